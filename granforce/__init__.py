@@ -1,15 +1,21 @@
-"""granforce: how undetermined are the contact forces in a packing of rigid frictional disks?"""
+"""granforce: how undetermined are the contact forces in a packing of rigid frictional disks?
+
+A session: ``packing = gf.pack(400, mu=0.1, seed=1)``, ``S = gf.ensemble(packing)``, then
+``gf.intervals(S)`` for exact bounds, or ``gf.walk(S, 1000, seed=0)`` and
+``gf.sample_uniform(S, 1000)`` for states, measured by ``gf.measures`` and drawn by ``gf.figures``.
+``granforce docs`` opens the reference of all names, with examples.
+"""
 
 import importlib
-from typing import Any
 
-from granforce.system.compiled import find_a_place
+from granforce.system.compiled import find_a_place as _find_a_place
 
-find_a_place()
+__version__ = "0.2.0"
 
-# Names are looked up on first use, so that `granforce --help` need not load numba and HiGHS. What a
-# function returns stands beside it. What a
-# function returns stands beside it.
+_find_a_place()
+
+# Names are looked up on first use, so that `granforce --help` need not load numba and HiGHS. A
+# function and the record it returns have the same home.
 _HOME = {
     "Cancelled": "records",
     "Cell": "cell",
@@ -114,9 +120,13 @@ _HOME = {
 __all__ = list(_HOME)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'granforce' has no attribute {name!r}")
     if not _HOME[name]:
         return importlib.import_module(f"granforce.{name}")
     return getattr(importlib.import_module(f"granforce.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__all__", "__doc__", "__file__", "__name__", "__path__", "__version__"]

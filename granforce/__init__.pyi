@@ -99,5 +99,6 @@ from granforce.study.store import Store as Store
 from granforce.study.store import Verdict as Verdict
 from granforce.study.store import open_store as open_store
 
+__version__: str
 __all__: list[str]
 _HOME: dict[str, str]

@@ -50,14 +50,9 @@ def small(code):
 
 
 def known():
-    """The command line's own list of its commands, former names left out."""
+    """The command line's own list of its commands."""
     (subparsers,) = (a for a in make_parser()._actions if hasattr(a, "choices") and a.choices)
-    return {name for name, parser in subparsers.choices.items() if parser.prog.endswith(f" {name}")}
-
-
-def named_today(words):
-    """`scan` by its former name as long as the command line knows no other."""
-    return ["sweep", *words[1:]] if words[0] == "scan" and "scan" not in known() else words
+    return set(subparsers.choices)
 
 
 def commands(document):
@@ -72,7 +67,7 @@ def commands(document):
         while words and "=" in words[0]:
             words.pop(0)  # variables
         if words[:1] == ["granforce"] and words[1:] and words[1].islower():
-            found.append(named_today(words[1:]))
+            found.append(words[1:])
     return found
 
 
@@ -211,7 +206,10 @@ def test_the_map_shows_every_room():
     for room, names in rooms.items():
         for name in names:
             assert (ROOT / "granforce" / room / name.removeprefix(room)).exists(), (room, name)
-    beside = {path.name for path in (ROOT / "granforce").glob("*.py")} - {"__init__.py"}
+    beside = {path.name for path in (ROOT / "granforce").glob("*.py")} - {
+        "__init__.py",
+        "__main__.py",
+    }
     assert set(rooms[""]) == beside
 
 

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
+from granforce import __version__
 from granforce.cli import words
 from granforce.cli.options import EXAMPLE
 from granforce.cli.parsing import Input, Kept, Output, Parser, Workplace, refused
@@ -121,8 +122,8 @@ def make_parser() -> Parser:
         epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
         formatter_class=EXAMPLE,
     )
+    parser.add_argument("--version", action="version", version=f"granforce {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for add in words.COMMANDS:
         add(commands)
-    commands.choices["sweep"] = commands.choices["scan"]  # its name before
     return parser

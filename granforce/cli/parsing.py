@@ -116,6 +116,14 @@ class Parser(argparse.ArgumentParser):
         given = {name for name, value in values.items() if value != argparse.SUPPRESS}
         return {name: typed for name, typed in self.options.items() if name in given}
 
+    def every_action(self) -> Iterator[argparse.Action]:
+        """The options and arguments of this parser and of the commands below it."""
+        for action in self._actions:
+            yield action
+            if isinstance(action, argparse._SubParsersAction):
+                for parser in dict.fromkeys(action.choices.values()):
+                    yield from parser.every_action()
+
     def chosen(self, arguments: argparse.Namespace) -> Parser:
         """The parser of the command that was typed."""
         for action in self._actions:

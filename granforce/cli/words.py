@@ -399,6 +399,19 @@ def add_docs(commands: Commands) -> None:
     )
 
 
+def add_completion(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "completion",
+        "print the script with which a shell completes commands, options and files",
+        "granforce completion bash > ~/.local/share/bash-completion/completions/granforce\n"
+        "  granforce completion zsh > ~/.zfunc/_granforce\n"
+        "  granforce completion fish > ~/.config/fish/completions/granforce.fish",
+        reports=False,
+    )
+    command.add_argument("shell", choices=["bash", "zsh", "fish", "tcsh"])
+
+
 def add_import(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -522,6 +535,7 @@ COMMANDS = (
         add_study,
         add_app,
         add_docs,
+        add_completion,
         add_import,
         add_export,
         add_bench,

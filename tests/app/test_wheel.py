@@ -5,8 +5,8 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 import urllib.request
+import zipfile
 
 import pytest
 from serving import CHROMIUM, FLAGS, MANY, PATIENCE, free_port, painted, wait_until_served
@@ -15,39 +15,80 @@ from small_store import ROOT
 SOURCES = ("app", "data", "granforce", "LICENSE", "README.md", "pyproject.toml")
 
 
-def test_every_package_is_in_the_wheel():
-    """Those of the app and the data are mapped into granforce; all others are listed."""
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    found = [init.parent.relative_to(ROOT) for init in ROOT.glob("[ag]*/**/__init__.py")]
-    names = [".".join(folder.parts) for folder in found if folder.parts[0] in ("app", "granforce")]
-    inside = [name if name.startswith("granforce") else f"granforce.{name}" for name in names]
-    assert sorted(listed) == sorted([*inside, "granforce.data"])
+PIP = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
+
+
+def environment(folder):
+    """Python of a fresh environment with this one's libraries, but without granforce."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    libraries = [path for path in sys.path if path.endswith("site-packages")]
+    (packages / "libraries.pth").write_text("\n".join(libraries))
+    return folder / "bin" / "python"
+
+
+def pip(*words):
+    """Run pip; skip where the build back-end cannot be downloaded."""
+    run = subprocess.run([*PIP, *map(str, words)], capture_output=True, text=True)
+    if "No matching distribution found for hatchling" in run.stderr:
+        pytest.skip("hatchling, which builds wheels, can be had from no index here")
+    assert run.returncode == 0, run.stderr
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """Folder of the programs of a fresh environment with the wheel, and this one's libraries."""
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "source"
+def clone(tmp_path_factory):
+    """A copy of the sources in a folder called granforce, as git clones it."""
+    source = tmp_path_factory.mktemp("parent") / "granforce"
     source.mkdir()
     for name in SOURCES:  # what building leaves behind stays out of the checkout
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, source / name)
-    pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
-    built = subprocess.run(
-        [*pip, "wheel", "--no-deps", "-w", str(folder), str(source)], capture_output=True, text=True
-    )
-    if "No matching distribution found for setuptools" in built.stderr:
-        pytest.skip("setuptools, which builds wheels, can be had from no index here")
-    assert built.returncode == 0, built.stderr
+    return source
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory, clone):
+    folder = tmp_path_factory.mktemp("wheel")
+    pip("wheel", "--no-deps", "-w", folder, clone)
     (wheel,) = folder.glob("*.whl")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "env")], check=True)
-    python = folder / "env" / "bin" / "python"
-    (packages,) = (folder / "env").glob("lib/python*/site-packages")
-    libraries = [path for path in sys.path if path.endswith("site-packages")]
-    (packages / "libraries.pth").write_text("\n".join(libraries))
-    subprocess.run([*pip, "--python", str(python), "install", "--no-deps", str(wheel)], check=True)
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def installed(wheel):
+    """Folder of the programs of a fresh environment with the wheel."""
+    python = environment(wheel.parent / "env")
+    pip("--python", python, "install", "--no-deps", wheel)
     return python.parent
+
+
+@pytest.mark.slow
+def test_every_module_is_in_the_wheel_and_no_picture_of_a_readme(wheel):
+    """Those of the app are mapped into granforce."""
+    found = [
+        path.relative_to(ROOT) for room in ("app", "granforce") for path in (ROOT / room).rglob("*")
+    ]
+    python = {path.as_posix() for path in found if path.suffix in (".py", ".pyi", ".js", ".css")}
+    expected = {name if name.startswith("granforce") else f"granforce/{name}" for name in python}
+    held = set(zipfile.ZipFile(wheel).namelist())
+    assert expected - held == set()
+    assert not [name for name in held if name.endswith(("README.md", ".png", ".webp"))]
+
+
+@pytest.mark.slow
+def test_an_editable_install_works_beside_the_clone_and_elsewhere(clone, tmp_path):
+    """Its parent holds a folder granforce, which is no package; type checkers find the library."""
+    python = environment(tmp_path / "env")
+    pip("--python", python, "install", "--no-deps", "-e", clone)
+    script = "import granforce as gf\nprint(gf.Packing.__name__)\nx: str = gf.pack(30, 1.0).mu\n"
+    for folder in (clone.parent, tmp_path):
+        (folder / "own.py").write_text(script.replace("x: str = ", ""))
+        run = subprocess.run([python, "own.py"], cwd=folder, capture_output=True, text=True)
+        assert run.stdout == "Packing\n", run.stderr
+        (folder / "own.py").write_text(script)
+        mypy = [sys.executable, "-m", "mypy", "--python-executable", str(python), "own.py"]
+        told = subprocess.run(mypy, cwd=folder, capture_output=True, text=True).stdout
+        assert 'expression has type "float", variable has type "str"' in told, told
 
 
 @pytest.mark.slow

@@ -67,12 +67,6 @@ def test_every_command_has_help_with_an_example(run, command):
     assert f"Example:\n  granforce {command}" in out
 
 
-def test_scan_answers_to_its_name_before(run):
-    code, out, _ = run("sweep", "--help")
-    assert code == 0 and "granforce scan" in out
-    assert "sweep" not in run("--help")[1]
-
-
 def test_pack_reports_and_saves(run, tmp_path):
     file = tmp_path / "p.npz"
     code, out, err = run("pack", "-n", 20, "--mu", 0.3, "--out", file, "--json")

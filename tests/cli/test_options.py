@@ -51,6 +51,7 @@ LINES = {
     ],
     "app": [""],
     "docs": ["--out reference.html"],
+    "completion": ["bash"],
     "import lammps": [
         "particles.dump contacts.dump --mu 0.5",
         "particles.dump contacts.dump --mu 0.5 --frames all",

@@ -3,13 +3,14 @@
 from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
 from granforce.cli.commands.inference import infer
 from granforce.cli.commands.packings import export, import_, pack
-from granforce.cli.commands.service import app, bench, cache, docs, study_
+from granforce.cli.commands.service import app, bench, cache, completion, docs, study_
 from granforce.cli.commands.states import measure, scan, uniform, volume, walk
 
 __all__ = [
     "app",
     "bench",
     "cache",
+    "completion",
     "docs",
     "export",
     "import_",

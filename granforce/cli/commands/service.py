@@ -11,6 +11,7 @@ from pathlib import Path
 
 import platformdirs
 
+from granforce.cli.parsing import ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
@@ -82,6 +83,21 @@ def docs(arguments: argparse.Namespace) -> None:
     print(path)
     if not arguments.out:
         webbrowser.open(path.as_uri())
+
+
+def completion(arguments: argparse.Namespace) -> None:
+    """The script with which a shell completes what is typed."""
+    import shtab
+
+    from granforce.cli.parser import make_parser
+
+    parser = make_parser()
+    for action in parser.every_action():
+        if action.type in (Input, Output):
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+        elif action.type in ROLES:
+            action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
+    print(shtab.complete(parser, arguments.shell))
 
 
 def bench(arguments: argparse.Namespace) -> None:

@@ -1,0 +1,5 @@
+"""`python -m granforce` is the command `granforce`."""
+
+from granforce.cli.parser import command
+
+command()
