@@ -87,7 +87,7 @@ TERMS = {
     ),
     "mean_force": Term(
         "mean normal force",
-        "The mean of fₙ over the contacts; forces are told in this unit.",
+        "The mean of fₙ over the contacts; the page and figures give forces in this unit.",
         "⟨fₙ⟩",
     ),
     "extent": Term(

@@ -126,14 +126,14 @@ def bounds(S, rng):
     found = gf.intervals(S, S.index[some])
     assert found.converged, f"uncertified: {int(np.sum(~(found.gap <= 1e-8)))} bounds"
     witness = linprog_bounds(S, int(some[0]))
-    ours = np.stack([found.lower[0], found.upper[0]], axis=1) / S.force_scale
+    ours = np.stack([found.low[0], found.high[0]], axis=1) / S.force_scale
     off = np.abs(ours - witness)
     assert not np.any(off > _AS_BOUND * np.maximum(1, np.abs(witness))), f"linprog: off {off}"
     if (own := _member(S)) is not None:
         inside = own[some]
         slack = 1e-7 * S.force_scale
-        assert np.all(inside >= found.lower - slack), "a member lies below its bound"
-        assert np.all(inside <= found.upper + slack), "a member lies above its bound"
+        assert np.all(inside >= found.low - slack), "a member lies below its bound"
+        assert np.all(inside <= found.high + slack), "a member lies above its bound"
 
 
 def limit_loads(S, rng):
@@ -154,7 +154,7 @@ def reaches(S, rng):
 def pulls(S, rng):
     contact = S.index[rng.integers(len(S.index))]
     reach = gf.reach(S, contact)
-    done = gf.pull(S, contact, np.linspace(reach.lower, reach.upper, 3))
+    done = gf.pull(S, contact, np.linspace(reach.low, reach.high, 3))
     _balanced(S, done.states)
 
 

@@ -105,7 +105,7 @@ def measured(S):
 
 
 MEASUREMENT = b"contact,f_n,f_t,sigma_n,sigma_t\n0,1.5,,0.1,\n"
-BOUNDS = b"contact,f_n_min,f_n_max\n0,0,2\n"
+BOUNDS = b"contact,f_n_low,f_n_high\n0,0,2\n"
 _part = {"states": 8, "chains": 2}
 
 # Every public function that computes, or reads: of an Ensemble of 20 disks and a folder.

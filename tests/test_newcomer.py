@@ -1,10 +1,15 @@
 """What a newcomer tries first, with nothing but the README, `help()` and the TAB key."""
 
+import json
 import pydoc
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
+from packings import packed
 
 import granforce as gf
 from granforce.cli.parser import main
@@ -54,3 +59,45 @@ def test_bash_completes_options_choices_and_files(capsys, tmp_path):
     assert "--ensemble-mu" in completed("granforce", "intervals", "--ens")
     assert completed("granforce", "walk", "--relax", "gauss_seidel_o") == ["gauss_seidel_only"]
     assert "packing.npz" in completed("granforce", "intervals", "--packing", "pack")
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A folder of one's own, and a store in it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    return tmp_path
+
+
+def report(capsys, *words):
+    assert main([str(word) for word in (*words, "--json")]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("unit", ["packing", "mean"])
+def test_report_table_and_library_agree_in_the_unit_that_names_carry(unit, cache, capsys):
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    S = gf.ensemble(packed(30, 0.3))
+    scale = {"packing": 1, "mean": S.force_scale}[unit]
+    words = ["--packing", "p.npz", "--unit", unit, "--csv", "table.csv"]
+    told, exact = report(capsys, "intervals", *words), gf.intervals(S)
+    table = pd.read_csv("table.csv")
+    assert table[f"f_t_high [{unit}]"].to_numpy() == pytest.approx(
+        exact.high[:, 1] / scale, abs=1e-7
+    )
+    extent = (exact.high - exact.low)[:, 0].mean() / scale
+    assert told[f"mean_extent_of_f_n [{unit}]"] == pytest.approx(extent, abs=1e-7)
+    assert told[f"mean_normal_force [{unit}]"] == pytest.approx(S.force_scale / scale)
+    told, loads = report(capsys, "limit-loads", *words), gf.limit_loads(S) / scale
+    load = pd.read_csv("table.csv")[f"limit_load [{unit}]"].to_numpy()
+    assert load == pytest.approx(loads, abs=1e-7)
+    assert told[f"mean_limit_load [{unit}]"] == pytest.approx(loads.mean(), abs=1e-7)
+
+
+def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys):
+    Path("known.csv").write_text("contact,f_n [mean]\n0,1\n")
+    assert main("intervals -n 20 --mu 0.3 --known known.csv".split()) == 2
+    told = capsys.readouterr().err
+    assert "f_n [mean]" in told and "--unit packing" in told and told.count("\n") == 1
+    Path("known.csv").write_text("contact,f_n_low [packing]\n0,0.5\n")
+    assert gf.read_known("known.csv").low.tolist() == [[0.5, -np.inf]]

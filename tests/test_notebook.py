@@ -84,7 +84,7 @@ def test_ensembles_walks_and_intervals_are_small_tables():
     for record, name, value in (
         (S, "dimension h", S.dimension),
         (walk, "η2", f"{gf.measures.eta2(walk.states):.4g}"),
-        (bounds, "exact η3", f"{gf.measures.eta3(bounds.lower, bounds.upper):.4g}"),
+        (bounds, "exact η3", f"{gf.measures.eta3(bounds.low, bounds.high):.4g}"),
     ):
         table = ET.fromstring(record._repr_html_())
         rows = {row[0].text: row[1].text for row in table.iter("tr")}

@@ -62,8 +62,8 @@ def test_one_point_is_found_by_everyone(S):
         "walk": gf.walk(S, 3, 0).states,
         "billiard": gf.sample_uniform(S, 8).flat,
         "hit and run": gf.sample_uniform(S, 8, method="hit_and_run").flat,
-        "lower": bounds.lower,
-        "upper": bounds.upper,
+        "lower": bounds.low,
+        "upper": bounds.high,
         "nearest": gf.nearest(S, start).forces,
         "accelerated": gf.nearest(S, start).forces,
         "sweeps": gf.gauss_seidel(S, start).forces,
@@ -83,7 +83,7 @@ def test_its_outline_and_its_limits_exist(S):
 
 
 def test_no_contact_asked_is_no_contact_answered(S):
-    assert gf.intervals(S, []).converged and len(gf.intervals(S, []).lower) == 0
+    assert gf.intervals(S, []).converged and len(gf.intervals(S, []).low) == 0
     assert len(gf.limit_loads(S, [])) == 0
 
 

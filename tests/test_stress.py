@@ -93,8 +93,8 @@ def test_crystals_with_dependent_equations(triangular, mu, vacancy, rng):
     assert bounds.max_gap <= 1e-8
     for forces in (found.forces, swept.forces):
         inside = forces[[0, 5]]
-        assert np.all(inside >= bounds.lower - 1e-7)
-        assert np.all(inside <= bounds.upper + 1e-7)
+        assert np.all(inside >= bounds.low - 1e-7)
+        assert np.all(inside <= bounds.high + 1e-7)
 
 
 def test_a_box_much_longer_than_wide(rng):

@@ -294,7 +294,7 @@ def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
 
 def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> str:
     """Two lines for a terminal: what is known as a file, and the intervals under it."""
-    lines = ["contact,f_n_min,f_n_max"]
+    lines = ["contact,f_n_low,f_n_high"]
     lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
     words = ["granforce", "intervals", *of_packing(selection), "--known", "known.csv"]
     return (

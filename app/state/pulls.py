@@ -283,8 +283,8 @@ def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
 def _rail(rail: Any, scale: float) -> Message:
     """A Rail as the player takes it: flat arrays, forces in ⟨f_n⟩."""
     return {
-        "lower": rail.lower / scale,
-        "upper": rail.upper / scale,
+        "lower": rail.low / scale,
+        "upper": rail.high / scale,
         "whole": rail.whole,
         "values": (rail.values / scale).astype(np.float64),
         "normal": (rail.states[..., 0] / scale).astype(np.float32).ravel(),

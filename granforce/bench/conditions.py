@@ -82,9 +82,9 @@ def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     ours, found = timed(intervals, S, contacts)
     theirs, bounds = timed(plain_loop, S, contacts)
     # Between the value that is attained and the one that bounds it lies the optimum.
-    beyond = np.abs([bounds[0] - found.lower, bounds[1] - found.upper]) / S.force_scale
+    beyond = np.abs([bounds[0] - found.low, bounds[1] - found.high]) / S.force_scale
     outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
-    common = {"task": task, "programs": found.lower.size + found.upper.size}
+    common = {"task": task, "programs": found.low.size + found.high.size}
     return [
         common | _told("granforce", ours, theirs) | {"gap": found.max_gap},
         common | _told("HiGHS", theirs, theirs) | {"off": float(outside.max())},
@@ -94,7 +94,7 @@ def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
 def _pulls(S: Ensemble, contacts: Integers, repeats: int) -> list[dict[str, Any]]:
     note("knowledge: pulls")
     found = intervals(S, contacts)
-    ends = zip(contacts, found.lower[:, 0], found.upper[:, 0], strict=True)
+    ends = zip(contacts, found.low[:, 0], found.high[:, 0], strict=True)
     asked = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
 
     def ours() -> Floats:

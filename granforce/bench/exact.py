@@ -114,7 +114,7 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
 
 def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
     seconds, found = timed(intervals, system, workers=workers)
-    error = _error(system, data, found.lower, found.upper)
+    error = _error(system, data, found.low, found.high)
     return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": str(found.counts)}
 
 

@@ -179,6 +179,57 @@ def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
     return {} if given is None else {"known": importers.read_known(given)}
 
 
+class Unit(NamedTuple):
+    """The unit in which a command reports and writes forces."""
+
+    word: str  # packing or mean
+    scale: float  # this unit in the packing's
+
+    def named(self, forces: Mapping[str, Any]) -> dict[str, Any]:
+        """Forces in the packing's unit by name, in this one, which the names then carry."""
+        return {f"{name} [{self.word}]": values / self.scale for name, values in forces.items()}
+
+    def reported(self, forces: Mapping[str, Any]) -> dict[str, Any]:
+        """The same as plain numbers and lists."""
+        return {name: np.asarray(values).tolist() for name, values in self.named(forces).items()}
+
+
+PACKING_UNIT = Unit("packing", 1.0)
+
+
+# Forces in reports on packings, which are in one unit whatever is asked for.
+_REPORTED = {
+    "mean_normal_force": "packing",
+    "mean_change_of_f_n": "mean",
+    "mean_change_of_f_t": "mean",
+}
+
+
+def with_units(lines: Mapping[str, Any]) -> dict[str, Any]:
+    """A report on a packing, with the units of forces in their names."""
+    return {
+        f"{name} [{_REPORTED[name]}]" if name in _REPORTED else name: value
+        for name, value in lines.items()
+    }
+
+
+def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
+    """What --unit asks for: the packing's own, or the mean normal force of its ensemble."""
+    if arguments.unit == "mean":
+        return Unit("mean", dataset["force_scale"].item())
+    return PACKING_UNIT
+
+
+def extents(dataset: xr.Dataset) -> dict[str, float]:
+    """How long the intervals of f_n are, by name, in the packing's unit; and the mean f_n."""
+    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    return {
+        "mean_normal_force": dataset["force_scale"].item(),
+        "mean_extent_of_f_n": float(extent.mean()),
+        "largest_extent_of_f_n": float(extent.max()),
+    }
+
+
 def walked(arguments: argparse.Namespace, output: str | None = None) -> Found:
     """The walk that the options ask for; output: a file that will be written."""
     return found(

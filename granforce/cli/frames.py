@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from granforce.cli.asked import check_outputs, write_csv
+from granforce.cli.asked import PACKING_UNIT, Unit, check_outputs, with_units, write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots
@@ -53,7 +53,8 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if dataset is not None:
         for note in dataset.attrs["notes"]:
             print(f"granforce: {note}", file=sys.stderr)
-        print_list(_rows(dataset), tuple(_rows(dataset)[0]), arguments.json)
+        rows = _rows(dataset, arguments.unit)
+        print_list(rows, tuple(rows[0]), arguments.json)
         if arguments.out is not None:
             series.save_series(dataset, arguments.out)
     return 1 if failed else 0
@@ -87,7 +88,7 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
         last, notes = list(json.loads(dataset.attrs["notes"]).items())[-1]
         for note in notes:
             print(f"granforce: {snapshots.word} {last}: {note}", file=sys.stderr)
-        columns = {name: dataset[name].values for name in ("frame", *SCALARS)}
+        columns = with_units({name: dataset[name].values for name in ("frame", *SCALARS)})
         lists = {name: values.tolist() for name, values in columns.items()}
         rows = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
         print_list(rows, tuple(columns), arguments.json)
@@ -111,11 +112,12 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
     return [number for number in there if number in numbers]
 
 
-def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """A line for each frame; forces in its mean measured normal force."""
+def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:
+    """A line for each frame; ⟨f_n⟩ is its mean measured normal force."""
     rows = []
     for k, number in enumerate(dataset["frame"].values.tolist()):
-        one, unit = dataset.isel(frame=k), float(dataset["unit"][k])
+        one = dataset.isel(frame=k)
+        unit = Unit("mean", float(dataset["unit"][k])) if word == "mean" else PACKING_UNIT
         account = dict(zip(dataset["kind"].values, one["account"].values, strict=True))
         mended = sum(int(account[kind]) for kind in KINDS if kind != "beyond_friction")
         rows.append(
@@ -131,6 +133,7 @@ def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
         )
         if "standard_error" in one:
             moved = np.abs(one["change"].values) > 3 * one["change_error"].values
-            rows[-1]["standard_error"] = float(np.nanmean(one["standard_error"].values) / unit)
+            error = float(np.nanmean(one["standard_error"].values))
+            rows[-1] |= unit.reported({"standard_error": error})
             rows[-1]["changed"] = int(moved.any(axis=1).sum())
     return rows

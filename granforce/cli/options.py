@@ -207,8 +207,8 @@ def add_known(group: argparse._ArgumentGroup) -> None:
         "--known",
         type=Input,
         metavar="FILE.csv",
-        help="forces that are known: columns contact, and f_n, f_t (exactly) or f_n_min, f_n_max, "
-        "f_t_min, f_t_max (bounds); empty fields say nothing",
+        help="forces that are known, in the packing's unit: columns contact, and f_n, f_t "
+        "(exactly) or f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
     )
 
 
@@ -233,6 +233,16 @@ def add_source(command: Parser) -> None:
     add_walk_options(command)
     add_conditions(command)
     add_store(command)
+
+
+def add_unit(command: argparse._ActionsContainer) -> None:
+    command.add_argument(
+        "--unit",
+        choices=["packing", "mean"],
+        default="packing",
+        help="unit of forces in reports and tables, whose names carry it: the packing's own "
+        "(default), or the mean normal force ⟨f_n⟩",
+    )
 
 
 def add_scheduler(command: argparse._ActionsContainer) -> None:
@@ -262,6 +272,7 @@ def add_exact(command: Parser) -> None:
     group.add_argument(
         "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
     )
+    add_unit(group)
     add_conditions(command)
     add_store(command)
 

@@ -19,6 +19,7 @@ from granforce.cli.options import (
     add_series,
     add_source,
     add_store,
+    add_unit,
     add_walk_options,
     add_wall_contacts,
     import_format,
@@ -125,7 +126,8 @@ def add_infer(commands: Commands) -> None:
         "--measured",
         type=Input,
         metavar="FILE.csv",
-        help="columns contact, f_n, f_t, sigma_n, sigma_t; empty or nan where not measured",
+        help="columns contact, f_n, f_t, sigma_n, sigma_t, in the packing's unit; empty or nan "
+        "where not measured",
     )
     group.add_argument(
         "--unmeasured",
@@ -154,11 +156,12 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
     )
+    add_unit(group)
     add_conditions(command)
     add_store(command)
     single = command.options.keys() - {"files"}
     # Those of a single packing, which many frames have in common, and those of many frames.
-    shared = {"json", "mu", "cache", "workers", "unmeasured", "states", "sample_seed"}
+    shared = {"json", "mu", "cache", "workers", "unmeasured", "states", "sample_seed", "unit"}
     series = command.add_argument_group("many photoelastic frames")
     series.add_argument(
         "--frames",
@@ -190,6 +193,7 @@ def add_measure(commands: Commands) -> None:
     command.add_argument(
         "--contacts", type=Output, metavar="FILE.csv", help="write f_n and its interval per contact"
     )
+    add_unit(command)
 
 
 def add_scan(commands: Commands) -> None:
@@ -352,6 +356,7 @@ def add_perturb(commands: Commands) -> None:
     group.add_argument(
         "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
     )
+    add_unit(group)
     add_conditions(command, known=False)
     add_store(command)
     drawn = {"random", "draw_seed"}

@@ -102,5 +102,5 @@ def _mean_extent(ensemble: Ensemble, workers: int) -> float:
     cancelling.check("exact bounds")
     if not bounds.converged:
         return np.nan
-    extent = measures.normal_extent(bounds.lower, bounds.upper)
+    extent = measures.normal_extent(bounds.low, bounds.high)
     return float(extent.mean() / ensemble.force_scale)

@@ -35,12 +35,12 @@ def read_measurement(source: Source) -> Measurement:
     """The Measurement in a CSV file, as `infer` wants it once it is `on` the contacts of a packing.
 
     source: a path or an open file. Columns: contact (its number in the packing), f_n, f_t, sigma_n,
-    sigma_t; empty or nan where a component was not measured. Contacts without a line were not
-    measured.
+    sigma_t in the packing's unit, which names may end with: ``f_n [packing]``. Fields are empty or
+    nan where a component was not measured. Contacts without a line were not measured.
 
     Raises InputError naming file and line.
     """
-    table = read_csv(source)
+    table = read_csv(source).in_packing_unit()
     contacts = table.whole("contact")
     table.index("contact")  # each is given once
     values = np.empty((len(contacts), 4))

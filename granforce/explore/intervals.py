@@ -37,9 +37,9 @@ class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
     contacts: Integers  # (k,) their numbers in the packing
-    lower: Floats  # (k, 2) least value, force; NaN where cancelled before, or not certified
-    upper: Floats  # (k, 2) largest value, force; NaN likewise
-    gap: Floats  # (k, 2, 2) duality gap of [component, lower or upper] in ⟨f_n⟩
+    low: Floats  # (k, 2) least value, force; NaN where cancelled before, or not certified
+    high: Floats  # (k, 2) largest value, force; NaN likewise
+    gap: Floats  # (k, 2, 2) duality gap of [component, low or high] in ⟨f_n⟩
     backbone: Mask  # (k,) bool, largest f_n > 0
     max_gap: float  # largest gap among the bounds that were reached
     converged: bool  # every bound was reached with a gap ≤ INTERVAL_GAP
@@ -52,8 +52,8 @@ class Intervals(NamedTuple):
             "all bounds certified": self.converged,
         }
         if self.converged and len(self.contacts):
-            extent = measures.normal_extent(self.lower, self.upper)
-            lines |= {"exact η3": measures.eta3(self.lower, self.upper), "mean ΔFₙ": extent.mean()}
+            extent = measures.normal_extent(self.low, self.high)
+            lines |= {"exact η3": measures.eta3(self.low, self.high), "mean ΔFₙ": extent.mean()}
             lines |= {"largest ΔFₙ": extent.max()}
         lines |= {"largest duality gap / ⟨fₙ⟩": self.max_gap, **self.counts}
         return notebook.table("Exact intervals over S", lines)

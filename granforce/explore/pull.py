@@ -56,8 +56,8 @@ class Reach(NamedTuple):
     """How far f_n of one contact can be pulled, and what holds it there."""
 
     contact: int  # its number in the packing
-    lower: float  # exact least f_n over S, force
-    upper: float  # exact largest f_n over S, force
+    low: float  # exact least f_n over S, force
+    high: float  # exact largest f_n over S, force
     gap: Floats  # (2,) duality gaps in ⟨f_n⟩
     states: Floats  # (2, N_c, 2) a network at either end, force
     opened: Mask  # (2, N_c) bool, contacts without force in every network at that end
@@ -139,12 +139,12 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
     """
     found = reach(ensemble, contact)
     beyond = INTERVAL_GAP * ensemble.force_scale
-    for value in values[(values < found.lower - beyond) | (values > found.upper + beyond)]:
+    for value in values[(values < found.low - beyond) | (values > found.high + beyond)]:
         raise InputError(
             f"a normal force of {value:.9g} on contact {contact} is outside its exact interval, "
-            f"{found.lower:.9g} to {found.upper:.9g}: no admissible network has it"
+            f"{found.low:.9g} to {found.high:.9g}: no admissible network has it"
         )
-    width = found.upper - found.lower
+    width = found.high - found.low
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
         states = np.stack([some_network(ensemble, state)] * len(values))
         if np.all(ensemble.admits(states)):
@@ -155,11 +155,11 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         )
     position = ensemble.position(contact)
     for part in _INWARD:
-        inside = found.lower + part * width, found.upper - part * width
+        inside = found.low + part * width, found.high - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
         if np.all(admitted := ensemble.admits(states)):
             return states
-    between = np.clip((values - found.lower) / width, 0.0, 1.0)[:, None, None]
+    between = np.clip((values - found.low) / width, 0.0, 1.0)[:, None, None]
     # On the line between both ends lies a network with each value: S with that known has one.
     on_the_line = (1 - between) * found.states[0] + between * found.states[1]
     for k in np.flatnonzero(~admitted):
@@ -169,7 +169,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not reached; take a value further from the ends of its interval, "
-        f"{found.lower:.9g} to {found.upper:.9g}"
+        f"{found.low:.9g} to {found.high:.9g}"
     )
 
 

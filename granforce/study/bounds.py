@@ -20,7 +20,7 @@ UNDETERMINED = 1e-6
 
 def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -> xr.Dataset:
     """Intervals as a dataset, with their measures and the clusters of undetermined contacts."""
-    low, high = bounds.lower, bounds.upper
+    low, high = bounds.low, bounds.high
     place = S.positions(bounds.contacts)
     original = S.original[place]
     tolerance = UNDETERMINED * S.force_scale

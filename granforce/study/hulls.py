@@ -60,7 +60,7 @@ def bounds(packing: Packing) -> Floats | None:
         return None
     found = intervals(S)
     both = np.zeros((len(packing.contacts.i), 2))
-    both[S.index] = np.column_stack([found.lower[:, 0], found.upper[:, 0]])
+    both[S.index] = np.column_stack([found.low[:, 0], found.high[:, 0]])
     return both
 
 

@@ -31,8 +31,8 @@ WORKERS = 2  # threads, while somebody waits with a force in hand
 class Rail(NamedTuple):
     """Networks of S in which f_n of one contact goes from its least to its largest value."""
 
-    lower: float  # exact bounds, force
-    upper: float
+    low: float  # exact bounds, force
+    high: float
     values: Floats  # (k,) f_n of the contact in the states, force, ascending
     states: Floats  # (k, N_c, 2) the networks nearest to the one pulled, force
     residual: Floats  # (k,) in ⟨f_n⟩
@@ -70,8 +70,8 @@ class Puller:
         ends = reach(self._S, contact, workers=WORKERS)
         (position,) = self._S.positions([contact])
         many = len(self._S.index) > MANY if many is None else many
-        inward = (ends.upper - ends.lower) * (INWARD if many else 0.0)
-        low, high = ends.lower + inward, ends.upper - inward
+        inward = (ends.high - ends.low) * (INWARD if many else 0.0)
+        low, high = ends.low + inward, ends.high - inward
         # The network itself is among them, so that nothing jumps when it is taken in hand.
         stops = np.linspace(low, high, FEW_STOPS if many else STOPS)
         values = np.union1d(stops, np.clip(state[position, 0], low, high))
@@ -141,8 +141,8 @@ def _rail(ends: Reach, parts: list[Pull], whole: bool = True) -> Rail:
     values = np.concatenate([part.values for part in parts])
     order = np.argsort(values)
     return Rail(
-        lower=ends.lower,
-        upper=ends.upper,
+        low=ends.low,
+        high=ends.high,
         values=values[order],
         states=np.concatenate([part.states for part in parts])[order],
         residual=np.concatenate([part.residual for part in parts])[order],

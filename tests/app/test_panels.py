@@ -499,8 +499,8 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     assert len(rows) == replay.summary["contacts"] and "." not in table[1].split(",")[0]
     np.testing.assert_allclose(column["f_n"], replay.normal[3] * replay.force_scale, rtol=1e-6)
     slack = 1e-6 * replay.force_scale
-    assert np.all(column["f_n_min"] <= column["f_n_low"] + slack)
-    assert np.all(column["f_n_high"] <= column["f_n_max"] + slack)
+    assert np.all(column["f_n_low"] <= column["f_n_seen_low"] + slack)
+    assert np.all(column["f_n_seen_high"] <= column["f_n_high"] + slack)
     packing = state.library.packing(state.cell.params["packing"])
     place = column["contact"].astype(int)
     np.testing.assert_array_equal(column["i"], packing.contacts.i[place])

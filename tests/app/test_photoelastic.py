@@ -181,7 +181,7 @@ def test_a_frame_is_opened_as_a_packing(state):
     np.testing.assert_allclose(player.measured["off"], frame.deviation[inner][S.index, 0], 1e-5)
     assert np.isnan(own).any() and np.isfinite(own).any()
     exact = gf.intervals(S)
-    assert np.isfinite(exact.upper).all() and exact.max_gap < 1e-6
+    assert np.isfinite(exact.high).all() and exact.max_gap < 1e-6
 
 
 def made(n, **options):

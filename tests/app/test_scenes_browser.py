@@ -140,8 +140,8 @@ def test_the_page_cuts_the_same_body_as_the_library(look, name, mu):
     low, high = np.array(
         ask(page, "small.body.scene.names.map((_, c) => small.body.interval(2 * c))")
     ).T
-    np.testing.assert_allclose(low, exact.lower[:, 0], atol=1e-7)
-    np.testing.assert_allclose(high, exact.upper[:, 0], atol=1e-7)
+    np.testing.assert_allclose(low, exact.low[:, 0], atol=1e-7)
+    np.testing.assert_allclose(high, exact.high[:, 0], atol=1e-7)
 
 
 def test_friction_is_changed_under_the_eye(look):
@@ -356,7 +356,7 @@ def bounds_are_exact(page, name, tolerance):
     """The ensemble of a scene, whose bounds the page has as the library finds them."""
     S = gf.ensemble(gf.scene(name))
     exact = gf.intervals(S)
-    seen, bounds = ask(page, "small.now.bounds"), [exact.lower[:, 0], exact.upper[:, 0]]
+    seen, bounds = ask(page, "small.now.bounds"), [exact.low[:, 0], exact.high[:, 0]]
     np.testing.assert_allclose(np.array(seen), np.column_stack(bounds), atol=tolerance)
     return S
 

@@ -32,9 +32,9 @@ def test_tangential_unknowns_left_out_are_zero_without_friction():
         intervals(without, without.index[[0, 5]]),
         intervals(vanishing, vanishing.index[[0, 5]]),
     )
-    assert np.ptp([one.lower[0, 0], one.upper[0, 0]]) > 0.1
-    assert np.abs(one.lower - other.lower).max() < 1e-5 * without.force_scale
-    assert np.abs(one.upper - other.upper).max() < 1e-5 * without.force_scale
+    assert np.ptp([one.low[0, 0], one.high[0, 0]]) > 0.1
+    assert np.abs(one.low - other.low).max() < 1e-5 * without.force_scale
+    assert np.abs(one.high - other.high).max() < 1e-5 * without.force_scale
 
 
 def test_the_benchmark_counts_every_skip():

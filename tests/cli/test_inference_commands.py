@@ -4,6 +4,7 @@ import json
 
 import frames
 import numpy as np
+import pandas as pd
 import pytest
 
 from granforce.cli.parser import main
@@ -35,10 +36,11 @@ def test_a_frame_becomes_a_packing_and_its_forces_are_inferred(folder, capsys):
     assert not found["cached"] and found["states"] == 40
     assert found["measured_components"] == 2 * frame["contacts_listed"]
     assert found["measured_where_nothing_can_carry"] == 0
-    columns = np.genfromtxt(folder / "inferred.csv", delimiter=",", names=True)
+    columns = pd.read_csv(folder / "inferred.csv")
+    normal, least = columns["f_n [packing]"], columns["least_f_n [packing]"]
     assert len(columns) == found["contacts"]
-    assert np.all(columns["f_n"] >= 0) and np.all(columns["error_f_n"] > 0)
-    sure = columns["contact"][columns["least_f_n"] > 1e-6 * columns["f_n"].mean()].astype(int)
+    assert np.all(normal >= 0) and np.all(columns["error_f_n [packing]"] > 0)
+    sure = columns["contact"][least > 1e-6 * normal.mean()].astype(int)
     assert set(found["carry_for_certain"]) == set(sure.tolist())
     assert told(infer, capsys)["cached"]
     other = told(f"{infer} --sample-seed 1", capsys)
@@ -48,7 +50,7 @@ def test_a_frame_becomes_a_packing_and_its_forces_are_inferred(folder, capsys):
 def test_without_draws_there_are_no_error_bars(folder, capsys):
     (folder / "some.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n3,1.5,,0.1,\n4,,0.1,,0.1\n")
     found = told("infer -n 20 --mu 0.3 --measured some.csv --states 0", capsys)
-    assert found["measured_components"] == 2 and "mean_standard_error" not in found
+    assert found["measured_components"] == 2 and "mean_standard_error [packing]" not in found
     assert found["chi_square"] >= 0
 
 
@@ -84,5 +86,5 @@ def test_error_bars_by_measuring_again(folder, capsys):
     flat, again = told(words, capsys), told(f"{words} --again", capsys)
     assert again["states"] == 40 and not again["cached"]
     assert again["chi_square"] == flat["chi_square"]
-    assert again["mean_standard_error"] != flat["mean_standard_error"]
+    assert again["mean_standard_error [packing]"] != flat["mean_standard_error [packing]"]
     assert told(f"{words} --again", capsys)["cached"]

@@ -105,7 +105,7 @@ def place(tmp_path_factory):
     (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     (folder / "r.txt").write_text("1\n" * 8)
-    (folder / "known.csv").write_text("contact,f_n_min\n0,0\n")
+    (folder / "known.csv").write_text("contact,f_n_low\n0,0\n")
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
     frames.write(folder, grains, rows)
     open_store(folder / "done" / "cells.zarr")

@@ -29,7 +29,7 @@ def S():
 
 def extent(body):
     found = intervals(body)
-    return np.mean(found.upper[:, 0] - found.lower[:, 0]) / body.force_scale
+    return np.mean(found.high[:, 0] - found.low[:, 0]) / body.force_scale
 
 
 def test_the_best_measurement_shortens_the_exact_intervals_most(S):
@@ -89,7 +89,7 @@ def test_what_carries_for_certain_is_what_exact_bounds_say():
     low[:], high[:] = -np.inf, np.inf
     low[seen], high[seen] = (m - 3 * sigma)[seen], (m + 3 * sigma)[seen]
     exact = intervals(ensemble(S.packing, known=Known(S.index, low, high)), found.contacts)
-    assert np.abs(found.least - exact.lower[:, 0]).max() < 1e-6 * S.force_scale
+    assert np.abs(found.least - exact.low[:, 0]).max() < 1e-6 * S.force_scale
     assert np.array_equal(found.carries, found.least > 1e-7 * S.force_scale)
     assert 0 < found.carries.sum() < len(found.carries)
     assert np.all(found.least <= S.original[::5, 0] + 1e-9)

@@ -69,8 +69,8 @@ def test_its_shadows_are_the_exact_intervals(seen):
     S, found = seen
     exact = gf.intervals(S)
     low, high = found.intervals
-    np.testing.assert_allclose(low, exact.lower, atol=2e-8 * S.force_scale)
-    np.testing.assert_allclose(high, exact.upper, atol=2e-8 * S.force_scale)
+    np.testing.assert_allclose(low, exact.low, atol=2e-8 * S.force_scale)
+    np.testing.assert_allclose(high, exact.high, atol=2e-8 * S.force_scale)
 
 
 def test_sides_are_named_by_what_stops_there(seen):

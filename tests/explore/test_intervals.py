@@ -39,8 +39,8 @@ def first():
 
 
 def agree(system, found, lower, upper, tolerance=1e-6):
-    assert np.abs(found.lower - lower).max() <= tolerance * system.force_scale
-    assert np.abs(found.upper - upper).max() <= tolerance * system.force_scale
+    assert np.abs(found.low - lower).max() <= tolerance * system.force_scale
+    assert np.abs(found.high - upper).max() <= tolerance * system.force_scale
 
 
 def test_what_frozen_surroundings_leave_open_is_certified():
@@ -51,7 +51,7 @@ def test_what_frozen_surroundings_leave_open_is_certified():
     assert found.converged
     assert found.counts["again"] == 0
     moved = np.abs(S.to_forces(linalg.null_space(S.A.toarray()).T)).max(axis=(0, 2))
-    extent = (found.upper - found.lower).max(axis=1)
+    extent = (found.high - found.low).max(axis=1)
     assert S.dimension > 0
     assert np.array_equal(extent > 1e-6 * S.force_scale, moved > 1e-9)
 
@@ -65,7 +65,7 @@ def test_bounds_where_some_contacts_can_do_nothing_but_slide():
     assert found.converged
     assert found.counts["again"] == 0
     for c in range(len(S.index)):
-        for side, value in enumerate((found.lower, found.upper)):
+        for side, value in enumerate((found.low, found.high)):
             program = module.bound_of(S, c, 0, side)
             alone = next(certified_values.from_scratch(system, 0, program))
             ((attained,), _) = certified_values.certify(system, [alone], [program])
@@ -89,7 +89,7 @@ def test_values_below_their_bounds_are_solved_again():
         cost = np.zeros(system.A.shape[1])
         cost[program.columns] = program.costs
         best = optimize.linprog(cost, A_eq=system.A, b_eq=system.b, options=exactly)
-        assert abs(found.upper[c, 0] / S.force_scale + best.fun) <= 3 * INTERVAL_GAP
+        assert abs(found.high[c, 0] / S.force_scale + best.fun) <= 3 * INTERVAL_GAP
 
 
 def test_bounds_agree_with_the_reference(small):
@@ -118,8 +118,8 @@ def test_limit_loads_agree_with_the_reference(small):
 def test_every_known_state_lies_inside_its_bounds(small):
     system, _, found = small
     slack = 1e-7 * system.force_scale
-    assert np.all(system.original >= found.lower - slack)
-    assert np.all(system.original <= found.upper + slack)
+    assert np.all(system.original >= found.low - slack)
+    assert np.all(system.original <= found.high + slack)
 
 
 def test_without_skipping_the_answers_are_the_same(first):
@@ -130,28 +130,28 @@ def test_without_skipping_the_answers_are_the_same(first):
     assert found.counts["f_n = 0 seen in a known state"] > 0
     assert every.counts["programs"] == 4 * len(system.index)
     for other in (known, every):
-        agree(system, other, found.lower, found.upper, 2 * INTERVAL_GAP)
+        agree(system, other, found.low, found.high, 2 * INTERVAL_GAP)
 
 
 def test_threads_and_company_do_not_change_a_bit(first):
     system, found = first
     threaded = intervals(system, workers=3)
-    np.testing.assert_array_equal(threaded.upper, found.upper)
-    np.testing.assert_array_equal(threaded.lower[:, 1], found.lower[:, 1])
+    np.testing.assert_array_equal(threaded.high, found.high)
+    np.testing.assert_array_equal(threaded.low[:, 1], found.low[:, 1])
     few = intervals(system, system.index[[40, 3, 41]])
-    np.testing.assert_array_equal(few.upper, found.upper[[40, 3, 41]])
+    np.testing.assert_array_equal(few.high, found.high[[40, 3, 41]])
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_bounds_are_told_as_they_are_found_the_widest_first_and_stay_the_same(first, workers):
     system, found = first
-    widths, told = (found.upper - found.lower)[:, 0], []
+    widths, told = (found.high - found.low)[:, 0], []
     again = intervals(system, workers=workers, widths=widths, watch=told.append)
     for one, other in zip(found, again, strict=True):
         if isinstance(one, np.ndarray):
             np.testing.assert_array_equal(one, other)
     assert again.counts == found.counts and again.max_gap == found.max_gap
-    sides = {0: again.lower, 1: again.upper}
+    sides = {0: again.low, 1: again.high}
     place = {int(c): k for k, c in enumerate(again.contacts)}
     last = {(bound.contact, bound.component, bound.side): bound.value for bound in told}
     assert len(last) == 4 * len(place)
@@ -197,7 +197,7 @@ def test_a_bound_left_short_of_its_certificate_is_refined_before_another_solver(
     again = intervals(system)
     assert again.converged and again.counts["again"] == 0
     assert set(refined) == {3, 40} and again.counts["programs"] == found.counts["programs"]
-    agree(system, again, found.lower, found.upper, 2 * INTERVAL_GAP)
+    agree(system, again, found.low, found.high, 2 * INTERVAL_GAP)
 
 
 def test_certificates_see_a_wrong_optimum(first):
@@ -227,7 +227,7 @@ def test_bounds_and_loads_agree_with_highs(mu):
     A, T = system.cone_form
     model = programs.standard_form(A, system.b / system.force_scale)
     for k in range(0, A.shape[1], 17):
-        for side, bound in ((1.0, found.lower), (-1.0, found.upper)):
+        for side, bound in ((1.0, found.low), (-1.0, found.high)):
             row = T.tocsr()[k].toarray().ravel()
             programs.set_cost(model, side * row)
             value = row @ programs.solve(model)[1] * system.force_scale
@@ -240,8 +240,8 @@ def test_forces_scale_with_the_pressure(first, factor):
     packing = system.packing
     scaled = packing._replace(pressure=packing.pressure * factor, forces=packing.forces * factor)
     other = intervals(ensemble(scaled))
-    np.testing.assert_allclose(other.upper / factor, found.upper, atol=1e-7 * system.force_scale)
-    np.testing.assert_allclose(other.lower / factor, found.lower, atol=1e-7 * system.force_scale)
+    np.testing.assert_allclose(other.high / factor, found.high, atol=1e-7 * system.force_scale)
+    np.testing.assert_allclose(other.low / factor, found.low, atol=1e-7 * system.force_scale)
 
 
 def test_a_square_lattice_without_friction_loads_one_line():
@@ -251,9 +251,9 @@ def test_a_square_lattice_without_friction_loads_one_line():
     found = intervals(system)
     assert found.converged
     line = 2 * side * side / side
-    np.testing.assert_allclose(found.upper[:, 0], line, rtol=1e-8)
-    np.testing.assert_allclose(found.lower, 0.0, atol=1e-7)
-    np.testing.assert_array_equal(found.upper[:, 1], 0.0)
+    np.testing.assert_allclose(found.high[:, 0], line, rtol=1e-8)
+    np.testing.assert_allclose(found.low, 0.0, atol=1e-7)
+    np.testing.assert_array_equal(found.high[:, 1], 0.0)
     # F itself is part of the line's force: it may take all of it.
     np.testing.assert_allclose(limit_loads(system), line, rtol=1e-8)
 
@@ -263,8 +263,8 @@ def test_a_square_lattice_with_friction_is_certified():
     found, loads = intervals(system), limit_load_bounds(system)
     assert found.converged and loads.converged
     # All contacts of a direction are alike.
-    np.testing.assert_allclose(found.upper[:, 0], found.upper[0, 0], atol=1e-6)
-    np.testing.assert_allclose(found.lower[:, 1], -found.upper[:, 1], atol=1e-6)
+    np.testing.assert_allclose(found.high[:, 0], found.high[0, 0], atol=1e-6)
+    np.testing.assert_allclose(found.low[:, 1], -found.high[:, 1], atol=1e-6)
 
 
 @pytest.mark.parametrize("mu", [1e-6, 1e-3])
@@ -274,7 +274,7 @@ def test_hexagonal_crystals_of_little_friction_are_certified(mu):
     found = intervals(crystal)
     assert found.converged
     # Translations map the contacts of a direction onto each other: their bounds are alike.
-    for bound in (found.lower, found.upper):
+    for bound in (found.low, found.high):
         alike = bound.reshape(3, 16, 2)
         np.testing.assert_allclose(alike, alike[:, :1].repeat(16, axis=1), atol=4 * INTERVAL_GAP)
     told = informative(crystal, 1, states=40, check=1)
@@ -283,18 +283,18 @@ def test_hexagonal_crystals_of_little_friction_are_certified(mu):
 
 def test_freezing_a_contact_holds_it_and_narrows_the_others(first):
     system, found = first
-    strong = int(np.argmax(found.lower[:, 0]))
+    strong = int(np.argmax(found.low[:, 0]))
     frozen = ensemble(system.packing, frozen=[system.index[strong]])
     narrowed = intervals(frozen)
     assert narrowed.converged
-    assert len(narrowed.upper) == len(system.index) - 1
-    assert np.all(narrowed.lower <= frozen.original + 1e-7 * frozen.force_scale)
-    assert np.all(narrowed.upper >= frozen.original - 1e-7 * frozen.force_scale)
+    assert len(narrowed.high) == len(system.index) - 1
+    assert np.all(narrowed.low <= frozen.original + 1e-7 * frozen.force_scale)
+    assert np.all(narrowed.high >= frozen.original - 1e-7 * frozen.force_scale)
 
 
 def test_forces_without_bounds_are_reported(first):
     system, found = first
-    weak = int(np.argmin(found.lower[:, 0]))
+    weak = int(np.argmin(found.low[:, 0]))
     frozen = ensemble(system.packing, frozen=[system.index[weak]], prune=False)
     with pytest.raises(InputError, match="not bounded"):
         intervals(frozen, frozen.index[:1])
@@ -311,9 +311,9 @@ def test_progress_counts_up_and_cancelling_leaves_the_rest_open(first):
     done = [number for number, _ in seen]
     assert done == sorted(done) and seen[0][1] == 4 * len(system.index)
     assert not cancelled.converged
-    reached = ~np.isnan(cancelled.upper)
+    reached = ~np.isnan(cancelled.high)
     assert 0 < reached.sum() < reached.size
-    np.testing.assert_array_equal(cancelled.upper[reached], found.upper[reached])
+    np.testing.assert_array_equal(cancelled.high[reached], found.high[reached])
 
 
 def test_contacts_outside_the_ensemble_are_refused(first):
@@ -336,7 +336,7 @@ def test_contacts_are_named_by_their_number_in_the_packing(first):
         (k,) = np.flatnonzero(whole.contacts == contact)
         one, load = intervals(frozen, [contact]), limit_load_bounds(frozen, [contact])
         assert one.contacts == load.contacts == [contact]
-        np.testing.assert_allclose(one.upper[0], whole.upper[k], atol=1e-7 * frozen.force_scale)
+        np.testing.assert_allclose(one.high[0], whole.high[k], atol=1e-7 * frozen.force_scale)
         assert load.load[0] == pytest.approx(loads.load[k], rel=1e-6)
     for result in (intervals, limit_loads):
         with pytest.raises(InputError, match=f"contact {system.index[4]} is none of"):
@@ -352,8 +352,8 @@ def test_what_is_not_certified_is_not_handed_out():
     assert not found.converged and not limits.converged
     unsure = ~(found.gap <= INTERVAL_GAP)
     assert unsure.any()
-    assert np.array_equal(np.isnan(found.lower), unsure[..., 0])
-    assert np.array_equal(np.isnan(found.upper), unsure[..., 1])
+    assert np.array_equal(np.isnan(found.low), unsure[..., 0])
+    assert np.array_equal(np.isnan(found.high), unsure[..., 1])
     assert np.array_equal(np.isnan(limits.load), ~(limits.gap <= INTERVAL_GAP))
-    sure = np.isfinite(found.lower) & np.isfinite(found.upper)
-    assert np.all(found.lower[sure] <= found.upper[sure] + 2e-8 * S.force_scale)
+    sure = np.isfinite(found.low) & np.isfinite(found.high)
+    assert np.all(found.low[sure] <= found.high[sure] + 2e-8 * S.force_scale)

@@ -44,7 +44,7 @@ def test_a_network_without_unbalance_to_hide_behind_is_still_refused():
     packing = attack("n13_mu1e-6")
     S = gf.ensemble(packing)
     strongest = S.index[np.argmax(S.original[:, 0])]
-    beyond = 2 * gf.intervals(S, [strongest]).upper[0]
+    beyond = 2 * gf.intervals(S, [strongest]).high[0]
     with pytest.raises(gf.NotJammedError, match=r"cannot hold together|no network agrees"):
         gf.ensemble(packing, known=gf.Known([strongest], [[beyond[0], -np.inf]], [[np.inf] * 2]))
 
@@ -58,12 +58,12 @@ def test_bounds_at_the_largest_friction_are_those_of_other_programs():
     (place,) = S.positions([17])
     found = gf.intervals(S, [17])
     assert found.converged and np.all(found.gap <= 1e-8)
-    ours = np.stack([found.lower[0], found.upper[0]], axis=1) / S.force_scale
+    ours = np.stack([found.low[0], found.high[0]], axis=1) / S.force_scale
     assert np.abs(ours - linprog_bounds(S, int(place))).max() < 1e-8
     reach = gf.reach(S, 17)
     assert S.residual(reach.states).max() <= BALANCED
     assert S.violation(reach.states).max() <= ADMISSIBLE
-    assert reach.upper == pytest.approx(reach.states[1, place, 0], rel=1e-9)
+    assert reach.high == pytest.approx(reach.states[1, place, 0], rel=1e-9)
 
 
 def test_uniform_states_under_known_forces_are_balanced():

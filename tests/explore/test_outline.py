@@ -63,8 +63,8 @@ def test_it_spans_the_exact_intervals_of_two_components():
     a, b = 3, 40
     found = outline(S, unit(S, (a, 0), (b, 1)), tolerance=1e-5)
     exact = intervals(S, S.index[[a, b]])
-    low = np.array([exact.lower[0, 0], exact.lower[1, 1]]) / S.force_scale
-    high = np.array([exact.upper[0, 0], exact.upper[1, 1]]) / S.force_scale
+    low = np.array([exact.low[0, 0], exact.low[1, 1]]) / S.force_scale
+    high = np.array([exact.high[0, 0], exact.high[1, 1]]) / S.force_scale
     for polygon in (found.inner, found.outer):
         np.testing.assert_allclose(polygon.min(axis=0), low, atol=1e-6)
         np.testing.assert_allclose(polygon.max(axis=0), high, atol=1e-6)

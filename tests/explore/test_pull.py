@@ -28,11 +28,11 @@ def test_every_value_between_the_ends_is_reached_and_both_ends(mu):
     S = gf.ensemble(packed(40, mu)) if mu else gf.ensemble(packed(40, 0.0), mu=0.4)
     for contact in S.index[::11]:
         reach = gf.reach(S, contact)
-        values = np.linspace(reach.lower, reach.upper, 11)
+        values = np.linspace(reach.low, reach.high, 11)
         found = gf.pull(S, contact, values)
         assert found.residual.max() <= BALANCED and found.violation.max() <= ADMISSIBLE
         (position,) = S.positions([contact])
-        width = reach.upper - reach.lower
+        width = reach.high - reach.low
         assert np.array_equal(found.values, found.states[:, position, 0])
         assert found.values == pytest.approx(values, abs=1e-4 * width + 1e-6 * S.force_scale)
         assert found.values[1:-1] == pytest.approx(values[1:-1], abs=1e-6 * S.force_scale)
@@ -46,7 +46,7 @@ def test_no_state_lies_ahead_of_the_nearest(S):
     contact = 50
     (position,) = S.positions([contact])
     reach = gf.reach(S, contact)
-    value = 0.3 * reach.lower + 0.7 * reach.upper
+    value = 0.3 * reach.low + 0.7 * reach.high
     found = gf.pull(S, contact, value)
     nearest = found.states[0]
     for seed in range(5):
@@ -71,7 +71,7 @@ def test_the_state_it_starts_from_counts(S):
 
 def test_values_do_not_know_their_company(S):
     reach = gf.reach(S, 50)
-    values = np.linspace(reach.lower, reach.upper, 12)[1:-1]
+    values = np.linspace(reach.low, reach.high, 12)[1:-1]
     together = gf.pull(S, 50, values).states
     for k in (0, 4, 9):
         assert np.array_equal(gf.pull(S, 50, values[k]).states[0], together[k])
@@ -80,9 +80,9 @@ def test_values_do_not_know_their_company(S):
 def test_the_ends_are_the_exact_bounds(S):
     contacts = S.index[[3, 60, 100]]
     bounds = intervals(S, contacts)
-    for contact, low, high in zip(contacts, bounds.lower, bounds.upper, strict=True):
+    for contact, low, high in zip(contacts, bounds.low, bounds.high, strict=True):
         reach = gf.reach(S, contact)
-        assert (reach.lower, reach.upper) == pytest.approx((low[0], high[0]), abs=3e-8)
+        assert (reach.low, reach.high) == pytest.approx((low[0], high[0]), abs=3e-8)
         assert reach.gap.max() <= 1e-8
         assert np.all(S.residual(reach.states) <= BALANCED)
 
@@ -100,9 +100,9 @@ def test_what_holds_a_contact_at_its_ends_is_open_or_slides(S):
 @pytest.mark.parametrize("beyond", [1e-6, 1e-3, 1e3])
 def test_values_outside_are_refused_with_the_interval(S, beyond):
     reach = gf.reach(S, 162)
-    for value in (reach.lower - beyond, reach.upper + beyond):
+    for value in (reach.low - beyond, reach.high + beyond):
         with pytest.raises(gf.InputError, match=r"exact interval, 3\.32498\d* to 6\.09518"):
-            gf.pull(S, 162, [0.5 * (reach.lower + reach.upper), value])
+            gf.pull(S, 162, [0.5 * (reach.low + reach.high), value])
 
 
 def test_a_contact_that_carries_nothing_cannot_be_pulled(S):
@@ -123,11 +123,11 @@ def test_a_force_pulled_to_zero_has_no_friction_left(S):
     (position,) = S.positions([3])
     for contact in S.index:
         reach = gf.reach(S, contact)
-        if reach.lower < 1e-9:
+        if reach.low < 1e-9:
             break
     (position,) = S.positions([contact])
-    found = gf.pull(S, contact, 0.01 * reach.upper)
-    assert abs(found.states[0, position, 1]) <= S.mu * 0.01 * reach.upper * (1 + 1e-12)
+    found = gf.pull(S, contact, 0.01 * reach.high)
+    assert abs(found.states[0, position, 1]) <= S.mu * 0.01 * reach.high * (1 + 1e-12)
 
 
 def test_scales_with_the_pressure(S):
@@ -144,7 +144,7 @@ def test_what_is_known_of_other_contacts_is_kept(S):
     known = gf.Known(held, sides, np.where(np.isfinite(sides), value[:, None], np.inf))
     T = gf.ensemble(S.packing, known=known)
     reach = gf.reach(T, pulled)
-    middle = 0.3 * reach.lower + 0.7 * reach.upper
+    middle = 0.3 * reach.low + 0.7 * reach.high
     found = gf.pull(T, pulled, middle)
     assert found.residual[0] <= BALANCED and found.violation[0] <= ADMISSIBLE
     assert abs(found.states[0, 3, 0] - value[0]) < 1e-9 * S.force_scale

@@ -56,7 +56,7 @@ def lengths(K, components):
     """Lengths of the exact intervals of components, force."""
     found = gf.intervals(K)
     assert found.converged
-    return np.array([found.upper[place] - found.lower[place] for place in components])
+    return np.array([found.high[place] - found.low[place] for place in components])
 
 
 def given_widths(S, components, width):
@@ -146,7 +146,7 @@ def test_commands_say_what_is_pinned(tmp_path, capsys):
     for width in (9e-9, 5e-13):
         bounds = middle, middle + width * S.force_scale
         (tmp_path / "k.csv").write_text(
-            "contact,f_n_min,f_n_max\n{},{!r},{!r}\n".format(c, *bounds)
+            "contact,f_n_low,f_n_high\n{},{!r},{!r}\n".format(c, *bounds)
         )
         for command in ("uniform", "volume", "intervals", "walk"):
             arguments = [command, "--packing", str(tmp_path / "p.npz"), "--json"]

@@ -71,7 +71,7 @@ def test_the_volume_scales_with_no_pressure_and_falls_with_what_is_known():
     assert same.log_volume == pytest.approx(whole.log_volume, abs=1e-6)
     contact = S.index[np.argmax(np.ptp(gf.intervals(S)[1:3], axis=0)[:, 0])]
     reach = gf.reach(S, contact)
-    middle = 0.5 * (reach.lower + reach.upper)
+    middle = 0.5 * (reach.low + reach.high)
     halves = []
     for low, high in ((-np.inf, middle), (middle, np.inf)):
         known = gf.Known([contact], [[low, -np.inf]], [[high, np.inf]])

@@ -93,8 +93,8 @@ def test_between_bounds_s_is_a_product(bounded):
     S, low, high = bounded
     a, b, unit = low / S.force_scale, high / S.force_scale, S.force_scale
     found = gf.intervals(S)
-    assert np.allclose(found.lower[:, 0], low, atol=1e-8) and found.converged
-    assert np.allclose(found.upper, np.column_stack([high, S.mu * high]), atol=1e-8)
+    assert np.allclose(found.low[:, 0], low, atol=1e-8) and found.converged
+    assert np.allclose(found.high, np.column_stack([high, S.mu * high]), atol=1e-8)
     volume = gf.volume(S, accuracy=0.1)
     exact = np.log(S.mu * (b**2 - a**2) if S.mu else b - a).sum()
     assert abs(volume.log_volume - exact) < 4 * volume.error

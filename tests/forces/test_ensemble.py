@@ -207,7 +207,7 @@ def test_a_faint_contact_that_a_load_rests_on_stays():
     assert len(S.index) == 2 and S.member is not None
     bounds = intervals(S)
     assert bounds.converged
-    np.testing.assert_allclose(bounds.upper[:, 0], [1.0, faint], atol=1e-9)
+    np.testing.assert_allclose(bounds.high[:, 0], [1.0, faint], atol=1e-9)
 
 
 def test_frozen_contacts_drop_the_pressure_and_keep_the_balance():

@@ -36,13 +36,13 @@ def normals(contacts, low, high):
 
 def within(S, bounds, states):
     slack = 1e-8 * S.force_scale
-    return np.all((states >= bounds.lower - slack) & (states <= bounds.upper + slack))
+    return np.all((states >= bounds.low - slack) & (states <= bounds.high + slack))
 
 
 def assert_bounds(S, expected):
     found = intervals(S)
     assert found.converged and found.max_gap <= INTERVAL_GAP
-    off = np.stack([found.lower, found.upper], axis=-1) - expected[S.index]
+    off = np.stack([found.low, found.high], axis=-1) - expected[S.index]
     assert np.abs(off).max() < 1e-6 * S.force_scale
     return found
 
@@ -130,8 +130,8 @@ def test_bounds_agree_with_another_solver_and_shrink_as_more_is_known(mu):
     after = intervals(K, K.index[::5])
     at = S.positions(after.contacts)
     slack = 1e-7 * S.force_scale
-    assert np.all(after.lower >= before.lower[at] - slack)
-    assert np.all(after.upper <= before.upper[at] + slack)
+    assert np.all(after.low >= before.low[at] - slack)
+    assert np.all(after.high <= before.high[at] + slack)
     from scipy.optimize import linprog
 
     A, b, T = K.scaled_form
@@ -139,7 +139,7 @@ def test_bounds_agree_with_another_solver_and_shrink_as_more_is_known(mu):
         for part in (0, 1):
             cost = T.tocsr()[2 * K.positions(after.contacts[[k]])[0] + part].toarray().ravel()
             least = linprog(cost, A_eq=A, b_eq=b, bounds=(0, None)).fun
-            assert after.lower[k, part] / K.force_scale == pytest.approx(least, abs=1e-7)
+            assert after.low[k, part] / K.force_scale == pytest.approx(least, abs=1e-7)
 
 
 def test_limit_loads_of_known_contacts_are_certified_and_no_larger():
@@ -205,7 +205,7 @@ def test_a_network_by_another_simulator_lies_inside_s_at_its_own_stress():
     bounds = intervals(S, some)
     assert bounds.converged
     own, slack = packing.forces[some], 1e-6 * S.force_scale
-    assert np.all((own >= bounds.lower - slack) & (own <= bounds.upper + slack))
+    assert np.all((own >= bounds.low - slack) & (own <= bounds.high + slack))
 
 
 def test_without_friction_the_stress_of_the_only_network_changes_nothing():
@@ -214,8 +214,8 @@ def test_without_friction_the_stress_of_the_only_network_changes_nothing():
     assert S.dimension == 0
     assert gf.nearest(S, S.original).converged
     found = intervals(S, S.index[:4])
-    assert found.upper[:, 0] == pytest.approx(S.original[:4, 0], abs=1e-6)
-    assert np.all(found.upper[:, 1] == 0)
+    assert found.high[:, 0] == pytest.approx(S.original[:4, 0], abs=1e-6)
+    assert np.all(found.high[:, 1] == 0)
     K = gf.ensemble(packing, known=held(packing, S.index[:3]))
     assert K.admits(K.original) and K.dimension == 0
     with pytest.raises(gf.NotJammedError, match="cannot hold together: f_n ="):
@@ -251,11 +251,11 @@ def test_frozen_surroundings_with_known_forces():
     assert gf.ensemble(packing, frozen=frozen, prescribed="none").prescribed == "none"
     one = S.index[len(S.index) // 2]
     before = intervals(S, [one])
-    middle = 0.5 * (before.lower[0, 0] + before.upper[0, 0])
+    middle = 0.5 * (before.low[0, 0] + before.high[0, 0])
     K = gf.ensemble(packing, frozen=frozen, known=normals([one], [middle], [ANY]))
     after = intervals(K, [one])
-    assert after.lower[0, 0] == pytest.approx(middle, abs=1e-7)
-    assert after.upper[0, 0] == pytest.approx(before.upper[0, 0], abs=1e-7)
+    assert after.low[0, 0] == pytest.approx(middle, abs=1e-7)
+    assert after.high[0, 0] == pytest.approx(before.high[0, 0], abs=1e-7)
     with pytest.raises(gf.InputError, match="frozen at a force that contradicts"):
         gf.ensemble(packing, frozen=frozen, known=normals([3], [50.0], [60.0]))
 
@@ -270,10 +270,10 @@ def test_nothing_known_is_s_itself():
     for known in nothing:
         K = gf.ensemble(packing, known=known)
         assert K.known is None
-        assert np.array_equal(intervals(K, [3]).upper, intervals(S, [3]).upper)
+        assert np.array_equal(intervals(K, [3]).high, intervals(S, [3]).high)
     # Bounds that say less than the cone: something is known, and nothing changes.
     K = gf.ensemble(packing, known=gf.Known([3, 7], [-1.0, -ANY], [1e3, ANY]))
-    assert intervals(K, [9]).upper == pytest.approx(intervals(S, [9]).upper, abs=1e-7)
+    assert intervals(K, [9]).high == pytest.approx(intervals(S, [9]).high, abs=1e-7)
 
 
 @pytest.mark.parametrize("every", [1, 2])
@@ -284,8 +284,8 @@ def test_where_everything_is_known_or_follows_nothing_is_left_open(every):
     assert K.dimension == 0
     found = intervals(K)
     assert found.converged and found.max_gap <= INTERVAL_GAP
-    assert np.abs(found.upper - packing.forces[K.index]).max() < 1e-8
-    assert np.abs(found.lower - packing.forces[K.index]).max() < 1e-8
+    assert np.abs(found.high - packing.forces[K.index]).max() < 1e-8
+    assert np.abs(found.low - packing.forces[K.index]).max() < 1e-8
     drawn = gf.sample_uniform(K, 4, 2)
     assert np.abs(drawn.flat - packing.forces[K.index]).max() < 1e-8
     assert gf.nearest(K, 1.5 * K.original).converged
@@ -298,7 +298,7 @@ def told(known, **options):
 
 
 def test_a_force_beyond_its_bound_is_told_with_what_it_would_have_to_give():
-    most = intervals(gf.ensemble(reference(NAME)), [10]).upper[0, 0]
+    most = intervals(gf.ensemble(reference(NAME)), [10]).high[0, 0]
     for beyond in (1e-5, 0.3):
         message = told(normals([10], [most + beyond], [ANY]))
         assert "f_n ≥" in message and "on contact 10" in message
@@ -309,10 +309,10 @@ def test_a_force_beyond_its_bound_is_told_with_what_it_would_have_to_give():
 def test_statements_that_contradict_each_other_are_named_and_no_others():
     packing = reference(NAME)
     S = gf.ensemble(packing)
-    most = intervals(S).upper[:, 0]
+    most = intervals(S).high[:, 0]
     one = 10
     K = gf.ensemble(packing, known=normals([one], [0.9 * most[one]], [ANY]))
-    other = int(np.argmax(np.where(S.index == one, 0, most - intervals(K).upper[:, 0])))
+    other = int(np.argmax(np.where(S.index == one, 0, most - intervals(K).high[:, 0])))
     both = [one, S.index[other], S.index[100]]
     message = told(normals(both, [0.9 * most[one], 0.99 * most[other], 0.0], [ANY, ANY, 90.0]))
     named = {int(c) for c in re.findall(r"on contact (\d+)", message)}
@@ -406,12 +406,12 @@ def test_scales_with_the_pressure():
     S = gf.ensemble(packing, known=gf.Known([4, 9], low, high), prescribed="stress")
     T = gf.ensemble(scaled, known=gf.Known([4, 9], 1e6 * low, 1e6 * high), prescribed="stress")
     one, two = intervals(S, [12]), intervals(T, [12])
-    assert two.upper / 1e6 == pytest.approx(one.upper, abs=1e-7)
+    assert two.high / 1e6 == pytest.approx(one.high, abs=1e-7)
 
 
 def test_two_disks_between_their_images_know_each_others_force():
     packing = two_disks(pressure=3.0, height=4.0)
     S = gf.ensemble(packing, known=gf.Known([0], [20.0, -ANY], [30.0, ANY]))
-    assert intervals(S).upper[:, 0] == pytest.approx([24.0, 24.0], abs=1e-5)
+    assert intervals(S).high[:, 0] == pytest.approx([24.0, 24.0], abs=1e-5)
     with pytest.raises(gf.NotJammedError, match="on contact 0"):
         gf.ensemble(packing, known=gf.Known([0], [25.0, -ANY], [30.0, ANY]))

@@ -285,8 +285,8 @@ def test_a_disk_in_a_groove_is_that_of_the_scene():
     S = ensemble(read_yade(*given(*files), 0.5, walls="held"))
     bounds = intervals(S)
     assert S.dimension == 1
-    np.testing.assert_allclose(bounds.lower[:, 0], f / 1.5, atol=1e-8)
-    np.testing.assert_allclose(bounds.upper[:, 0], f / 0.5, atol=1e-8)
+    np.testing.assert_allclose(bounds.low[:, 0], f / 1.5, atol=1e-8)
+    np.testing.assert_allclose(bounds.high[:, 0], f / 0.5, atol=1e-8)
     assert ensemble(read_yade(*given(*files), 0.5, walls="pressing")).dimension == 0
     for wrong, said in ((None, "no contact of two grains"), ("box", "walls are held or pressing")):
         with pytest.raises(InputError, match=said):

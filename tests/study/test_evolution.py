@@ -52,8 +52,8 @@ def test_every_snapshot_has_its_intervals(found):
             np.flatnonzero((one["id1"] == min(pair)) & (one["id2"] == max(pair)))[0]
             for pair in ends.tolist()
         ]
-        np.testing.assert_allclose(one["low"].values[place], bounds.lower, atol=1e-8)
-        np.testing.assert_allclose(one["high"].values[place], bounds.upper, atol=1e-8)
+        np.testing.assert_allclose(one["low"].values[place], bounds.low, atol=1e-8)
+        np.testing.assert_allclose(one["high"].values[place], bounds.high, atol=1e-8)
         assert int(one["dimension"]) == S.dimension
         assert float(one["pressure"]) == packing.pressure and float(one["residual"]) < 1e-9
     assert np.all(dataset["eta1"] > 0) and np.all(dataset["eta3"] > dataset["eta1"])

@@ -27,8 +27,8 @@ def puller(S):
 def test_a_rail_goes_from_bound_to_bound_through_admissible_networks(S, puller):
     contact = int(S.index[7])
     rail, bounds = puller.rail(contact, S.original), intervals(S, [contact])
-    assert rail.lower == pytest.approx(bounds.lower[0, 0], abs=1e-7 * S.force_scale)
-    assert rail.upper == pytest.approx(bounds.upper[0, 0], abs=1e-7 * S.force_scale)
+    assert rail.low == pytest.approx(bounds.low[0, 0], abs=1e-7 * S.force_scale)
+    assert rail.high == pytest.approx(bounds.high[0, 0], abs=1e-7 * S.force_scale)
     assert np.all(np.diff(rail.values) > 0)
     np.testing.assert_array_equal(rail.states[:, 7, 0], rail.values)
     halfway = (rail.states[1:] + rail.states[:-1]) / 2  # what a page shows in between
@@ -40,10 +40,10 @@ def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller):
     contact = int(S.index[7])
     whole = puller.rail(contact, S.original)
     rail = puller.rail(contact, S.original, many=True)
-    assert (rail.lower, rail.upper) == (whole.lower, whole.upper)
+    assert (rail.low, rail.high) == (whole.low, whole.high)
     assert len(rail.values) <= pulls.FEW_STOPS + 1 < len(whole.values)
-    width = rail.upper - rail.lower
-    np.testing.assert_allclose(rail.values[[0, -1]], [rail.lower, rail.upper], atol=1.1e-4 * width)
+    width = rail.high - rail.low
+    np.testing.assert_allclose(rail.values[[0, -1]], [rail.low, rail.high], atol=1.1e-4 * width)
     halfway = (rail.states[1:] + rail.states[:-1]) / 2
     for states in (rail.states, halfway):
         assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
@@ -52,7 +52,7 @@ def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller):
 def test_a_part_of_a_rail_comes_first_and_threads_change_nothing(S, puller):
     contact = int(S.index[7])
     part, rail = puller.rails(contact, S.original, many=True)
-    assert not part.whole and rail.whole and (part.lower, part.upper) == (rail.lower, rail.upper)
+    assert not part.whole and rail.whole and (part.low, part.high) == (rail.low, rail.high)
     kept = np.isin(rail.values, part.values)
     assert kept.tolist() == [False, *[True] * len(part.values), False]
     np.testing.assert_array_equal(part.states, rail.states[kept])

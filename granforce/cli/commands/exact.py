@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.cli.asked import conditions, extension, found, known_forces, numbers, write_csv
+from granforce.cli.asked import (
+    conditions,
+    extension,
+    extents,
+    found,
+    known_forces,
+    numbers,
+    unit,
+    write_csv,
+)
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
@@ -25,13 +34,17 @@ def perturb(arguments: argparse.Namespace) -> None:
         precision=arguments.precision,
         **conditions(arguments),
     )
-    scale = dataset["force_scale"].item()
-    load, limit = (dataset[name].values / scale for name in ("critical_low", "limit_load"))
+    forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
+    load = dataset["critical_low"].values
+    reported = {
+        "mean_normal_force": scale,
+        "critical_force": dataset["critical_force"].item() * scale,
+        "critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11)),
+        "limit_load": float(dataset["limit_load"].mean()),
+    }
     lines = {
         "contacts": len(load),
-        "critical_force": dataset["critical_force"].item(),
-        "critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11)).tolist(),
-        "limit_load": float(limit.mean()),
+        **forces.reported(reported),
         **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
         "fit_range": json.loads(dataset.attrs["fit_range"]),
         "decay_exponent_of_other_ranges": dataset["fit_exponent"].values.tolist(),
@@ -43,9 +56,10 @@ def perturb(arguments: argparse.Namespace) -> None:
     }
     print_report(lines, arguments.json)
     if arguments.csv is not None:
-        names = ("limit_load", "critical_low", "critical_high", "pair_opening")
-        names += ("opened", "slid", "kept", *COUNTS)
+        names = ("limit_load", "critical_low", "critical_high")
         columns = {"contact": dataset["backbone"].values}
+        columns |= forces.named({name: dataset[name].values for name in names})
+        names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
         write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
 
 
@@ -60,18 +74,16 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[
 def intervals(arguments: argparse.Namespace) -> None:
     """Exact intervals, computed or found; report them."""
     dataset, ends = _exact(arguments, kinds.INTERVALS)
-    scale = dataset["force_scale"].item()
-    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    forces = unit(arguments, dataset)
     position = dataset["position"].values
     cluster = dataset["cluster"].values
     histogram = np.histogram(position[np.isfinite(position)], bins=10, range=(0, 1))[0]
     lines = {
-        "contacts": len(extent),
+        "contacts": dataset.sizes["contact"],
         **extension(dataset),
         "coordination": dataset["coordination"].item(),
         "exact_eta3": dataset["eta3"].item(),
-        "mean_extent_of_f_n": float(extent.mean() / scale),
-        "largest_extent_of_f_n": float(extent.max() / scale),
+        **forces.reported(extents(dataset)),
         "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
@@ -82,30 +94,36 @@ def intervals(arguments: argparse.Namespace) -> None:
     }
     print_report(lines, arguments.json)
     if arguments.csv is not None:
-        columns = {"contact": dataset["backbone"].values}
-        for name, side in (("min", "low"), ("max", "high")):
-            columns |= {f"f_n_{name}": dataset[side].values[:, 0]}
-            columns |= {f"f_t_{name}": dataset[side].values[:, 1]}
+        bounds = {
+            f"{part}_{side}": dataset[side].values[:, k]
+            for side in ("low", "high")
+            for k, part in enumerate(("f_n", "f_t"))
+        }
+        columns = {"contact": dataset["backbone"].values, **forces.named(bounds)}
         write_csv(arguments.csv, columns | {"cluster": cluster})
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
     """Limit loads, computed or found; report them."""
     dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
-    load = dataset["limit_load"].values / dataset["force_scale"].item()
-    lines = {
-        "contacts": len(load),
+    forces, load = unit(arguments, dataset), dataset["limit_load"].values
+    reported = {
+        "mean_normal_force": dataset["force_scale"].item(),
         "mean_limit_load": float(load.mean()),
         "least_limit_load": float(load.min()),
         "largest_limit_load": float(load.max()),
+    }
+    lines = {
+        "contacts": len(load),
+        **forces.reported(reported),
         **json.loads(dataset.attrs["counts"]),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
     print_report(lines, arguments.json)
     if arguments.csv is not None:
-        names = {"contact": "backbone", "limit_load": "limit_load"}
-        write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
+        columns = {"contact": dataset["backbone"].values}
+        write_csv(arguments.csv, columns | forces.named({"limit_load": load}))
 
 
 def stress(arguments: argparse.Namespace) -> None:
@@ -126,5 +144,5 @@ def stress(arguments: argparse.Namespace) -> None:
     }
     print_report(lines, arguments.json)
     if arguments.csv is not None:
-        names = {"angle": "stress_angle", "largest": "stress_support"}
+        names = {"angle [rad]": "stress_angle", "largest [pressure]": "stress_support"}
         write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})

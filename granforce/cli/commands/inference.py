@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from granforce.cli import frames
-from granforce.cli.asked import conditions, found, write_csv
+from granforce.cli.asked import conditions, found, unit, write_csv
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
@@ -42,7 +42,8 @@ def infer(arguments: argparse.Namespace) -> int | None:
         certain=arguments.certain,
         **asked,
     )
-    scale, given = dataset["force_scale"].item(), measured.forces + measured.sigma
+    forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
+    given = measured.forces + measured.sigma
     change = np.abs(dataset["inferred"].values - dataset["measured"].values)
     lines = {
         "entry": entry,
@@ -53,28 +54,29 @@ def infer(arguments: argparse.Namespace) -> int | None:
         ),
         "chi_square": dataset["chi_square"].item(),
         "freedom": dataset["freedom"].item(),
-        "mean_change_of_f_n": float(np.nanmean(change[:, 0]) / scale),
+        **forces.reported({"mean_change_of_f_n": float(np.nanmean(change[:, 0]))}),
         "suspects": dataset["suspect"].values.tolist(),
     }
     columns = {"contact": dataset["backbone"].values}
     for k, part in enumerate(("f_n", "f_t")):
-        columns |= {part: dataset["inferred"].values[:, k]}
-        columns |= {f"deviation_{part}": dataset["deviation"].values[:, k]}
+        columns |= forces.named({part: dataset["inferred"].values[:, k]})
+        columns |= {f"deviation_{part} [sigma]": dataset["deviation"].values[:, k]}
     if arguments.certain:
-        least = dataset["least_normal"].values / scale
-        sure = np.flatnonzero(least > CARRYING)
+        least = dataset["least_normal"].values
+        sure = np.flatnonzero(least > CARRYING * scale)
         order = sure[np.argsort(-least[sure], kind="stable")]
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
-        columns |= {"least_f_n": dataset["least_normal"].values}
+        columns |= forces.named({"least_f_n": least})
     if states:
         error = dataset["standard_error"].values
-        lines |= {"states": dataset.sizes["state"], "mean_standard_error": error.mean() / scale}
+        lines |= {"states": dataset.sizes["state"]}
+        lines |= forces.reported({"mean_standard_error": error.mean()})
         lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
         lines |= {"reached": bool(dataset["reached"].item())}
         for k, part in enumerate(("f_n", "f_t")):
-            columns |= {f"mean_{part}": dataset["expected"].values[:, k]}
-            columns |= {f"error_{part}": error[:, k]}
+            expected = dataset["expected"].values[:, k]
+            columns |= forces.named({f"mean_{part}": expected, f"error_{part}": error[:, k]})
     print_report(lines | ends, arguments.json)
     if arguments.csv is not None:
         write_csv(arguments.csv, columns)

@@ -9,11 +9,13 @@ import numpy as np
 
 from granforce.cli import frames
 from granforce.cli.asked import (
+    PACKING_UNIT,
     check_outputs,
     get_packing,
     packing_parameters,
     required_mu,
     store_of,
+    with_units,
     write_csv,
 )
 from granforce.experiment.measurements import COLUMNS as MEASURED_COLUMNS
@@ -46,7 +48,7 @@ def _report(lines: Mapping[str, Any], packing: Packing, arguments: argparse.Name
         if arguments.out is not None:
             importers.save_packing(packing, arguments.out)
     finally:
-        print_report(lines, arguments.json)
+        print_report(with_units(lines), arguments.json)
 
 
 def _scene(arguments: argparse.Namespace) -> None:
@@ -113,7 +115,7 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T
         columns = {"contact": np.arange(len(found.measured))}
-        columns |= dict(zip(MEASURED_COLUMNS, values, strict=True))
+        columns |= PACKING_UNIT.named(dict(zip(MEASURED_COLUMNS, values, strict=True)))
         write_csv(arguments.measured, columns)
 
 

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from granforce.cli.asked import (
     conditions,
     extension,
+    extents,
     found,
     numbers,
     packing_parameters,
+    unit,
     walked,
     write_csv,
 )
@@ -102,17 +104,14 @@ def volume(arguments: argparse.Namespace) -> int:
 def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or found."""
     _, parameters, dataset, _ = walked(arguments, arguments.contacts)
-    scale = dataset["force_scale"].item()
-    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    forces = unit(arguments, dataset)
     names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
     lines = {
         "mu": parameters["mu"],
         "states": parameters["states"],
         **extension(dataset),
         **{name: dataset[name].item() for name in names},
-        "mean_normal_force": scale,
-        "mean_extent_of_f_n": float(extent.mean() / scale),
-        "largest_extent_of_f_n": float(extent.max() / scale),
+        **forces.reported(extents(dataset)),
         "correlation": dataset["correlation"].item(),
         "correlation_low": dataset["correlation_low"].item(),
         "correlation_high": dataset["correlation_high"].item(),
@@ -121,10 +120,11 @@ def measure(arguments: argparse.Namespace) -> None:
     }
     print_report(lines, arguments.json)
     if arguments.contacts is not None:
-        columns = {"contact": dataset["backbone"].values}
-        for name, source in (("f_n", "original"), ("f_n_min", "low"), ("f_n_max", "high")):
-            columns[name] = dataset[source].values[:, 0]
-        write_csv(arguments.contacts, columns)
+        sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
+        columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
+        write_csv(
+            arguments.contacts, {"contact": dataset["backbone"].values, **forces.named(columns)}
+        )
 
 
 def scan(arguments: argparse.Namespace) -> int:

@@ -13,12 +13,12 @@ _COMPONENTS = "f_n", "f_t"
 def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
-    f_n, f_t: known exactly; f_n_min, f_n_max, f_t_min, f_t_max: bounds, as `granforce intervals
-    --csv` writes them. Forces in the packing's units; empty fields say nothing, and neither do
-    other columns. source: a path or an open file. Raises InputError naming the line of what is
-    wrong.
+    f_n, f_t: known exactly; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as `granforce intervals
+    --csv` writes them. Forces are in the packing's unit, which names may end with: ``f_n
+    [packing]``. Empty fields and other columns are ignored. source: a path or an open file. Raises
+    InputError naming the line of what is wrong, and for a column in another unit.
     """
-    table = read_csv(source)
+    table = read_csv(source).in_packing_unit()
     contacts = table.whole("contact")
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
@@ -26,8 +26,8 @@ def read_known(source: Source) -> Known:
     for k, name in enumerate(_COMPONENTS):
         for column, sides in (
             (name, (low, high)),
-            (f"{name}_min", (low,)),
-            (f"{name}_max", (high,)),
+            (f"{name}_low", (low,)),
+            (f"{name}_high", (high,)),
         ):
             if column in table.header:
                 told = True
@@ -36,8 +36,8 @@ def read_known(source: Source) -> Known:
                     side[given, k] = values
     if not told:
         raise InputError(
-            f"{table.name}: no column f_n, f_t, f_n_min, f_n_max, f_t_min or f_t_max: nothing "
-            "would be known"
+            f"{table.name}: no column f_n, f_t, f_n_low, f_n_high, f_t_low or f_t_high: "
+            "nothing would be known"
         )
     return Known(contacts, low, high)
 

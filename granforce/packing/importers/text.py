@@ -30,6 +30,10 @@ _GZIP, _ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
 
+# What names of columns of forces in the packing's unit may end with.
+PACKING = " [packing]"
+
+
 class Table(NamedTuple):
     """Rows of text fields under named columns."""
 
@@ -48,6 +52,17 @@ class Table(NamedTuple):
         return self._replace(
             rows=[self.rows[k] for k in chosen], lines=[self.lines[k] for k in chosen]
         )
+
+    def in_packing_unit(self) -> Table:
+        """The table without the unit ``[packing]`` at the end of names; InputError for another."""
+        for name in self.header:
+            if name.endswith("]") and not name.endswith(PACKING):
+                raise InputError(
+                    f"{self.name}: column {_quoted(name)} is not in the packing's unit; write the "
+                    "table with --unit packing, or multiply it and leave out the brackets"
+                )
+        header = [name.removesuffix(PACKING) for name in self.header]
+        return make_table(self.name, header, self.rows, self.lines)
 
     def require(self, *columns: str) -> None:
         """InputError unless all these columns are there."""

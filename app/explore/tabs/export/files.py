@@ -56,12 +56,12 @@ def contacts(
         "f_t": tangential * scale,
     }
     for k, part in enumerate(("f_n", "f_t")):
-        columns[f"{part}_low"] = replay.low[:, k] * scale
-        columns[f"{part}_high"] = replay.high[:, k] * scale
+        columns[f"{part}_seen_low"] = replay.low[:, k] * scale
+        columns[f"{part}_seen_high"] = replay.high[:, k] * scale
     if exact is not None and np.array_equal(exact["backbone"].values, replay.backbone):
         for k, part in enumerate(("f_n", "f_t")):
-            columns[f"{part}_min"] = exact["low"].values[:, k]
-            columns[f"{part}_max"] = exact["high"].values[:, k]
+            columns[f"{part}_low"] = exact["low"].values[:, k]
+            columns[f"{part}_high"] = exact["high"].values[:, k]
     return columns
 
 
@@ -74,14 +74,14 @@ COLUMNS = {
     "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
     "f_n": "normal force in the network on screen, force",
     "f_t": "tangential force in the network on screen, force",
-    "f_n_low": "smallest normal force of all states, force",
-    "f_n_high": "largest normal force of all states, force",
-    "f_t_low": "smallest tangential force of all states, force",
-    "f_t_high": "largest tangential force of all states, force",
-    "f_n_min": "least possible normal force (exact), force",
-    "f_n_max": "largest possible normal force (exact), force",
-    "f_t_min": "least possible tangential force (exact), force",
-    "f_t_max": "largest possible tangential force (exact), force",
+    "f_n_seen_low": "smallest normal force of all states, force",
+    "f_n_seen_high": "largest normal force of all states, force",
+    "f_t_seen_low": "smallest tangential force of all states, force",
+    "f_t_seen_high": "largest tangential force of all states, force",
+    "f_n_low": "least possible normal force (exact), force",
+    "f_n_high": "largest possible normal force (exact), force",
+    "f_t_low": "least possible tangential force (exact), force",
+    "f_t_high": "largest possible tangential force (exact), force",
 }
 
 
