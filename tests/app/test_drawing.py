@@ -50,6 +50,26 @@ def test_every_script_is_a_module_by_itself(run):
     assert len(run("".join(names), "(all) => Object.keys(all)")) > len(names) / 2
 
 
+@pytest.mark.parametrize("cancelled", [False, True])
+def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
+    """It was sent before, and is painted a frame later: the old packing is on screen again by then."""
+    shown = run(
+        "packing/replay/live",
+        """async ({ Live }, { cancelled }) => {
+            const shown = [], told = [], player = { loaded: {}, model: { live: true } }
+            const live = new Live(player, (message) => told.push(message))
+            live.show = (picture) => shown.push(picture)
+            live.hear({ picture: { mu: 0.1 }, number: 1 })
+            if (cancelled) player.model.live = false
+            await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
+            live.remove()
+            return [shown.length, told.at(-1).painted]
+        }""",
+        cancelled=cancelled,
+    )
+    assert shown == [0 if cancelled else 1, 1]
+
+
 # Two contacts, four frames, the first one the original.
 NORMAL = np.array([[1.0, 2.0], [0.5, 3.0], [2.0, 1.0], [1.5, 2.5]])
 TANGENTIAL = np.array([[0.1, -0.2], [0.0, 0.4], [-0.3, 0.1], [0.2, 0.2]])

@@ -105,11 +105,12 @@ export class Live {
 
   /** Take what the server sends of a computation. */
   hear(message) {
-    const { picture, states, bounds, number } = message, { loaded } = this.player
+    const { picture, states, bounds, number } = message, { loaded, model } = this.player
     if (states) this.player.grow(plain(states))
     if (bounds) this.player.arrive(plain(bounds))
     requestAnimationFrame(() => { // never in a hidden tab, which thus is sent no more
-      if (picture && this.player.loaded === loaded) this.show(plain(picture)) // not over the finished one
+      // Neither over the finished packing nor, once it was cancelled, over the old one, which stays then.
+      if (picture && model.live && this.player.loaded === loaded) this.show(plain(picture))
       this.tell({ painted: number })
     })
   }
