@@ -194,7 +194,7 @@ def page(lasting):
         page.keyboard.press("Escape")
     let_go = "scene.selected !== null && scene.onSelect(null)"  # again, where an answer was late
     until(page, f"({let_go}, scene.selected === null && scene.hand.replay.held === null)")
-    no_more(page, "pulls=")
+    no_more(page, "pull=")
     return page
 
 

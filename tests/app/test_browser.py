@@ -212,7 +212,7 @@ def test_a_click_selects_the_contact_everywhere(page):
     rank = column(page, "chosen", "rank")[0]
     ranks, which = column(page, "bars", "rank"), column(page, "bars", "at")
     assert which[ranks.index(rank)] == contact
-    searched(page, f"contact={contact}")
+    searched(page, f"select={contact}")
     page.mouse.click(*at(page, x, y))
     page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 0")
 
@@ -444,7 +444,7 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     more(page).locator("button.pin").click()
     page.locator("input.scrub").fill("9")
     page.locator("button.between").click()
-    searched(page, "between=3-9")
+    searched(page, "swing=6-22")
     page.locator("button.play").click()
     page.locator("input.scrub").fill("0.5")
     mixed = np.array(scene(page, "Array.from(scene.mixed.normal)"))
@@ -452,7 +452,7 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     np.testing.assert_allclose(mixed, (normal[3] + normal[9]) / 2, atol=1e-5)
     assert "50 % of the way" in page.locator("b.state").inner_text()
     page.locator("button.between").click()
-    no_more(page, "between")
+    no_more(page, "swing")
 
 
 # Selecting and computing
@@ -533,7 +533,7 @@ def test_a_copied_link_reopens_the_view(page, visit):
     contact, x, y = link_of(page)
     page.mouse.click(*at(page, x, y))
     page.get_by_role("button", name="zoom in").click()
-    searched(page, "frame=4", "contact", "zoom")
+    searched(page, "network=8", "select", "zoom")
     page.get_by_role("button", name="Copy link").click()
     link = page.evaluate("navigator.clipboard.readText()")
     again = visit(link[link.index("?") :])

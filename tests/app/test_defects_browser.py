@@ -54,7 +54,7 @@ def test_steps_of_the_player_are_not_gone_back_to(page):
     before = page.evaluate("history.length")
     for _ in range(3):
         page.locator("button.step").click()
-    searched(page, "frame=3")
+    searched(page, "network=6")
     assert page.evaluate("history.length") == before
 
 
@@ -71,7 +71,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
         shows(page, 1)
         searched(page, "mu=1&")
         page.locator("button.step").click()
-        searched(page, "frame=1")
+        searched(page, "network=1")
         server.kill()
         page.get_by_role("alert").get_by_text("Connection lost").wait_for()
         painting = scene(page, "scene.painted")
@@ -114,10 +114,10 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     page.locator("input.error").fill("-1")
     page.locator("button.hold").click()
     page.locator(".said").get_by_text("An error bar is a number from 0 on").wait_for()
-    assert "known=" not in page.url
+    assert "hold=" not in page.url
     page.locator("input.error").fill("0.1")
     page.locator("button.hold").click()
-    searched(page, "known=")
+    searched(page, "hold=")
 
 
 def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
@@ -132,7 +132,7 @@ def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
         }"""
     )
     assert flung[0]  # let go before it could be pulled
-    searched(page, f"pulls={flung[1]}%3A")
+    searched(page, f"pull={flung[1]}%3A")
     until(page, "scene.hand.replay.held && !scene.hand.active")
 
 
@@ -265,7 +265,7 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
     which = f"Green: contact {backbone[b]}; violet: contact {backbone[a]}."
     page.get_by_text(which).wait_for(state="attached")  # among what is to be opened
-    searched(page, f"pair={b}-{a}")
+    searched(page, f"span={b}-{a}")
 
 
 # 9: Small things

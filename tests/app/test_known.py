@@ -130,7 +130,7 @@ def test_contradictions_are_one_clear_line_and_taken_back(state, visited):
     wait_for(state)
     assert "agrees with" in state.work.message and "\n" not in state.work.message
     assert state.knowledge.known == before and state.knowledge.narrowed.known == tuple(before)
-    other = visited(state.link().split("&known")[0] + "&known=9:30")
+    other = visited(state.link().split("&hold")[0] + "&hold=9:30")
     assert "agrees with" in other.work.message and not other.knowledge.known
 
 

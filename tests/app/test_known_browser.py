@@ -38,7 +38,7 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page.locator("button.hold").click()
     chips(page, 2)
     picture(page, "known/held")
-    page.wait_for_url("**known=4*~9*")
+    page.wait_for_url("**hold=4*~9*")
     page.reload()
     painted(page)
     chips(page, 2)

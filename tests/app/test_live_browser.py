@@ -233,7 +233,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(page):
     assert "pulled to" in page.locator(".said").inner_text()
     picture(page, "live/dragging")
     page.mouse.up()
-    searched(page, "pulls=")
+    searched(page, "pull=")
     assert normal(page)[contact] == pytest.approx(during[contact], abs=1e-5)
     assert float(page.locator("b.residual").text_content()) < 1e-9
     until(page, f"scene.selected === {contact}")
@@ -242,7 +242,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(page):
     shown = np.array(scene(page, "Array.from(scene.style.bin)"))
     np.testing.assert_allclose(shown, 32 * np.clip(0.5 + change, 0, 1), atol=0.51)
     page.keyboard.press("z")
-    no_more(page, "pulls=")
+    no_more(page, "pull=")
     until(page, "scene.hand.player.replay.held === null")
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
@@ -255,7 +255,7 @@ def test_at_the_end_of_the_rail_the_page_says_why(page):
     assert normal(page)[contact] == pytest.approx(scene(page, "scene.hand.rail.upper"), abs=1e-4)
     picture(page, "live/end")
     page.mouse.up()
-    searched(page, "pulls=")
+    searched(page, "pull=")
 
 
 def test_brackets_move_the_selected_force_and_escape_lets_go(page):
@@ -265,10 +265,10 @@ def test_brackets_move_the_selected_force_and_escape_lets_go(page):
     before = normal(page)
     for key in "[[":
         page.keyboard.press(key)
-    searched(page, "pulls=")
+    searched(page, "pull=")
     assert normal(page)[contact] < before[contact]
     page.keyboard.press("Escape")
-    no_more(page, "pulls=")
+    no_more(page, "pull=")
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
@@ -293,7 +293,7 @@ def test_a_link_holds_what_was_pulled(visit):
     page = visit()
     pulled(page)
     page.mouse.up()
-    searched(page, "pulls=")
+    searched(page, "pull=")
     until(page, "scene.hand.player.replay.held.pull !== undefined")
     again = visit(page.evaluate("location.search"))
     until(again, "scene.hand.player.replay.held !== null")
@@ -352,7 +352,7 @@ def test_a_finger_pulls_the_selected_contact(visit):
         touch("touchMove", (x, y - 2 * k))
     until(page, f"scene.mixed.normal[{contact}] > {before[contact] + 1e-3}")
     touch("touchEnd")
-    searched(page, "pulls=")
+    searched(page, "pull=")
 
 
 def test_a_grip_without_a_pull_leaves_what_is_told(page):
@@ -375,9 +375,9 @@ def test_a_grip_without_a_pull_leaves_what_is_told(page):
 def test_playing_on_lets_go(page):
     pulled(page)
     page.mouse.up()
-    searched(page, "pulls=")
+    searched(page, "pull=")
     page.locator("button.step").click()
-    no_more(page, "pulls=")
+    no_more(page, "pull=")
     until(page, "scene.hand.player.replay.held === null")
     frames = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
     np.testing.assert_allclose(normal(page), frames[1], atol=1e-6)
@@ -415,7 +415,7 @@ def test_a_dot_of_the_intervals_is_dragged_along_its_bar(page):
     if scene(page, "scene.hand.value") > low + 1e-3:  # the dot is where the hand is
         assert dot(page, contact)[1] == pytest.approx(y + 15, abs=3)
     page.mouse.up()
-    searched(page, "pulls=")
+    searched(page, "pull=")
 
 
 def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(page):

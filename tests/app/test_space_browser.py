@@ -62,7 +62,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     if "axes" in query:  # a chain first; in the plane of a pair it would become one of the two
         pulled(page)
         page.mouse.up()
-        searched(page, "pulls=")
+        searched(page, "pull=")
         until(page, "scene.hand.player.replay.held.pull !== undefined")
     before, start, frames = normal(page), here(page), scene(page, "scene.hand.frames")
     middle = [np.mean(column(page, "outer", name)) for name in "xy"]
@@ -87,13 +87,36 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.wait_for_function(f"() => {MODEL}('here').get_column('x')[0] <= {edge} + 1e-6")
     page.mouse.move(u, v)
     page.mouse.up()
-    page.wait_for_function("() => /pulls=.*[pn]%3A/.test(location.search)")
+    page.wait_for_function("() => /pull=.*[pn]%3A/.test(location.search)")
     until(page, "scene.hand.player.replay.held.pull?.length === 3")
     assert float(page.locator("b.residual").text_content()) < 1e-9
     np.testing.assert_allclose(normal(page), during, atol=2e-3)
     page.keyboard.press("z")
     until(page, "scene.hand.player.replay.held?.pull?.length !== 3")
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
+
+
+def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
+    """And can be taken there: the next pull begins where the first ended."""
+    page = visit()
+    pulled(page)
+    page.mouse.up()
+    searched(page, "pull=")
+    page.get_by_role("tab", name="Force space").click()
+    ready(page)
+    spot = scene(page, "scene.hand.player.plots.projected(scene.mixed)")
+    page.wait_for_function(
+        f"([x, y]) => Math.hypot({MODEL}('here').get_column('x')[0] - x, "
+        f"{MODEL}('here').get_column('y')[0] - y) < 1e-4",
+        arg=spot,
+    )
+    x, y = place(page, *spot)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 10, y + 10)
+    until(page, "scene.hand.spot.fan !== null")
+    page.mouse.up()
+    searched(page, "~")
 
 
 @pytest.mark.parametrize(("button", "axis"), [("Sweep the green", "x"), ("Sweep the violet", "y")])
@@ -118,7 +141,7 @@ def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
     assert "orange carries more" in page.locator(".said").inner_text()
     until(page, "scene.hand.spot.target === null")  # it comes to an end by itself
     np.testing.assert_array_equal(normal(page), before)
-    assert page.locator(".said").text_content() == "" and "pulls" not in page.url
+    assert page.locator(".said").text_content() == "" and "pull=" not in page.url
     sweep.click()
     until(page, "scene.hand.player.replay.held !== null")
     sweep.click()
@@ -186,7 +209,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     until(page, "scene.hand.player.replay.frame === 4")
     assert scene(page, widths) == pinned
     more(page).locator("button.pin").click()
-    searched(page, "reference=4")
+    searched(page, "pinned=8")
     until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
     more(page).locator("button.split").click()
     until(page, "!scene.hand.player.split.on")

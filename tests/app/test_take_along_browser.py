@@ -64,7 +64,7 @@ def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
     assert path.suffix == ".webm" and content[:4] == b"\x1a\x45\xdf\xa3" and len(content) > 5000
     assert page.get_by_role("button", name="Movie (WebM)", exact=True).is_visible()
     # The player is where it was; the movie has its caption, and says how long it is.
-    searched(page, "frame=3")
+    searched(page, "network=6")
     assert scene(page, "scene.hand.player.replay.position") == 3
     assert scene(page, "scene.disks.canvas.width === Math.round(scene.root.clientWidth)")
     width, height, duration, picture = page.evaluate(

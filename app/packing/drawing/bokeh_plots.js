@@ -57,11 +57,15 @@ export class Plots {
   /** A source by name; new contents of it are heard from now on. */
   find(name) {
     const source = named(this.document, name)
-    if (source && !this.heard.has(source)) {
-      this.heard.add(source)
-      source.properties.data.change.connect(this.onData)
-    }
+    if (source) this.watch(source)
     return source
+  }
+
+  /** Hear of new contents of a source, which the server sets as the states have them, not the hand. */
+  watch(source) {
+    if (this.heard.has(source)) return
+    this.heard.add(source)
+    source.properties.data.change.connect(this.onData)
   }
 
   /** Intervals and measures of the states passed. */
@@ -178,6 +182,7 @@ export class Plots {
       if (word !== "follows" || !tabs.includes(on)) continue
       const path = this.find(name)
       if (!path) continue
+      this.watch(model)
       const held = name === "path" && replay.held && this.projected(replay.mixed)
       if (held) {
         [model.get_column("x")[0], model.get_column("y")[0]] = held
