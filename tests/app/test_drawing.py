@@ -52,7 +52,7 @@ def test_every_script_is_a_module_by_itself(run):
 
 @pytest.mark.parametrize("cancelled", [False, True])
 def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
-    """It was sent before, and is painted a frame later: the old packing is on screen again by then."""
+    """It was sent before and is painted a frame later, when the old packing is back."""
     shown = run(
         "packing/replay/live",
         """async ({ Live }, { cancelled }) => {
