@@ -209,8 +209,8 @@ class Knowledge(param.Parameterized):
         state = self.state
         value, error = _number(value, "a known force"), _number(error, "an error bar")
         number = state.replay.backbone[contact]
-        current = self._settled and tuple(self.known) == self.narrowed.known
-        others = state.exact if not self.known else self.narrowed.after if current else None
+        current = self.whole
+        others = state.exact if not self.known else current.after if current else None
         if others is None or error or contact in {one.contact for one in self.known}:
             return Statement(contact, _rounded(value), _rounded(error))
         low, high = (float(_normal(others, name)[contact]) for name in ("low", "high"))
@@ -227,6 +227,12 @@ class Knowledge(param.Parameterized):
             )
         inside = np.clip(value, low + INWARD * width, high - INWARD * width)
         return Statement(contact, _rounded(inside))
+
+    @property
+    def whole(self) -> Narrowed | None:
+        """The Narrowed of all that is known now, once all its bounds are there; or None."""
+        found: Narrowed | None = self.narrowed
+        return found if self._settled and found and found.known == tuple(self.known) else None
 
     @property
     def _settled(self) -> bool:

@@ -15,7 +15,6 @@ from bokeh.io.doc import patch_curdoc
 from bokeh.models import CustomJS, FreehandDrawTool, Scatter
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
-from PIL import Image
 from small_store import KEPT, STATES
 from visitor import drop, press, wait_for
 
@@ -24,7 +23,7 @@ from app.background.limits import Limits
 from app.browser.messages import TO_BROWSER, listed
 from app.explore.controls import Controls
 from app.explore.tabs.export import export as export_view
-from app.explore.tabs.export import files, movies, standalone
+from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction import study_figures as drawn_study
@@ -35,7 +34,7 @@ from app.results import distributions, planes, study_data, uploads
 from app.state import perturbations
 from app.widgets import label_places
 from app.widgets.file_drop import Dropper
-from app.widgets.plot_style import lines, palettes
+from app.widgets.plot_style import lines
 from granforce import measures
 from granforce.measures import statistics
 from granforce.packing.neighbours import find_pairs
@@ -474,20 +473,6 @@ def test_a_tap_on_a_mu_shows_its_states(state):
 # Export
 
 
-def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state):
-    replay = state.replay
-    view = {"colour": "change", "thickness": "normal", "reference": 0, "dark": False}
-    look = movies.shades(replay, {}, palettes(False), most=1.0, full=1e-3, **view)
-    told = {"ink": "#000000", "bar": {"low": "less", "high": "more"}, "lines": ["width", "from"]}
-    with Image.open(io.BytesIO(movies.gif(replay, look | told))) as movie:
-        side, warm = movie.width, []
-        for k in range(movie.n_frames):
-            movie.seek(k)
-            pixels = np.asarray(movie.convert("RGB"), dtype=int)[:side]
-            warm.append((pixels[..., 0] - pixels[..., 2]).max())
-    assert warm[0] < 30 and max(warm) > 120  # orange, of what carries more
-
-
 def test_the_table_of_contacts_holds_what_is_on_screen(state):
     replay = state.replay
     state.compute_exact()
@@ -497,10 +482,9 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     rows = np.array([line.split(",") for line in table[1:]], dtype=float)
     column = dict(zip(names, rows.T, strict=True))
     assert len(rows) == replay.summary["contacts"] and "." not in table[1].split(",")[0]
-    np.testing.assert_allclose(column["f_n"], replay.normal[3] * replay.force_scale, rtol=1e-6)
-    slack = 1e-6 * replay.force_scale
-    assert np.all(column["f_n_low"] <= column["f_n_seen_low"] + slack)
-    assert np.all(column["f_n_seen_high"] <= column["f_n_high"] + slack)
+    np.testing.assert_allclose(column["f_n [mean]"], replay.normal[3], rtol=1e-6)
+    assert np.all(column["f_n_low [mean]"] <= column["f_n_seen_low [mean]"] + 1e-6)
+    assert np.all(column["f_n_seen_high [mean]"] <= column["f_n_high [mean]"] + 1e-6)
     packing = state.library.packing(state.cell.params["packing"])
     place = column["contact"].astype(int)
     np.testing.assert_array_equal(column["i"], packing.contacts.i[place])
@@ -554,7 +538,41 @@ def test_every_button_hands_a_file_over(state):
         assert "/" not in file["name"], key
         drawn = key in ("svg", "png", "webm")  # by the browser
         assert file["caption"]["lines"] if drawn else file["content"][300:]
-    assert len(keys) == 10
+    assert len(keys) == 9
+
+
+def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
+    state.compute_exact()
+    wait_for(state, lambda: state.exact is not None)
+    view = export_view.View(state)
+
+    def table():
+        handed = []
+        view.buttons.tell = handed.append
+        view.buttons.hear({"key": "csv"})
+        wait_for(state, lambda: handed)
+        lines = handed[0]["content"].decode().splitlines()
+        head = [line for line in lines if line.startswith("#")]
+        names, *rows = (line.split(",") for line in lines[len(head) :])
+        return "\n".join(head), dict(zip(names, np.array(rows, dtype=float).T, strict=True))
+
+    head, free = table()
+    assert "held" not in head and "known" not in free and "Forces are in the mean" in head
+    state.knowledge.hold(4, float(state.replay.normal[0, 4]))
+    head, early = table()  # before the bounds under it are there
+    assert "still being computed" in head and "f_n_low [mean]" not in early
+    wait_for(state)
+    head, held = table()
+    number, after = state.replay.backbone[4], state.knowledge.narrowed.after
+    assert f"Known: contact {number}: fₙ = " in head and "exact with these forces held" in head
+    assert list(np.flatnonzero(held["known"])) == [4] and f"hold={number}%3A" in head
+    scale = state.replay.force_scale
+    for name in ("low", "high"):
+        found = held[f"f_n_{name} [mean]"]
+        np.testing.assert_allclose(found, after[name].values[:, 0] / scale, atol=1e-6)
+        unheld = held[f"f_n_{name}_without_known [mean]"]
+        np.testing.assert_allclose(unheld, free[f"f_n_{name} [mean]"], atol=1e-6)
+    assert np.ptp([held["f_n_low [mean]"][4], held["f_n_high [mean]"][4]]) < 1e-3
 
 
 def test_unknown_keys_are_ignored(state):

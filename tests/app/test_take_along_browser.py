@@ -10,8 +10,6 @@ from PIL import Image
 from serving import PATIENCE, column, painted, picture, scene, searched
 from small_store import KEPT, ROOT, STATES
 
-from app.explore.tabs.export import movies
-
 # What was taken along, to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "along"
 
@@ -91,20 +89,6 @@ def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
     with Image.open(io.BytesIO(picture)) as image:
         pixels = np.asarray(image.convert("L"))
     assert (pixels[:900] < 200).any() and (pixels[905:] < 100).any()  # packing, and words below it
-
-
-def test_a_movie_for_slides_is_drawn_by_the_server(page, tmp_path):
-    path = taken(page, "Movie (GIF)", tmp_path)
-    assert path.stat().st_size <= movies.MOST_BYTES
-    with Image.open(path) as movie:
-        assert movie.n_frames > movies.FRAMES / 2 and movie.height > 1.1 * movie.width
-        first = np.asarray(movie.convert("RGB")).copy()
-        movie.seek(movie.n_frames // 2)
-        later = np.asarray(movie.convert("RGB"))
-    words = slice(first.shape[1], None)  # below the packing: which network it is
-    assert (first != later).any() and (first[words] != later[words]).any()
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(later).save(ARTEFACTS / "movie.png")
 
 
 def test_all_states_are_exported_not_only_those_kept(page, tmp_path):

@@ -1,47 +1,137 @@
 """Share what is on screen: pictures, tables, datasets, the packing, the parameters."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import panel as pn
 import xarray as xr
 
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, origin, stem
-from ....packing.view import exact_intervals, full_extent, gone, measured, pins
+from ....packing.view import gone, measured, pins
 from ....results import planes
 from ....results.compute import found_or_made
 from ....results.library import SOURCES, Cell, Library
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
-from ....widgets.plot_style import palettes
 from ....widgets.progress import Progress
-from . import files, movies, standalone
+from . import files, standalone
 
-FILES = {
-    "Picture of the packing": {"svg": "SVG", "png": "PNG"},
-    "Animation": {"webm": "Movie (WebM)", "gif": "Movie (GIF)"},
-    "Share with others": {"html": "This view as a page (HTML)"},
+
+class Snapshot:
+    """What is on screen at the moment when a file of it is asked for; it makes the file."""
+
+    def __init__(self, state: AppState) -> None:
+        self.library, self.cell, self.replay = state.library, state.cell, state.replay
+        self.exact, self.possible = state.exact, state.possible
+        self.view, self.link, self.command = state.view, state.link(), state.command
+        self.stem = stem(state.cell.selection)
+        self.known, self.source = list(known_words(state)), origin(state.cell)
+        frame = min(state.looks.frame, len(self.replay.normal) - 1)
+        held, knowledge = state.hand.held, state.knowledge
+        self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
+        network = files.on_screen(self.replay, frame, held)
+        self._head = files.explained(
+            self._columns, self.replay, self.source, network, *self.known,
+            files.bounds_of(knowledge), f"This view: ?{self.link}",
+        )  # fmt: skip
+        numbers = state.numbers
+        self._numbered = self.view if numbers is None else numbers.of(self.view)
+        self._shown: dict[str, Any] = {
+            "loads": state.loads,
+            "gone": gone(knowledge, self.replay),
+            "measured": measured(state, self.replay),
+            "pins": pins(knowledge),
+        }
+
+    def file(self, ending: str, mime: str, content: bytes) -> files.File:
+        """A file named like the packing."""
+        return files.File(f"{self.stem}.{ending}", mime, content)
+
+    def csv(self, job: Job) -> files.File:
+        """A table of the contacts."""
+        return self.file("csv", "text/csv", files.csv(self._columns, self._head))
+
+    def json(self, job: Job) -> files.File:
+        """Parameters, link, command and view."""
+        content = files.parameters(self.cell, self.link, self._numbered)
+        return self.file("json", "application/json", content)
+
+    def npz(self, job: Job) -> files.File:
+        """The packing."""
+        content = files.npz(self.library.packing(self.cell.params["packing"]))
+        return self.file("npz", "application/zip", content)
+
+    def netcdf(self, job: Job) -> files.File:
+        """All states, as NetCDF."""
+        return self.file("nc", "application/x-netcdf", files.netcdf(self._dataset(job)))
+
+    def zarr(self, job: Job) -> files.File:
+        """All states, as a zipped Zarr group."""
+        return self.file("zarr.zip", "application/zip", files.zarr_zip(self._dataset(job)))
+
+    def _dataset(self, job: Job) -> xr.Dataset:
+        states = all_states(self.library, self.cell, job)
+        job.begin("making the file")
+        return files.dataset(self.library.packing(self.cell.params["packing"]), states, self.exact)
+
+    def html(self, job: Job) -> files.File:
+        """The view as a page that needs no server."""
+        outlined = None
+        if self.replay.summary["dimension"] > 0:
+            kept = standalone.thinned(self.replay)[0]
+            principal = planes.principal(kept)
+            outlined = planes.outline(self.library, self.cell, kept, principal)(job)
+        job.begin("making the page")
+        content = standalone.html(
+            self.library, self.cell, self.replay, self.possible, self._shown, view=self.view,
+            outlined=outlined, link=self.link, command=self.command,
+            source=" ".join([self.source, *self.known]),
+        )  # fmt: skip
+        return self.file("html", "text/html", content)
+
+
+class Kind(NamedTuple):
+    """A kind of file: what its button says, and what makes it; None: the browser draws it."""
+
+    words: str
+    make: Callable[[Snapshot, Job], files.File] | None = None
+    long: bool = False  # whether its progress is shown
+
+
+GROUPS = {
+    "Picture of the packing": {"svg": Kind("SVG"), "png": Kind("PNG")},
+    "Animation": {"webm": Kind("Movie (WebM)")},
+    "Share with others": {"html": Kind("This view as a page (HTML)", Snapshot.html, True)},
     "Data on screen": {
-        "csv": "Contacts (CSV)",
-        "netcdf": "States (NetCDF)",
-        "zarr": "States (Zarr, zipped)",
+        "csv": Kind("Contacts (CSV)", Snapshot.csv),
+        "netcdf": Kind("States (NetCDF)", Snapshot.netcdf, True),
+        "zarr": Kind("States (Zarr, zipped)", Snapshot.zarr, True),
     },
-    "To go on elsewhere": {"npz": "Packing (NPZ)", "json": "Parameters (JSON)"},
+    "To go on elsewhere": {
+        "npz": Kind("Packing (NPZ)", Snapshot.npz),
+        "json": Kind("Parameters (JSON)", Snapshot.json),
+    },
 }
-DRAWN = ("svg", "png", "webm")  # in the browser
+FILES = {
+    heading: {key: kind.words for key, kind in group.items()} for heading, group in GROUPS.items()
+}
+KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Pictures have a colour bar, a scale and a caption. Movies play from the first state to the last, or
-to and fro between two: WebM is recorded here at the player's speed, GIF is drawn for slides, at
-most 5 MB. The page as one file plays without a server and without a network.
-Contacts: one row each with disks, forces as packed and now, the range over the networks and,
-where known, exact bounds; the file's first lines explain the columns. States: the packing, and
-<b>all</b> states with their measures, units and parameters; where only some were kept, all are
-computed again. Every plot is saved as PNG or SVG by the buttons above it. The address of the page
-reopens this view; <code>granforce walk --packing packing.npz</code> goes on with the packing.
+Each file shows the view as it is now, with what is pulled and held. Pictures have a colour bar, a
+scale and a caption. The movie plays from the first network to the last, or to and fro between two,
+at the player's speed. The page as one file needs no server and no network connection.
+Contacts: one row each, with disks, forces as packed and now, the range over the networks and,
+where known, the exact bounds; forces are in mean forces, as on screen, and the first lines explain
+the columns. States: the packing, and <b>all</b> states with their measures, units and parameters;
+where only some were kept, all are computed again. Every plot is saved as PNG or SVG by the buttons
+above it. The address of the page reopens this view; <code>granforce walk --packing
+packing.npz</code> continues with the packing.
 """
-LONG = ("netcdf", "zarr", "gif", "html")  # with progress
 
 
 class View:
@@ -69,81 +159,22 @@ class View:
         )
 
     def _asked(self, key: str) -> None:
-        state = self.state
+        state, kind = self.state, KINDS[key]
         self.told.object = ""
         if state.replay is None:
             self.told.object = "There is nothing on screen yet."
-            return
-        name = stem(state.cell.selection)
-        if key in DRAWN:
-            self.buttons.hand_over_picture(f"{name}.{key}", caption(state))
-            return
-        task = self.making if key in LONG else self.task
-        task.start(self._work(key, name), self.buttons.hand_over)
+            self.buttons.rest()
+        elif kind.make is None:
+            name = f"{stem(state.cell.selection)}.{key}"
+            self.buttons.hand_over_picture(name, caption(state))
+        else:
+            task = self.making if kind.long else self.task
+            task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)
 
     def _rest(self, event: Any) -> None:
         """What failed or was cancelled brings no file: its button rests, too."""
         if not event.new:
             self.buttons.rest()
-
-    def _work(self, key: str, stem: str) -> Callable[[Job], files.File]:
-        """Work that makes a file of what is on screen now."""
-        state = self.state
-        library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        possible, known = state.possible, state.knowledge
-        drawn: dict[str, Any] = {"loads": state.loads, "gone": gone(known, replay)}
-        drawn["measured"] = measured(state, replay)
-        shown = drawn | {"pins": pins(known)}
-        view, link, command, held = state.view, state.link(), state.command, state.hand.held
-        told, source = caption(state), " ".join([origin(cell), *known_words(state)])
-        frame = min(state.looks.frame, len(replay.normal) - 1)
-
-        def work(job: Job) -> files.File:
-            job.begin("making the file")
-            if key == "csv":
-                columns = files.contacts(replay, exact, frame, held)
-                head = files.explained(
-                    columns, replay, origin(cell), files.on_screen(replay, frame, held)
-                )
-                content = files.csv(columns, head)
-                return files.File(f"{stem}.csv", "text/csv", content)
-            if key == "json":
-                content = files.parameters(cell, link, view)
-                return files.File(f"{stem}.json", "application/json", content)
-            if key == "npz":
-                content = files.npz(library.packing(cell.params["packing"]))
-                return files.File(f"{stem}.npz", "application/zip", content)
-            if key in ("netcdf", "zarr"):
-                states = all_states(library, cell, job)
-                job.begin("making the file")
-                whole = files.dataset(library.packing(cell.params["packing"]), states, exact)
-                if key == "netcdf":
-                    return files.File(f"{stem}.nc", "application/x-netcdf", files.netcdf(whole))
-                return files.File(f"{stem}.zarr.zip", "application/zip", files.zarr_zip(whole))
-            if key == "gif":
-                job.begin("drawing the movie")
-                bounds = exact_intervals(possible, replay)
-                most = full_extent(replay, bounds, view["full"])
-                names = ("colour", "thickness", "reference", "dark", "full", "stretch")
-                looks = {name: view[name] for name in names} | {"most": most} | drawn
-                look = movies.shades(replay, bounds, palettes(view["dark"]), **looks)
-                content = movies.gif(
-                    replay, look | told, between=view["between"], progress=job.tell,
-                    cancelled=job.cancelled,
-                )  # fmt: skip
-                return files.File(f"{stem}.gif", "image/gif", content)
-            outlined = None
-            if replay.summary["dimension"] > 0:
-                kept = standalone.thinned(replay)[0]
-                outlined = planes.outline(library, cell, kept, planes.principal(kept))(job)
-            job.begin("making the page")
-            content = standalone.html(
-                library, cell, replay, possible, shown, view=view, outlined=outlined, link=link,
-                command=command, source=source,
-            )  # fmt: skip
-            return files.File(f"{stem}.html", "text/html", content)
-
-        return work
 
     def _follow(self, event: Any) -> None:
         if event.new:

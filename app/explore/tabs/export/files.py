@@ -18,6 +18,7 @@ from granforce.study.schema import packing_dataset
 from ....results.library import Cell
 from ....results.replays import Replay
 from ....results.selection import command
+from ....state.known import Knowledge
 from ....state.pulls import Held
 
 Columns = dict[str, np.ndarray]
@@ -35,13 +36,17 @@ class File(NamedTuple):
 
 
 def contacts(
-    replay: Replay, exact: xr.Dataset | None, frame: int, held: Held | None = None
+    replay: Replay,
+    exact: xr.Dataset | None,
+    frame: int,
+    held: Held | None = None,
+    knowledge: Knowledge | None = None,
 ) -> Columns:
-    """One row a contact of the backbone, forces in the packing's unit: {name: array}.
+    """One row a contact of the backbone, forces in ⟨f_n⟩ as on screen: {name: array}.
 
-    On screen is the state of this frame, or the network that pulls have led to.
+    On screen is the state of this frame, or the network that pulls have led to, with the bounds
+    that what is known leaves.
     """
-    scale = replay.force_scale
     normal, tangential = replay.normal[frame], replay.tangential[frame]
     if held is not None:
         normal, tangential = held.forces.T
@@ -50,19 +55,39 @@ def contacts(
         "contact": replay.backbone,
         "i": replay.links.i[first],
         "j": replay.links.j[first],
-        "f_n_original": replay.normal[0] * scale,
-        "f_t_original": replay.tangential[0] * scale,
-        "f_n": normal * scale,
-        "f_t": tangential * scale,
+    }
+    known = [] if knowledge is None else [one.contact for one in knowledge.known]
+    if known:
+        columns["known"] = np.isin(np.arange(len(replay.backbone)), known).astype(int)
+    columns |= {
+        "f_n_original": replay.normal[0],
+        "f_t_original": replay.tangential[0],
+        "f_n": normal,
+        "f_t": tangential,
     }
     for k, part in enumerate(("f_n", "f_t")):
-        columns[f"{part}_seen_low"] = replay.low[:, k] * scale
-        columns[f"{part}_seen_high"] = replay.high[:, k] * scale
-    if exact is not None and np.array_equal(exact["backbone"].values, replay.backbone):
-        for k, part in enumerate(("f_n", "f_t")):
-            columns[f"{part}_low"] = exact["low"].values[:, k]
-            columns[f"{part}_high"] = exact["high"].values[:, k]
-    return columns
+        columns[f"{part}_seen_low"] = replay.low[:, k]
+        columns[f"{part}_seen_high"] = replay.high[:, k]
+    narrowed = None if knowledge is None or not known else knowledge.whole
+    if narrowed is not None:
+        columns |= _bounds(narrowed.after, replay) | _bounds(narrowed.before, replay, FREE)
+    elif exact is not None:
+        columns |= _bounds(exact, replay, FREE if known else "")
+    return {f"{name} [mean]" if name.startswith("f_") else name: columns[name] for name in columns}
+
+
+FREE = "_without_known"  # at the end of the names of bounds that heed nothing that is known
+
+
+def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
+    """Exact bounds in ⟨f_n⟩; none where they are of other contacts."""
+    if not np.array_equal(exact["backbone"].values, replay.backbone):
+        return {}
+    return {
+        f"{part}_{side}{ending}": exact[side].values[:, k] / replay.force_scale
+        for k, part in enumerate(("f_n", "f_t"))
+        for side in ("low", "high")
+    }
 
 
 # What the columns of the table of contacts hold.
@@ -70,19 +95,26 @@ COLUMNS = {
     "contact": "number of the contact in the packing",
     "i": "number of the first grain; the normal n points from i to j",
     "j": "number of the second grain",
-    "f_n_original": "normal force that the packing came to rest with, force",
-    "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
-    "f_n": "normal force in the network on screen, force",
-    "f_t": "tangential force in the network on screen, force",
-    "f_n_seen_low": "smallest normal force of all states, force",
-    "f_n_seen_high": "largest normal force of all states, force",
-    "f_t_seen_low": "smallest tangential force of all states, force",
-    "f_t_seen_high": "largest tangential force of all states, force",
-    "f_n_low": "least possible normal force (exact), force",
-    "f_n_high": "largest possible normal force (exact), force",
-    "f_t_low": "least possible tangential force (exact), force",
-    "f_t_high": "largest possible tangential force (exact), force",
+    "known": "1 where the normal force is held, else 0",
+    "f_n_original": "normal force that the packing came to rest with",
+    "f_t_original": "tangential force with it, along t = (-n_y, n_x)",
+    "f_n": "normal force in the network on screen",
+    "f_t": "tangential force in the network on screen",
+    "f_n_seen_low": "smallest normal force of all states",
+    "f_n_seen_high": "largest normal force of all states",
+    "f_t_seen_low": "smallest tangential force of all states",
+    "f_t_seen_high": "largest tangential force of all states",
+    "f_n_low": "least possible normal force (exact)",
+    "f_n_high": "largest possible normal force (exact)",
+    "f_t_low": "least possible tangential force (exact)",
+    "f_t_high": "largest possible tangential force (exact)",
 }
+
+
+def _meaning(column: str) -> str:
+    name = column.removesuffix(" [mean]")
+    free = ", whatever is held" if name.endswith(FREE) else ""
+    return f"{COLUMNS[name.removesuffix(FREE)]}{free}"
 
 
 def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
@@ -92,13 +124,22 @@ def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
     return f"Network {replay.number[frame]}" if frame else "Network as packed"
 
 
+def bounds_of(knowledge: Knowledge) -> str:
+    """Of which networks a table's exact bounds are, in words; empty where nothing is held."""
+    if not knowledge.known:
+        return ""
+    if knowledge.whole is None:
+        return f"Bounds that heed what is held are still being computed; {FREE[1:]}: without it."
+    return f"Bounds are exact with these forces held; {FREE[1:]}: without them."
+
+
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
     """Lines, each after a #, that tell what a table holds and in which units."""
     unit = (
-        f"Forces are in the packing's own unit (pressure times length): mean normal force "
-        f"{replay.force_scale:.9g}. Lengths are in the packing's unit."
+        "Forces are in the mean normal force, as on screen; it is "
+        f"{replay.force_scale:.9g} in the packing's own unit (pressure times length)."
     )
-    lines = [*titles, unit, *(f"{name}: {COLUMNS[name]}" for name in columns)]
+    lines = [*filter(None, titles), unit, *(f"{name}: {_meaning(name)}" for name in columns)]
     return "".join(f"# {line}\n" for line in lines)
 
 
