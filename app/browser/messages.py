@@ -42,6 +42,7 @@ FROM_BROWSER = {
         {"live": {"painted": int}},  # the number of the last message that was drawn
     ),
     "Progress": ({"stop": True}, {"cancel": True}),
+    "Results": ({"measure": True},),  # the volume of S
     "Small": (
         {"scene": str},
         {"scene": str, "mu": float},
@@ -53,7 +54,7 @@ FROM_BROWSER = {
             **{"load": [float, ...], "plane": [int, int]},
         },
     ),
-    "Tour": ({"step": int},),
+    "StatusLine": ({"stop": True}, {"cancel": True}, {"read": True}),  # what failed was read
 }
 
 MEASURED = {"scene": str, "mu": float, "plane": [int, int]}  # of a small scene

@@ -4,74 +4,31 @@ from typing import Any
 
 import numpy as np
 
-from ..results.progress_feed import Summary
 from ..results.replays import Replay
-from ..results.selection import Selection
 from ..state.app_state import AppState
-from ..widgets.foldout import Foldout
+from ..widgets.header import Header
 from ..widgets.hints import term
 
 QUESTION = "What am I seeing? Why more than one force network?"
 
 
-def lead(state: AppState) -> str:
-    """The question that the picture answers, and what is seen, as HTML."""
-    if state.work.moving and not state.selection.imported:
-        return jamming(state.selection)
-    if state.seen is None:
-        return ""
-    return first(state.seen.summary, state.looks.tab, state.looks.fresh)
-
-
-# What the packing is looked at for, by tabs, where it is not what is free; and what is seen of it.
-ASKED = {
-    "statistics": (
-        "How much can one force vary while no disk moves?",
-        "Here is a packing made with friction μ = {mu:g}. With different friction the disks "
-        "would have settled elsewhere.",
-    ),
-    "perturb": (
-        "How hard can you push before something moves?",
-        "Each line is the force between two touching disks at rest: thicker means stronger.",
-    ),
-}
-
-
-# The same to somebody who is new.
-ASKED_FIRST = {
-    "plane": (
-        "Each dot is one way to hold these {n} disks still.",
-        "The picture shows the red dot's forces. Drag the dot, and watch all the lines change.",
-    ),
-}
-
-
-def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
-    """What does not move, what is free, and what playing shows; or what is asked beside.
-
-    fresh: whether to somebody who is new, for whom playing waits.
-    """
+def told(replay: Replay) -> str:
+    """What the picture shows, and why there is more than one network, as HTML."""
+    summary = replay.summary
     n, free = summary["n"], summary["dimension"]
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
-        told = f"No number is free: there is just one {term('network', 'force network')}."
-        told += " Choose some friction to see more." if summary["mu"] == 0 else ""
-    elif tab in ASKED or (fresh and tab in ASKED_FIRST):
-        found, told = ASKED.get(tab) or ASKED_FIRST[tab]
-        found, told = found.format(n=n), told.format(mu=summary["mu"])
+        said = f"No number is free: there is just one {term('network', 'force network')}."
+        said += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can vary."
-        told = "Lines are the forces between touching disks: the thicker, the stronger. "
-        told += f"<b>Balance leaves {term('h', f'{free} numbers')} free</b>, so countless sets of "
-        told += "forces "
-        told += "hold the very same disks. "
-        told += (
-            "No photograph shows which of them is there."
-            if fresh
-            else f"Play goes through some such {term('network', 'networks')}, found at random: "
-            "alternatives, not moments in time."
+        said = (
+            "Lines are the forces between touching disks: the thicker, the stronger. Balance "
+            f"leaves {term('h', f'{free} numbers')} free, so countless sets of forces hold the "
+            f"very same disks. Play goes through some such {term('network', 'networks')}, found "
+            "at random: alternatives, not moments in time."
         )
-    return f"<h2>{found}</h2><p>{told}</p>"
+    return f"<h2>{found}</h2><p>{said}</p>"
 
 
 def rest(replay: Replay) -> str:
@@ -134,33 +91,17 @@ def _dependent(count: int) -> str:
     return f" (less {count} that follow from the others, as each force acts on two disks)"
 
 
-def jamming(selection: Selection) -> str:
-    """What moves while a packing is made."""
-    return (
-        "<h2>These disks move until they jam.</h2>"
-        f"<p>A gas of {selection.packing['n']} rigid disks is compressed by one pressure: the box "
-        "shrinks, collisions (the short chains) turn into contacts that last, and at last nothing "
-        "can move any more. From then on the disks never move again, and the contact forces are "
-        f"explored on that {term('packing')}.</p>"
-    )
-
-
 def more(replay: Replay) -> str:
     """The longer part, to be opened, as HTML for a page without scripts of its own."""
     return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
 
 
-def view(state: AppState) -> Foldout:
-    """The longer part of the explanation, below the packing."""
-    made = Foldout(line=QUESTION, sizing_mode="stretch_width", margin=(4, 10))
+def follow(state: AppState, header: Header) -> None:
+    """Have the help of the page explain what is on screen."""
 
     def tell(*events: Any) -> None:
-        if state.work.moving and not state.selection.imported:
-            made.inside = ""
-        elif state.seen is not None:
-            made.inside = rest(state.seen)
+        if state.replay is not None:
+            header.help = told(state.replay) + rest(state.replay)
 
-    state.param.watch(tell, "seen")
-    state.work.param.watch(tell, "moving")
+    state.param.watch(tell, "replay")
     tell()
-    return made

@@ -1,9 +1,10 @@
 // Slider for μ on a logarithmic scale, with a place for 0 and a tick for every stored value.
 
+import { button } from "../browser/dom.js"
+
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
 const HILL = 22 // px, its height
-const NARROW = "(max-width: 1199.95px)" // where the sidebar begins closed
 
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
 const rounded = (mu) => Number(mu.toPrecision(2))
@@ -12,12 +13,14 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
-    <div class="head"><label for="mu">Friction μ</label> <small>(changes the packing)</small>
-      <input id="mu" class="typed" inputmode="decimal" aria-label="μ"></div>
-    <div class="hill"></div>
-    <div class="rail"><div class="ticks"></div>
-      <input type="range" step="0.01" aria-label="logarithm of μ"></div>
-    <div class="scale"></div>`
+    <label for="mu"><b>Friction μ</b><small>each μ has its own packing</small></label>
+    <div class="track">
+      <div class="hill"></div>
+      <div class="rail"><div class="ticks"></div>
+        <input type="range" step="0.01" aria-label="logarithm of μ"></div>
+      <div class="scale"></div>
+    </div>
+    <input id="mu" class="typed" inputmode="decimal" aria-label="μ">`
   const part = (name) => root.querySelector(`.${name}`)
   const range = root.querySelector("[type=range]"), typed = part("typed")
 
@@ -43,14 +46,9 @@ export function render({ model, view }) {
     range.max = model.most
     part("ticks").innerHTML = model.stored
       .map((mu) => `<i style="left:${along(place(mu, model.least))}"></i>`).join("")
-    let marks = `<span style="left:${along(model.least)}">0</span>`
-    for (let k = Math.ceil(model.least + 0.4); k <= model.most; k++) {
-      marks += `<span style="left:${along(k)}">${Number((10 ** k).toPrecision(1))}</span>`
-    }
-    part("scale").innerHTML = marks
-    for (const mark of part("scale").children) {
-      mark.addEventListener("click", () => { wish(Number(mark.textContent)) })
-    }
+    const marks = [[0, model.least]]
+    for (let k = Math.ceil(model.least + 0.4); k <= model.most; k++) marks.push([Number((10 ** k).toPrecision(1)), k])
+    part("scale").replaceChildren(...marks.map(([mu, at]) => button(String(mu), () => wish(mu), { style: `left: ${along(at)}`, tabIndex: -1 })))
     follow()
   }
 
@@ -60,7 +58,7 @@ export function render({ model, view }) {
     if (!(most > 0)) return
     const points = model.hill.map(([mu, eta]) =>
       `${100 * (place(mu, model.least) - model.least) / (model.most - model.least)},${HILL * (1 - eta / most)}`)
-    part("hill").innerHTML = `<span>how much forces vary</span>
+    part("hill").innerHTML = `<span>η₂(μ)</span>
       <svg viewBox="0 0 100 ${HILL}" preserveAspectRatio="none" aria-hidden="true">
       <polygon points="0,${HILL} ${points.join(" ")} 100,${HILL}"/></svg>`
   }
@@ -104,11 +102,5 @@ export function render({ model, view }) {
   draw()
   drawHill()
 
-  // In the page where it is narrow, else in the sidebar: never in both.
-  const host = document.createElement("div"), narrow = matchMedia(NARROW)
-  const settle = () => host.replaceChildren(...(narrow.matches === model.on_narrow ? [root] : []))
-  narrow.addEventListener("change", settle)
-  model.on("remove", () => narrow.removeEventListener("change", settle))
-  settle()
-  return host
+  return root
 }

@@ -16,11 +16,10 @@ class FrictionSlider(Scripted):
     """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
 
     mu = param.Number(default=0.1)
-    hill = param.List(default=[], doc="[(μ, η)] to be drawn along it")
+    hill = param.List(default=[], doc="[(μ, η2)] to be drawn along it")
     stored = param.List(default=[], doc="values of μ that need no computing")
     least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
     most = param.Number(default=MOST_PLACE, constant=True)
-    on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
 
     def __init__(self, on_typed: Callable[[str], object], **params: Any) -> None:
         """on_typed(text): what to do with a value that was typed, sensible or not."""

@@ -1,51 +1,95 @@
-"""Numbers of the walk on screen, and what was left out or went wrong on the way."""
+"""The results of the states on screen: how undetermined forces are, seen and exact, and why."""
 
 from collections.abc import Iterator
 from typing import Any
 
-import panel as pn
+import param
+import xarray as xr
 
+from ..browser.bundle import Scripted
+from ..browser.messages import Message
+from ..packing.view import exact_intervals
 from ..results.progress_feed import Summary
+from ..results.replays import Replay
 from ..state.app_state import AppState
-from ..widgets.foldout import Foldout
 from ..widgets.hints import term
-from ..widgets.parts import LATER
+from .volume import Volume
 
-TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
-<div>{value}</div><div class="name">{meaning}</div></div>"""
-STYLE = """
-.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(114px, 1fr)); gap: 5px;
-  margin-top: 6px; }
-.tile { padding: 4px 6px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
-  font-variant-numeric: tabular-nums; font-size: 13.5px; cursor: help; line-height: 18px; }
-.tile .name { font-size: 11px; line-height: 13px; opacity: 0.85; white-space: nowrap; }
-.tile:focus-visible { outline: 2px solid #e8710a; }
-.flag { margin: 6px 0 0; padding: 5px 9px; border-radius: 6px; font-size: 12.5px;
-  background: #7a4a00; color: #ffffff; }
-.first { font-size: 14px; line-height: 1.45; margin: 8px 2px 0; }
-.rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
-"""
-
-# Words and symbol, name among the summary's numbers, form, key of the glossary, and what it is of.
-TILES = (
-    ("free numbers h", "dimension", "d", "h", "forces less equations"),
-    ("spread η1", "eta1", ".4f", "eta1", "of one force"),
-    ("distance η2", "eta2", ".4f", "eta2", "of two networks"),
-    ("range η3", "eta3", ".4f", "eta3", "largest − least force"),
-)
-# The same of what only those look at who check.
-CHECKS = (
-    ("disks N", "n", "d", "n", ""),
-    ("packing fraction φ", "packing_fraction", ".4f", "phi", ""),
-    ("contacts per disk z", "coordination", ".3f", "z", ""),
-    ("accepted", "acceptance", ".0%", "accepted", ""),
-    ("mixing R̂", "worst_r_hat", ".3f", "r_hat", ""),
-    ("effective size", "least_bulk_size", ".0f", "ess", ""),
-)
-
+PART = 0.15  # of η3, to be compared with η1 and η2
 # Beyond these, numbers from a sample are flagged: chains do not agree, or too few states count.
 MOST_R_HAT, LEAST_SIZE = 1.1, 100
-FLAG = '<div class="flag" role="note">⚠ {}</div>'
+MEASURE = '<button type="button" class="soft">measure</button>'
+
+
+class Results(Scripted):
+    """Two tables of numbers with symbol and word; see results_line.js."""
+
+    html = param.String()
+
+    def __init__(self, state: AppState, volume: Volume, **params: Any) -> None:
+        super().__init__(**params)
+        self._state, self._volume = state, volume
+        state.param.watch(self._tell, ["replay", "exact"])
+        volume.param.watch(self._tell, ["found", "offered"])
+        self._tell()
+
+    def _tell(self, *events: Any) -> None:
+        state, volume = self._state, self._volume
+        if state.replay is not None:
+            self.html = tables(state.replay, state.exact, volume.found, volume.offered)
+
+    def _heard(self, message: Message) -> None:
+        self._volume.measure()
+
+
+def tables(
+    replay: Replay, exact: xr.Dataset | None, volume: xr.Dataset | None, measurable: bool
+) -> str:
+    """All numbers as HTML; measurable: the volume of S can be asked for."""
+    flags = "".join(f'<p class="flag" role="note">{line}</p>' for line in doubts(replay.summary))
+    left = f'<p class="left">{left_out(replay.summary)}</p>'
+    return undetermined(replay, exact) + packed(replay, volume, measurable) + left + flags
+
+
+def undetermined(replay: Replay, exact: xr.Dataset | None) -> str:
+    """η1, η2, 0.15 η3 and mean ΔF_n: over the states, and over all of S where known."""
+    summary = replay.summary
+    known = exact_intervals(exact, replay)
+    seen_extent = (replay.high[:, 0] - replay.low[:, 0]).mean() if len(replay.low) else 0.0
+    rows = [
+        ["seen in {} networks".format(summary["states"]), f"{summary['eta1']:.3f}",
+         f"{summary['eta2']:.3f}", f"{PART * summary['eta3']:.3f}", _mean(seen_extent)],
+    ]  # fmt: skip
+    if exact is not None and known:
+        whole = (known["high"] - known["low"]).mean()
+        rows.append(["exact", "", "", f"{PART * float(exact['eta3']):.3f}", _mean(whole)])
+    head = [
+        "How undetermined",
+        term("eta1", "η₁ spread"),
+        term("eta2", "η₂ distance"),
+        term("eta3", "0.15 η₃ intervals"),
+        term("extent", "ΔFₙ mean"),
+    ]
+    return _table(head, rows)
+
+
+def packed(replay: Replay, volume: xr.Dataset | None, measurable: bool) -> str:
+    """z, φ, h with its count, and ln V of the packing."""
+    summary = replay.summary
+    forces, free = 2 * summary["contacts"], summary["dimension"]
+    count = f"{free} = {forces} − {forces - free}" if free else "0"
+    measured = MEASURE if measurable else "–"
+    if volume is not None:
+        error = float(volume["log_volume_error"])
+        measured = f"{float(volume['log_volume']):.1f} ± {error:.1g}".replace("-", "−")
+    head = [
+        term("z", "z contacts per disk"),
+        term("phi", "φ packing fraction"),
+        term("h", "h free dimensions"),
+        term("volume", "ln V volume of S"),
+    ]
+    row = [f"{summary['coordination']:.3f}", f"{summary['packing_fraction']:.4f}", count, measured]
+    return _table(head, [row])
 
 
 def doubts(summary: Summary) -> Iterator[str]:
@@ -63,47 +107,14 @@ def doubts(summary: Summary) -> Iterator[str]:
         )
 
 
-def numbers(summary: Summary) -> str:
-    """How undetermined the forces are, and what speaks against that, as HTML."""
-    flags = "".join(map(FLAG.format, doubts(summary)))
-    return f'<p class="first">{finding(summary)}</p>{flags}'
+def _mean(value: float) -> str:
+    return f"{value:.3f} ⟨fₙ⟩"
 
 
-def checks(summary: Summary) -> str:
-    """The measures of that, what they stand on, and what was left out, as HTML."""
-    style, rest = f"<style>{STYLE}</style>", f'<div class="rest">{left_out(summary)}</div>'
-    return style + as_tiles(TILES, summary) + as_tiles(CHECKS, summary) + rest
-
-
-def finding(summary: Summary) -> str:
-    """What the numbers say, in one sentence."""
-    if not summary["dimension"]:
-        return (
-            "<b>How much can the forces vary?</b> Not at all: balance leaves every force one value."
-        )
-    networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
-    return (
-        f"<b>How much can the forces vary?</b> Over {networks} found at random, a force varies by "
-        f"about <b>{100 * summary['eta1']:.2g} %</b> of the mean force. Pulled on purpose, it can "
-        "go further."
-    )
-
-
-def as_tiles(rows: tuple[tuple[str, ...], ...], summary: Summary) -> str:
-    """Tiles of those numbers of a summary that it has, as HTML; rows: as TILES."""
-    values = dict(summary)
-    if summary.get("skipped"):
-        values["acceptance"] = None  # nothing was tried
-    made = "".join(
-        TILE.format(name=name, value=_text(values[key], form), term=term, meaning=meaning)
-        for name, key, form, term, meaning in rows
-        if key in values
-    )
-    return f'<div class="tiles">{made}</div>'
-
-
-def _text(value: Any, form: str) -> str:
-    return "–" if value is None else format(value, form)
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    titles = "".join(f'<th scope="col">{title}</th>' for title in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"
 
 
 # Number of the summary → key of the glossary, and words.
@@ -132,37 +143,4 @@ def left_out(summary: Summary) -> str:
         )
     if summary["kept"] < summary["states"]:
         line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} networks."
-    return line
-
-
-def tiles(state: AppState, volume: Any) -> pn.Column:
-    """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
-    folded = Foldout(line="In numbers", sizing_mode="stretch_width", margin=(2, 12))
-    within = pn.Column(volume.tiles, volume.measure, visible=False, sizing_mode="stretch_width")
-    folded.link(within, open="visible")
-
-    shown = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
-
-    def tell(*events: Any) -> None:
-        if state.replay is not None:
-            summary = state.replay.summary
-            shown.object, folded.inside = numbers(summary), checks(summary)
-
-    state.param.watch(tell, "replay")
-    tell()
-    return pn.Column(shown, folded, within, styles=LATER, sizing_mode="stretch_width")
-
-
-def of_which(state: AppState) -> pn.pane.HTML:
-    """Whose numbers and plots are pale, while others are asked for."""
-    line = pn.pane.HTML(visible=False, sizing_mode="stretch_width", margin=(6, 12, 0, 12))
-
-    def tell(*events: Any) -> None:
-        old = state.cell is not None and state.missing
-        line.visible = old
-        if old:
-            line.object = f"<b>Pale: still of μ = {state.cell.mu:g}</b>, {state.cell.series}"
-
-    state.param.watch(tell, ["missing", "cell"])
-    tell()
     return line

@@ -13,8 +13,6 @@ const ICONS = {
   undo: "M12 5V1L6 6l6 5V7a6 6 0 1 1-6 6H4a8 8 0 1 0 8-8z",
   hold: "M8 2h8v2l-1 1v6l3 3v2h-5v6l-1 1-1-1v-6H6v-2l3-3V5L8 4z",
   between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
-  predict: "M12 3a6 6 0 0 1 6 6c0 4-5 4-5 8h-2c0-5 5-5 5-8a4 4 0 0 0-8 0H6a6 6 0 0 1 6-6zM11 19h2v2h-2z",
-  differ: "M3 5h8v14H3zM16 4a5 5 0 0 1 4 8l3 4-2 1-3-4a5 5 0 1 1-2-9zm0 2a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
   split: "M3 5h8v14H3zM13 5h8v14h-8z",
   closer: "M11 4h2v7h7v2h-7v7h-2v-7H4v-2h7z",
   farther: "M4 11h16v2H4z",
@@ -36,24 +34,9 @@ function button(name, title, word = "") {
     `${icon(name)}${said}</button>`
 }
 
-// Around the scene, and over it tools that come and go with what is selected.
+// The scene with tools over it that come and go with what is selected; below it the player, the legend,
+// and what compares and checks networks.
 const BUTTONS = `
-  <div class="lead"></div>
-  <div class="bar">
-    ${button("restart", "restart with the forces as packed (Home)")}
-    ${button("back", "one network back (←)")}
-    ${button("play", "space", "Play")}
-    ${button("step", "one network on (→)")}
-    <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
-    <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="3"
-      aria-label="speed"><span class="rate"></span></label>
-    <button type="button" class="all">More controls</button>
-  </div>
-  <div class="quiz" role="status"></div>
-  <div class="read">
-    <span>network: <b class="state"></b></span>
-    <span class="said"></span>
-  </div>
   <div class="scenes">
     <div class="view">
       ${button("closer", "zoom in (wheel, pinch)")}
@@ -70,19 +53,25 @@ const BUTTONS = `
       </span>
     </div>
   </div>
-  <div class="legend"></div>
-  <details class="extras"><summary>More</summary>
-  <div class="game">Games:
-    ${button("predict", "three questions, each asked before the page shows the answer", "Predict, then look")}
-    ${button("differ", "two networks without colour: which lines differ most?", "Spot the difference")}
+  <div class="bar">
+    ${button("restart", "restart with the forces as packed (Home)")}
+    ${button("back", "one network back (←)")}
+    ${button("play", "space", "Play")}
+    ${button("step", "one network on (→)")}
+    <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
+    <b class="state"></b>
+    <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="0"
+      aria-label="speed"><span class="rate"></span></label>
   </div>
-  <div class="game">Compare:
+  <div class="read"><span class="said"></span></div>
+  <div class="legend"></div>
+  <details class="extras"><summary>Compare and check</summary>
+  <div class="game">
     ${button("pin", "pin this network, to compare others with it", "Pin")}
     ${button("between", "between the pinned network and this one", "To and fro")}
     ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
   </div>
-  <div class="game">Made: <span class="source"></span></div>
-  <div class="read">Check:
+  <div class="read">
     <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
@@ -94,13 +83,17 @@ const BUTTONS = `
       <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
     </span>
   </div>
+  <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
   </details>`
 const CLOSER = 0.7 // of the view, by a button
 
 export class Buttons {
-  /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
-  constructor(scene, actions) {
+  /**
+   * actions: by the buttons' names; scrub(position); tab(number), for the digits. look(name, value): what
+   * lines are to show, or how, was chosen in the legend.
+   */
+  constructor(scene, actions, look) {
     this.root = made("div", { className: "stage", innerHTML: BUTTONS })
     this.actions = actions
     this.asked = scene.root.appendChild(made("div", { className: "asked" }))
@@ -114,6 +107,11 @@ export class Buttons {
     }
     for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", all[name])
     this.part("scrub").addEventListener("input", (event) => actions.scrub(Number(event.target.value)))
+    this.part("legend").addEventListener("change", ({ target }) => {
+      const value = { checkbox: target.checked, number: target.value === "" ? null : target.valueAsNumber }[target.type] ?? target.value
+      if (target.validity.valid && (value !== null || target.placeholder)) look(target.name, value)
+      else target.value = target.defaultValue
+    })
     this.part("error").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
     this.part("speed").addEventListener("input", () => this.tellRate())
     this.tellRate()
@@ -155,7 +153,16 @@ export class Buttons {
     this.root.classList.toggle("playing", playing)
   }
 
-  /** One line beside the number of the network, in place of how far it is changed; empty: none. */
+  /** What lines show, to be chosen; what was open, or has the focus, keeps it. */
+  tellLegend(html) {
+    const legend = this.part("legend"), open = legend.querySelector("details")?.open
+    const { name } = legend.getRootNode().activeElement ?? {}
+    legend.innerHTML = html
+    if (open) legend.querySelector("details").open = true
+    if (name) legend.querySelector(`[name="${name}"]`)?.focus({ preventScroll: true })
+  }
+
+  /** One line below the player; empty: none. */
   say(words) { this.part("said").textContent = words }
 
   /** What was asked for and is not there yet lies over the old picture; empty: nothing was. */

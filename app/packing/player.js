@@ -4,23 +4,15 @@
 import { actions } from "./hand/actions.js"
 import { ask, knownThere } from "../browser/send.js"
 import { Buttons } from "./buttons.js"
-import { Difference } from "../obsolete/difference.js"
 import { Grab, UNCHOSEN } from "./hand/drag_force.js"
-import { Invitation } from "../obsolete/invite.js"
 import { CATCH_UP, extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
 import { plain } from "../browser/to_object.js"
-import { Later } from "../obsolete/later.js"
-import { knows, remember } from "../browser/local_storage.js"
-import { Near } from "../obsolete/near.js"
-import { openMoving, shown } from "../obsolete/opening.js"
 import { Pins } from "./drawing/pins.js"
 import { Plots } from "./drawing/bokeh_plots.js"
-import { Predict } from "../obsolete/predict.js"
 import { Pushed } from "./hand/push_animation.js"
 import { Replay } from "./replay/replay.js"
 import { Scene } from "./drawing/scene.js"
-import { closeSidebar } from "../obsolete/sidebar.js"
 import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
@@ -39,7 +31,7 @@ class Player {
     this.model = model
     this.scene = new Scene((contact) => { model.contact = contact })
     this.actions = actions(this)
-    this.buttons = new Buttons(this.scene, this.actions)
+    this.buttons = new Buttons(this.scene, this.actions, (name, value) => { model[name] = value })
     this.plots = new Plots(page, () => this.again(), {
       dots: {
         take: (k, _, value) => this.hand.takeInBars(this.plots.find("bars").get_column("at")[k], value),
@@ -54,30 +46,21 @@ class Player {
     })
     this.replay = this.look = this.loaded = null
     this.resting = null // where a pause comes to rest, while it is on its way
-    this.opens = false // whether it plays by itself, before the first gesture
-    this.took = false // whether a force was taken into the hand
     this.playing = this.follows = false // the newest state of a walk under way
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(this)
-    this.later = new Later("network", this.buttons.part("all"), shown())
-    this.near = new Near(this)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
-    this.invite = new Invitation(this)
     this.scene.onMarks = (context, scene) => {
-      this.invite.place()
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
-      this.difference.draw(context, scene)
     }
     this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
-    this.difference = new Difference(this)
-    this.predict = new Predict(this)
     this.split = new Split(this)
     this.sway = new Sway(this.scene)
     this.pushed = new Pushed(this)
-    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView(); this.near.draw() }
+    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
       grain: (k) => this.look.grain(k, this.replay),
@@ -95,7 +78,6 @@ class Player {
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
     if (!this.pushable) this.pushed.end()
-    this.buttons.root.classList.toggle("guesses", this.invite.guesses)
   }
 
   /** Whether force space has been turned to, where the point is what can be dragged first. */
@@ -107,13 +89,12 @@ class Player {
   load() {
     const { model, scene, playing } = this, walk = plain(model.walk)
     if (model.walk === this.loaded || !walk.contacts) return
-    const zoom = this.loaded ? null : model.zoom // of the link that opened the page
+    const shown = this.loaded !== null, zoom = shown ? null : model.zoom // of the link that opened the page
     this.loaded = model.walk
-    this.difference.end()
     const view = this.live.leave(), place = this.grownInto(walk)
     this.playing = false
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
-    this.look = new Look(model, this.replay.walk, this.later.waits)
+    this.look = new Look(model, this.replay.walk)
     this.hand.settle()
     this.tellHeld(false)
     this.pushed.end()
@@ -127,7 +108,6 @@ class Player {
     this.tellAsked()
     scene.show(this.replay.walk)
     if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
-    else scene.view = this.near.view ?? scene.view
     this.split.show()
     scene.resize()
     scene.repaint()
@@ -135,7 +115,7 @@ class Player {
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
     this.follows = walk.room > 0 || (this.follows && place !== null)
     if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
-    else if (this.model.predict) this.predict.ask() // of a link
+    else if (!shown) this.playFirst()
   }
 
   /** Where a walk that is finished goes on, if it is the one that was being computed; else null. */
@@ -161,7 +141,7 @@ class Player {
   /** More exact bounds of the packing on screen. */
   arrive(bounds) {
     const { replay, plots } = this
-    if (!replay || bounds.low.length !== replay.walk.contacts || this.later.waits) return // or to be found out
+    if (!replay || bounds.low.length !== replay.walk.contacts ) return
     replay.bounds = bounds
     if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
   }
@@ -204,9 +184,6 @@ class Player {
     const { model, plots, replay } = this
     this.told = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
-    const invited = plots.invites
-    plots.invite(this.points && !this.opens && !this.took && !this.grows && replay.walk.free > 0)
-    if (plots.invites !== invited) this.mark() // what can be dragged is said above the packing, too
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
     for (const listener of this.listeners) listener()
@@ -226,7 +203,7 @@ class Player {
   /** Where the view has come to rest, for links. */
   tellView() {
     const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
-    if (key === this.viewed || scene.frozen || this.later.waits) return
+    if (key === this.viewed || scene.frozen) return
     this.viewed = key
     clearTimeout(this.looking)
     this.looking = setTimeout(() => {
@@ -247,15 +224,8 @@ class Player {
 
   /** Whether a network is on screen that was pulled: the legend says so, too. */
   tellHeld(held) {
-    if (held) this.difference.end()
     this.buttons.tellHeld(held)
     if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
-  }
-
-  /** Networks without colour, where it would give something away, or as they were. */
-  dress(plain) {
-    this.look.plain = plain
-    this.again()
   }
 
   again() {
@@ -284,6 +254,13 @@ class Player {
     this.direction = 1
     this.before = performance.now()
     requestAnimationFrame((now) => this.tick(now))
+  }
+
+  /** The page opens playing, unless a link shows one moment, or nothing is to move. */
+  playFirst() {
+    const { model } = this
+    if (STILL.matches || model.frame || model.between || this.pulled || model.contact !== null || this.pushes) return
+    requestAnimationFrame(() => this.play(true))
   }
 
   /** What rests is a network that has a name: the nearest one, but between two that are compared. */
@@ -376,8 +353,7 @@ class Player {
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
       tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
-      lead: () => { buttons.part("lead").innerHTML = model.lead },
-      legend: () => { buttons.part("legend").innerHTML = model.legend },
+      legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
       asked: () => this.tellAsked(),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
@@ -386,22 +362,17 @@ class Player {
       displacement: () => this.pushed.tellMotion(),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
-      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.near.show(); this.again() },
+      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
       measured: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
-      predict: loaded(() => this.predict.ask()),
-      guess: () => {
-        document.documentElement.style.setProperty("--hill", model.guess ? "hidden" : "visible") // which gives it away
-        if (!model.guess) remember("guess")
-      },
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       pins: loaded(() => { this.recover(); scene.drawMarks(this.look.style) }),
-      contact: loaded(() => { this.recover(); this.difference.guess(model.contact); this.predict.guess(model.contact); this.mark() }),
+      contact: loaded(() => { this.recover(); this.mark() }),
     }
   }
 
@@ -422,10 +393,9 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
-  model.on(["tab", "wide", "figure", "pushing", "guess"], () => { // and what invites, in other words
+  model.on(["tab", "wide", "figure", "pushing"], () => {
     if (!player.replay || player.live.moves) return
     player.tellTab()
-    player.near.show()
     player.again()
     player.mark()
   })
@@ -442,12 +412,6 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["lead", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
-  model.fresh = player.later.waits
-  player.buttons.root.classList.toggle("first", model.fresh)
-  player.later.listeners.push(() => { model.fresh = false; player.buttons.root.classList.remove("first") })
-  if (!knows("guess") && !new URLSearchParams(location.search).has("tour")) model.guess = true
-  openMoving(player)
-  closeSidebar(page, view)
+  for (const name of ["legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
   return player.buttons.root
 }

@@ -44,7 +44,6 @@ class Player(Scripted, Seen):
     scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
     asked = param.String(doc="what was asked for and is not on screen, in words")
-    lead = param.String(doc="HTML: the question, and what is seen, in sentences")
     legend = param.String(doc="HTML: what colour and width show")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()

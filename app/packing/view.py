@@ -7,7 +7,6 @@ import xarray as xr
 
 from granforce.types import Floats
 
-from ..explore import explanation
 from ..results import planes, progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly
 from ..results.planes import Plane
@@ -19,7 +18,8 @@ from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
 from .player import Player, frames
 
 # Both ways.
-SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour", "guess", "fresh")
+SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
+SHARED += ("stretch", "overlay")
 SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
@@ -28,13 +28,21 @@ SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 LARGE = 4.0  # ⟨f_n⟩, up to which widths are shown: few forces are larger
 LEGEND = """
-<span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
-<span tabindex="0" data-term="{width_term}">width: {width}, up to
- <svg width="40" height="12"><polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5"
-  fill="currentColor" fill-opacity="0.65"/></svg>
- {shown:.3g} × mean force</span>
-<span class="loose" tabindex="0" data-term="rattler">pale disks: loose, no force on them</span>
+<label data-term="{colour_term}">Colour {colour}</label><span>{bar}</span>
+<label data-term="{width_term}">Width {width}</label>
+<span>up to <svg width="40" height="12" aria-hidden="true">
+  <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
+  </svg> {shown:.3g} ⟨fₙ⟩</span>
+<span class="loose" tabindex="0" data-term="rattler">pale disks carry nothing</span>
 {marks}
+<details><summary>Scales</summary>
+<label>colours full at <input name="full" type="number" step="any" placeholder="auto"
+  min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
+<label>widths times <input name="stretch" type="number" step="any"
+  min="{stretch_least:g}" max="{stretch_most:g}" value="{stretch:g}"></label>
+<label data-term="overlay"><input name="overlay" type="checkbox"{overlay}>
+  mark strong and undetermined contacts</label>
+</details>
 """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
@@ -45,8 +53,6 @@ JAMMING = """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
 )
-# What the legend says in place of the words to choose by.
-DEFINED = {"change": "stronger or weaker than as packed"}
 DOT = """<svg width="12" height="12">
  <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 
@@ -87,10 +93,10 @@ class PackingView:
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain,
-            ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab", "fresh"],
+            ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab", "reference"],
         )
-        state.param.watch(self._explain, ["seen", "exact", "loads"])
-        state.knowledge.param.watch(self._explain, "narrowed")
+        state.param.watch(self._explain, ["seen", "exact", "loads", "measured"])
+        state.knowledge.param.watch(self._explain, ["known", "narrowed"])
         state.hand.param.watch(self._explain, "pulls")
         state.work.param.watch(self._explain, "moving")
         self._show()
@@ -146,7 +152,6 @@ class PackingView:
         pulled = self.player.pulled or bool(self.state.hand.pulls)
         self.player.param.update(
             legend=JAMMING if self.state.work.moving else legend(self.state, pulled),
-            lead=explanation.lead(self.state),
         )
 
 
@@ -224,13 +229,13 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"−{full:.3g}", diverging, f"+{full:.3g} × mean force (grey: none)"
+    change = f"−{full:.3g}", diverging, f"+{full:.3g} ⟨fₙ⟩"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
-        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} × the mean force"),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
@@ -247,7 +252,7 @@ def colour_words(looks: Looks, pulled: bool) -> str:
 def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
-    return f"{full or loads.max(initial=0):.2f} × the mean force"
+    return f"{full or loads.max(initial=0):.2f} ⟨fₙ⟩"
 
 
 def legend(state: AppState, pulled: bool = False) -> str:
@@ -266,17 +271,45 @@ def legend(state: AppState, pulled: bool = False) -> str:
     told = colour_words(looks, pulled)
     if pulled and looks.tab == "perturb" and not state.hand.pulls:
         told = "change by the push"
+    (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
     return LEGEND.format(
-        width=WIDTHS[looks.thickness],
+        width=_chosen(state, "thickness", WIDTHS),
         shown=shown,
         high=6 + 6 * shown / widest,
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=DEFINED.get("" if pulled else looks.colour, told),
+        colour=told if pulled else _chosen(state, "colour", COLOURS),
         bar=bar,
+        full="" if looks.full is None else f"{looks.full:g}",
+        full_least=full_least,
+        full_most=full_most,
+        stretch=looks.stretch,
+        stretch_least=least,
+        stretch_most=most,
+        overlay=" checked" if looks.overlay else "",
         marks=_marks(looks.dark) if looks.overlay else "",
     )
+
+
+def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:
+    """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
+    pinned = state.looks.reference
+    there = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
+    there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
+    chosen = getattr(state.looks, name)
+    return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
+
+
+def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
+    """A list of what lines can show as HTML; the player takes over what is chosen."""
+    value, there = getattr(state.looks, name), meaningful(state, labels, name)
+    options = "".join(
+        f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
+        for key, words in there.items()
+    )
+    title = {"colour": "Colour", "thickness": "Width"}[name]
+    return f'<select name="{name}" aria-label="{title}">{options}</select>'
 
 
 def _marks(dark: bool) -> str:

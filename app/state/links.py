@@ -45,7 +45,6 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "zoom": _place,
     "split": _flag,
     "beside": float,
-    "predict": int,
     "pulls": pulls.read,
     "known": known.read,
     "colour": str,

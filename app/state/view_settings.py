@@ -76,7 +76,6 @@ class Seen(param.Parameterized):
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
     guess = param.Boolean(doc="whether the curve over friction is to be guessed before it is shown")
     fresh = param.Boolean(doc="whether no force was dragged yet in this browser")
     beside = param.Number(

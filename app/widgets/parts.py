@@ -5,14 +5,11 @@ from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.document import Document
 from bokeh.models import CustomAction, CustomJS, SaveTool
 from bokeh.plotting import figure as Figure
-from panel.io import document as panel_document
-from panel.io import unlocked
-from panel.reactive import Syncable
 
 from ..browser.bundle import SHARED
+from ..browser.panel_patches import together
 from ..state.app_state import AppState
 from ..state.view_settings import Looks
 from .plot_style import plot
@@ -22,12 +19,7 @@ NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 
 MOVES = ["moves"]  # tags of what the player draws itself while it plays
 
-# What is not seen while the tour speaks of something else; see tour.js.
-EXTRA = {"display": "var(--extra, var(--later, flex))"}
-# What is not seen before the first gesture, or before it is asked for; see later.js.
-LATER = {"display": "var(--later, flex)"}
-# Panes of HTML say themselves that they are visible, whatever is around them.
-BESIDE = {"content-visibility": "var(--beside, visible)"}
+LATER = {"display": "flex"}
 
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
 # Small buttons: what one is here for, and what else can be done.
@@ -53,72 +45,6 @@ NEWEST = """
 const fig = [...button.document._all_models.values()].findLast(one => one.tags.includes(mark))
 const name = fig.toolbar.tools.find(one => one.filename).filename;
 """
-
-# Panel builds the views of a new child before React mounts them; told of another size of the
-# window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
-UNMOUNTED = """
-const view = Bokeh.Models.get("Figure").prototype.default_view.prototype
-for (const name of ["measure_layout", "after_layout"]) {
-  const usual = view[name]
-  view[name] = function () { if (this.layout != null) usual.call(this) }
-}
-"""
-
-# Where fingers scroll the page, a plot that is dragged by them would hold it fast.
-FINGERS = """
-const {prototype} = Bokeh.Models.get("Figure").prototype.default_view
-const {initialize} = prototype
-prototype.initialize = function () {
-  if (matchMedia("(pointer: coarse)").matches) this.model.toolbar.active_drag = null
-  initialize.call(this)
-}
-"""
-
-# Panel's React components listen to changes only some time after they were first drawn: what came
-# in between would never be seen.
-LATE_LISTENERS = """
-const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
-const {watch} = prototype
-prototype.watch = function (view, name, changed, state) {
-  watch.call(this, view, name, changed, state)
-  if (state) changed()  // what a component draws, which costs nothing where it is the same
-}
-"""
-
-
-def mend_late_views(document: Document) -> None:
-    """Have the browser bear with what is told to it of views that it has not mounted yet.
-
-    Plots that are not on the page yet are passed over where it lays the page out, those under
-    fingers let the page scroll, and components that begin to listen take over what has changed
-    since they were drawn.
-    """
-    mended = [CustomJS(code=code) for code in (UNMOUNTED, FINGERS, LATE_LISTENERS)]
-    document.js_on_event("document_ready", *mended)
-
-
-def answer_with_lock() -> None:
-    """Have events of a browser answered while Bokeh's lock is held, as its changes are."""
-    # Panel does without it where changes told just before still wait for their turn, and answers
-    # them, too: Bokeh, through which plots are changed, refuses then, and all of it is lost.
-    Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # a mark on it
-
-
-def send_what_waits(document: Document) -> None:
-    """Send messages that Panel keeps back although nothing holds them any more."""
-    # One of its tasks, having sent its own, takes away the mark by which the next would know that
-    # it has some to send; they would wait for the next change.
-    if document in panel_document._WRITE_MSGS:
-        panel_document._WRITE_BLOCK[document] = True
-        panel_document._dispatch_write_task(document, panel_document._dispatch_msgs, document)
-
-
-def together(function: Callable[..., object], **arguments: Any) -> None:
-    """Call a function, and send all it changes on the page as one message, in its turn."""
-    # Bokeh sends by itself what Panel does not hold, and that may overtake what waits in Panel's
-    # queue: changes of a plot would reach a browser that has not got the plot yet.
-    with unlocked():
-        function(**arguments)
 
 
 class TabView:

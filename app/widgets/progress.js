@@ -2,7 +2,10 @@
 
 import { ask } from "../browser/send.js"
 
-export function render({ model, view }) {
+export function render({ model, view }) { return taskLine(model, view) }
+
+/** Bar, words and buttons of the task that a model follows. */
+export function taskLine(model, view) {
   const root = document.createElement("div")
   root.className = "task"
   root.innerHTML = `
@@ -12,9 +15,6 @@ export function render({ model, view }) {
 
   function show() {
     root.hidden = !model.running
-    if (model.css_classes.includes("titled")) {
-      document.documentElement.style.setProperty("--task", model.running ? `${root.offsetHeight}px` : "0px")
-    }
     const known = model.fraction !== null && model.fraction !== undefined
     const percent = known ? Math.round(100 * model.fraction) : 40
     bar.classList.toggle("unknown", !known)

@@ -24,10 +24,8 @@ class Progress(Scripted):
     words = param.String()
     keeps = param.Boolean()
 
-    def __init__(self, *tasks: Task, titled: bool = False) -> None:
-        """titled: in the page's title bar, where it moves and covers nothing."""
-        classes = ["titled"] if titled else []
-        super().__init__(sizing_mode="stretch_width", margin=0, css_classes=classes)
+    def __init__(self, *tasks: Task, **params: Any) -> None:
+        super().__init__(**{"sizing_mode": "stretch_width", "margin": 0} | params)
         self._tasks = tasks
         self._follow()
         for task in tasks:

@@ -36,12 +36,11 @@ class Asked(NamedTuple):
 def asked(query: str) -> Asked:
     """What a link's query asks for; what cannot be read is left out.
 
-    An address without a view begins with the groove; links from before there were scenes name a μ,
-    a tab or the like, and are of large packings.
+    Links from before there were scenes name a μ, a tab or the like, and are of large packings.
     """
     given = dict(parse_qsl(query.lstrip("?")))
     named = "scene" in given
-    name = given.pop("scene", MANY if given else FIRST)
+    name = given.pop("scene", MANY)
     if name not in (*scenes.SCENES, OWN):
         name = FIRST
     try:

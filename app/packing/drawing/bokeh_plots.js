@@ -18,7 +18,6 @@ export class Plots {
     this.heard = new Set()
     this.layers = {} // by the name of the source whose plot they lie on
     this.moving = false
-    this.invites = false // whether the point in force space says that it can be dragged
     this.colours = {}
     this.placed = { count: 0, drawn: 0 } // states of a walk under way: in force space, and by Bokeh
   }
@@ -26,7 +25,6 @@ export class Plots {
   /** Draw what moves on layers, or at rest have it drawn by Bokeh. */
   move(on) {
     this.moving = on
-    this.invite(this.invites)
     if (on) return
     for (const layer of Object.values(this.layers)) layer.take(false)
     this.drawPlaced()
@@ -45,13 +43,6 @@ export class Plots {
     layer?.take(this.moving)
     if (layer?.on) layer.paint()
     else source.change.emit()
-  }
-
-  /** Have the point in force space say that it can be dragged: its layer does while things move. */
-  invite(on) {
-    this.invites = on
-    const tag = named(this.document, "invitation"), visible = on && !this.moving
-    if (tag && tag.visible !== visible) tag.setv({ visible }, { sync: false })
   }
 
   /** A source by name; new contents of it are heard from now on. */

@@ -8,15 +8,12 @@ const THIN = 0.15 // of its width, a chain that a filter leaves out
 const DIM = 0.35 // chains under the marks of Fig. 5
 
 export class Look {
-  /** quiet: whether colours wait for the first pull, which explains them. */
-  constructor(model, walk, quiet = false) {
+  constructor(model, walk) {
     this.model = model
     this.walk = walk
     this.scales = plain(model.scales)
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
-    this.quiet = quiet
-    this.plain = false // whether colours would give something away, see difference.js
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.strong = largest(walk.normal.subarray(0, walk.contacts))
     this.measure()
@@ -48,10 +45,9 @@ export class Look {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
-    const told = !this.plain && (this.before || !this.quiet) && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+    const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
       (colour !== "deviation" || this.measured)
-    const { change, neutral } = palettes, plain = this.quiet ? change[change.length >> 1] : neutral
-    style.colours = told ? palettes[this.before ? "change" : colour] : [plain]
+    style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
       style.bin[c] = told ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
@@ -107,7 +103,7 @@ export class Look {
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
     if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
-    if (exact && !this.quiet) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
+    if (exact) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
     return rows
   }
 

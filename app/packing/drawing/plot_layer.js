@@ -6,7 +6,6 @@ import { circle, line } from "../../browser/canvas_paths.js"
 
 const TRAIL = 4 // states that the trail in force space reaches back
 const DOT_REACH = 9 // px from a dot that still mean it
-const INVITE = "drag me"
 const TOUCH_REACH = 22 // the same of a finger
 
 export class Layer {
@@ -116,7 +115,7 @@ export const LAYERS = {
     const track = replay.track.slice(Math.max(0, Math.floor(replay.position) - TRAIL), Math.floor(replay.position) + 1)
     const points = track.map((k) => [x(px[k]), y(py[k])])
     points.push([x(mix(px)), y(mix(py))])
-    for (let k = plots.invites ? points.length : 1; k < points.length; k++) {
+    for (let k = 1; k < points.length; k++) {
       context.globalAlpha = 0.85 * (k / points.length) ** 2
       line(context, points[k - 1], points[k])
     }
@@ -133,13 +132,6 @@ function spot(context, [px, py], plots) {
   circle(context, [px, py], 6)
   context.fill()
   context.stroke()
-  if (!plots.invites) return
-  context.font = "13px sans-serif"
-  context.fillStyle = plots.colours.now
-  const { width } = context.measureText(INVITE)
-  context.fillRect(px - width - 18, py - 9, width + 8, 20)
-  context.fillStyle = "white"
-  context.fillText(INVITE, px - width - 14, py + 5)
 }
 
 function curve(context, xs, ys, x, y, count, from = 0) {

@@ -88,7 +88,6 @@ export class Split {
       twin.show(walk)
     }
     const { look } = this
-    look.plain = player.difference.on
     look.measure()
     twin.palette = player.scene.palette
     twin.describe = { contact: (k) => look.contact(k, shown), grain: (k) => look.grain(k, shown) }

@@ -3,11 +3,7 @@
 /** name → function, none of which does anything while a packing is being made. */
 export function actions(player) {
   const loaded = (action) => (given) => { if (player.replay && !player.live.moves) action(player.replay, given) }
-  const other = (action) => loaded((replay, given) => {
-    player.difference.end()
-    action(replay, given)
-  })
-  const halted = (action) => other((replay, given) => {
+  const halted = (action) => loaded((replay, given) => {
     player.hand.free()
     player.follows = false
     player.play(false)
@@ -21,7 +17,7 @@ export function actions(player) {
     hold: loaded((replay) => player.hold(replay)),
     undo: loaded((replay) => { if (replay.held) player.hand.tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
-    play: other((replay) => {
+    play: loaded((replay) => {
       player.hand.free()
       player.follows = false
       if (player.playing && player.resting === null) player.pause(replay)
@@ -35,20 +31,12 @@ export function actions(player) {
     next: loaded((replay) => player.choose(replay, 1)),
     previous: loaded((replay) => player.choose(replay, -1)),
     scrub: halted((replay, to) => player.show(to)),
-    pin: other((replay) => {
+    pin: loaded((replay) => {
       model.reference = replay.frame
       model.beside = null
     }),
-    between: other((replay) => player.between(replay)),
-    split: other(() => { model.split = !model.split }),
-    predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
-    differ: loaded((replay) => {
-      model.predict = 0
-      if (player.difference.on) return player.difference.end()
-      player.play(false)
-      if (replay.swinging) model.between = null
-      player.difference.begin(replay)
-    }),
+    between: loaded((replay) => player.between(replay)),
+    split: loaded(() => { model.split = !model.split }),
     tab: (number) => model.send_msg({ tab: number }),
   }
 }

@@ -57,7 +57,6 @@ export class Grab {
     const { player } = this
     if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
     player.follows = false
-    player.took = true
     if (player.playing) player.play(false)
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()
@@ -93,7 +92,6 @@ export class Grab {
   /** Nothing is in the hand any more. */
   still() {
     this.unsay()
-    this.player.later.offer()
     this.player.plots.move(false)
     this.player.paint()
     this.player.paintPlots()

@@ -37,9 +37,6 @@ export class Pushed {
     player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
   }
 
-  /** The slider was let go. */
-  leave() { if (this.there) this.player.later.offer() }
-
   /** Disks move only where they are pushed hard enough. */
   tellMotion() { this.player.sway.take(this.there ? this.player.model.displacement : null) }
 }

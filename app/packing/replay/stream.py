@@ -6,8 +6,8 @@ from typing import Any
 from bokeh.document import Document
 
 from ...browser.messages import Message
+from ...browser.panel_patches import together
 from ...state.app_state import AppState
-from ...widgets.parts import together
 from ..player import Player
 
 TICK_MS = 40  # how often it is looked for something new

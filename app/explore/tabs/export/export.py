@@ -19,7 +19,7 @@ from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
 from ....widgets.progress import Progress
-from . import files, standalone
+from . import figure, files, standalone
 
 
 class Snapshot:
@@ -154,6 +154,7 @@ class View:
             self.buttons,
             Progress(self.making),
             self.told,
+            figure.panel(self.state),
             note(HELP),
             sizing_mode="stretch_width",
         )

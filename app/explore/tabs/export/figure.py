@@ -8,7 +8,7 @@ from ....packing.captions import caption, stem
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.number import NumberField
-from ....widgets.parts import LATER, folded_away, note
+from ....widgets.parts import folded_away, note
 
 TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
@@ -36,4 +36,4 @@ def panel(state: AppState) -> Any:
         margin=(0, 10, 4, 10),
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
-    return pn.Column(folded_away(TITLE, inside), styles=LATER, sizing_mode="stretch_width")
+    return folded_away(TITLE, inside)

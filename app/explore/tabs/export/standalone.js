@@ -35,7 +35,6 @@ export function begin(given, style) {
   shadow.append(Object.assign(document.createElement("style"), { textContent: style }))
   shadow.append(render({ model, view }))
   data.player.scene.hand = null // nobody is there to make the networks that follow a hand
-  data.player.later.offer()
   data.player.select() // no button holds a force either
   const { player } = data, paint = player.paintPlots.bind(player)
   player.paintPlots = (now) => {

@@ -99,7 +99,6 @@ def html(
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
-        "lead": explanation.first(replay.summary),
         "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"])),
         "source": source,
         "frame": frame,
@@ -110,7 +109,7 @@ def html(
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),
-        words=explanation.more(replay),
+        words=explanation.told(replay) + explanation.more(replay),
         plots="".join(plots),
         script=script,
         command=escape(command),

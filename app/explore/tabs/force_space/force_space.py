@@ -12,6 +12,7 @@ from bokeh.plotting import figure as Figure
 from granforce.records import InputError
 
 from ....background.jobs import Job, reading
+from ....browser.panel_patches import together
 from ....results import compute, planes, progress_feed
 from ....results.library import Shown
 from ....results.planes import Outlined, Plane
@@ -28,7 +29,6 @@ from ....widgets.parts import (
     one_of_several,
     plotted,
     question,
-    together,
 )
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, hover, legend_above
 from ....widgets.progress import Progress

@@ -22,6 +22,7 @@ from granforce.measures import statistics
 from granforce.types import Floats
 
 from ....background.jobs import Job, reading
+from ....browser.panel_patches import together
 from ....obsolete.glimpse import Glimpses, glimpse
 from ....packing.view import exact_intervals
 from ....results import distributions
@@ -43,7 +44,6 @@ from ....widgets.parts import (
     one_of_several,
     plotted,
     question,
-    together,
 )
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, STATES, corner, hover, legend_above
 from . import study_figures

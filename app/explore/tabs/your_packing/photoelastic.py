@@ -13,11 +13,12 @@ from bokeh.plotting import figure as Figure
 from granforce.records import InputError
 
 from ....background.jobs import Task
+from ....browser.panel_patches import together
 from ....results import photoelastic_frames
 from ....results.photoelastic_frames import Frame
 from ....results.uploads import Files
 from ....widgets.file_buttons import Handover
-from ....widgets.parts import PRIMARY, choice, figure, note, saving, together
+from ....widgets.parts import PRIMARY, choice, figure, note, saving
 from ....widgets.plot_style import BLUE, ORANGE, corner, hover, legend_above
 from ..export.files import File
 from . import frame_picture

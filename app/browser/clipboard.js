@@ -1,0 +1,13 @@
+// The clipboard, which browsers offer to pages of this machine and of https only.
+
+import { made } from "./dom.js"
+
+/** Copy a text. */
+export async function copy(text) {
+  if (navigator.clipboard) return navigator.clipboard.writeText(text)
+  const area = made("textarea", { value: text })
+  document.body.append(area)
+  area.select()
+  document.execCommand("copy")
+  area.remove()
+}

@@ -1,0 +1,156 @@
+"""The instrument: packing and player, tabs and results, and what is known of them: one screen."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+from urllib.parse import parse_qsl
+
+import panel as pn
+from bokeh.document import Document
+
+from ..background import gc_pauses
+from ..browser.panel_patches import send_what_waits
+from ..packing.replay.stream import Stream
+from ..packing.view import PackingView
+from ..results.library import Library
+from ..state import visit
+from ..state.app_state import AppState
+from ..widgets.header import Header
+from ..widgets.hints import Hints
+from ..widgets.page_frame import framed
+from . import explanation
+from .controls import Controls
+from .page_address import Address
+from .results_line import Results
+from .status_line import StatusLine
+from .tabs.tabs import Tabs, pale_when_old
+from .volume import Volume
+
+WAITING_MS = 250  # how often what Panel has kept back is sent
+WIDE = {"sizing_mode": "stretch_width", "margin": 0}
+KEYS = [
+    ["Space", "play, pause at the nearest network"],
+    ["← →  Home End", "one network back or on; to the first or last"],
+    ["N  Shift N", "select the next contact, the largest force first"],
+    ["[ ]", "pull the selected force down or up"],
+    ["H", "hold the selected force; again: release it"],
+    ["Z  Esc", "undo the last pull; release all"],
+    ["1 … 6", "the tabs"],
+    ["?", "this list"],
+]
+
+# Below 900 px everything is in one column. From there on the page is one screen high: the packing
+# is a square that takes the height there is, tabs and results are beside it; from 1800 px on force
+# space has a place of its own between them (player.js).
+GRID = {
+    "& .main-content": {
+        "display": "grid",
+        "gridTemplateColumns": "minmax(0, 1fr)",
+        "alignContent": "start",
+    },
+    "& .controls": {"padding": "8px 24px 6px"},
+    "& .side, & .space, & .panels": {"padding": "4px 24px"},
+    "@media (max-width: 599.95px)": {
+        "& .controls, & .side, & .space, & .panels": {"padding": "6px 12px"},
+    },
+    "& .status": {"position": "sticky", "bottom": 0, "zIndex": 5},
+    "@media (min-width: 900px)": {
+        "& .main-content": {
+            "gridTemplate": (
+                '"header header" auto "controls controls" auto "side panels" minmax(420px, 1fr)'
+                ' "status status" auto / min(52vw, max(420px, 100dvh - 244px)) minmax(0, 1fr)'
+            ),
+            "height": "100dvh",
+            "columnGap": "28px",
+            "alignContent": "stretch",
+        },
+        "& .header-row": {"gridArea": "header"},
+        "& .controls": {"gridArea": "controls"},
+        "& .side": {
+            "gridArea": "side", "containerType": "size", "overflow": "hidden auto",
+            "height": "auto", "padding": "0 0 0 24px",
+        },
+        "& .panels": {
+            "gridArea": "panels", "display": "flex", "flexDirection": "column",
+            "minHeight": 0, "height": "auto", "overflow": "hidden", "padding": "0 24px 0 0",
+        },
+        "& .panels > .tabs": {"flex": "1 1 0", "minHeight": 0, "overflow": "hidden auto"},
+        "& .status": {"gridArea": "status"},
+    },
+    "@media (min-width: 1800px)": {
+        "& .main-content": {
+            "gridTemplate": (
+                '"header header header" auto "controls controls controls" auto'
+                ' "side space panels" minmax(420px, 1fr) "status status status" auto'
+                " / min(40vw, 100dvh - 244px) minmax(0, 1fr) minmax(0, 1.1fr)"
+            ),
+        },
+        "& .space": {"gridArea": "space", "overflow": "hidden auto", "padding": 0, "minHeight": 0, "height": "auto"},
+    },
+}  # fmt: skip
+
+
+def explore_page(document: Document, query: str) -> Any:
+    """The page of large packings, as a link's query asks; `embed=1`: the packing alone."""
+    library = pn.state.as_cached("library", _open_library)
+    state = AppState(library, visit.turns(document), query, visit.visitor(document))
+    looks, work = state.looks, state.work
+    work.message = work.message or " ".join(state.library.notes)
+    packing = PackingView(state)
+    Stream(state, packing.player, document)
+    hears, state.hand.tell = packing.player.hears, packing.player.tell
+    hears["wide"] = lambda wide: looks.param.update(wide=wide)
+    hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
+    side = pn.Column(packing.player, css_classes=["side"], **WIDE)
+    if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":
+        whole = framed(None, [side], dark=looks.dark)
+    else:
+        around = _Around(state, side)
+        hears["tab"] = around.tabs.choose
+        pn.state.onload(partial(work.piecewise, around.parts()))
+        whole = framed(around.header, around.columns, dark=looks.dark, styles=GRID)
+    visit.poll_while_running(work, document)
+    document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
+    visit.at_end(work.close)
+    return whole
+
+
+class _Around:
+    """What is around the packing: header, controls, tabs, results and the status line."""
+
+    def __init__(self, state: AppState, side: pn.Column) -> None:
+        self.state = state
+        self.header = Header(
+            door="explore", dark=state.looks.dark, keys=KEYS, css_classes=["header-row"], **WIDE
+        )
+        self.header.link(state.looks, dark="dark")
+        self.tabs = Tabs(state)
+        self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
+        self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
+        self.panels = pn.Column(css_classes=["panels"], **WIDE)
+        self.status = StatusLine(state, css_classes=["status"], **WIDE)
+        self.columns = [self.controls, side, self.space, self.panels, self.status]
+
+    def parts(self) -> Iterator[None]:
+        """Everything that follows the packing, piece by piece."""
+        state, tabs = self.state, self.tabs
+        controls = Controls(state)
+        self.controls[:] = [controls.line, controls.made]
+        yield
+        results = Results(state, Volume(state), css_classes=["results"], **WIDE)
+        within = pn.Column(tabs.tabs, css_classes=["tabs"], **WIDE)
+        pale_when_old([*tabs.pages.items(), ("summary", results), ("plane", self.space)])
+        self.panels[:] = [within, results]
+        state.looks.param.watch(lambda event: state.work.piecewise(tabs.beside(self.space)), "wide")
+        yield
+        yield from tabs.filling(state.looks.tab)
+        yield from tabs.beside(self.space)
+        self.side.extend([Address(state), Hints()])
+        explanation.follow(state, self.header)
+        state.read_ahead()
+
+
+def _open_library() -> Library:
+    """The stores, once for all visitors."""
+    gc_pauses.settle()
+    return Library()

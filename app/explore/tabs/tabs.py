@@ -1,0 +1,133 @@
+"""The tabs beside the packing: each view is made when it is first seen."""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import panel as pn
+import panel_material_ui as pmui
+
+from ...state.app_state import AppState
+from ...widgets.parts import PLAIN
+from .export import export
+from .force_space import force_space
+from .friction import friction
+from .intervals import intervals
+from .push import push
+from .your_packing import upload
+
+# Name in links → title, and view. Their components are known before any page is: those that are
+# defined while pages are open, the first page alone learns of.
+TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
+    "intervals": ("Intervals", intervals.View),
+    "plane": ("Force space", force_space.View),  # the second: see WITHOUT_SPACE
+    "statistics": ("Friction", friction.View),
+    "perturb": ("Push", push.View),
+    "upload": ("Your packing", upload.View),
+    "export": ("Export", export.View),
+}
+LOOK = {
+    "& .MuiTabs-root": {"minHeight": "36px"},
+    "& .MuiTab-root": {
+        "minWidth": 0, "minHeight": "36px", "padding": "6px 2px", "marginRight": "20px",
+        "fontSize": "15px", "letterSpacing": 0, "color": "var(--quiet)", **PLAIN,
+    },
+    "& .MuiTab-root.Mui-selected": {"color": "var(--ink)", "fontWeight": 600},
+    "& .MuiTabs-list, & .MuiTabs-flexContainer": {"borderBottom": "1px solid var(--line)"},
+}  # fmt: skip
+# The same without force space, which has a place of its own on a wide screen.
+WITHOUT_SPACE = LOOK | {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}}
+GROWING = ("intervals", "plane")  # what shows a walk while it is computed
+
+
+class Tabs:
+    """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
+
+    def __init__(self, state: AppState) -> None:
+        self.state, self.looks = state, state.looks
+        self.names = list(TABS)
+        self._begun: set[str] = set()
+        self._space: Any = None  # the view of force space, wherever it is
+        self.pages = {
+            name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
+            for name in self.names
+        }
+        if self.looks.tab not in self.names:
+            self.looks.tab = self.names[0]
+        self.tabs = pmui.Tabs(
+            *((TABS[name][0], self.pages[name]) for name in self.names),
+            active=self.names.index(self.looks.tab),
+            sx=LOOK,
+            sizing_mode="stretch_width",
+        )
+        self.tabs.param.watch(lambda event: state.work.piecewise(self._showing()), "active")
+        self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
+
+    def choose(self, number: int) -> None:
+        """Show tab 1, 2, …; other numbers do nothing, and what is on screen anyway stays there."""
+        if 1 <= number <= len(self.names) and not self._has_place(self.names[number - 1]):
+            self.tabs.active = number - 1
+
+    def _showing(self) -> Iterator[None]:
+        name = self.names[self.tabs.active]
+        yield from self.filling(name)  # first, so that those who follow the state find it there
+        if name == self.names[self.tabs.active]:
+            self.looks.tab = name
+
+    def beside(self, place: Any) -> Iterator[None]:
+        """Put force space into a place of its own on a wide screen, else back into its tab."""
+        wide, page = self.looks.wide, self.pages["plane"]
+        self.tabs.sx = WITHOUT_SPACE if wide else LOOK
+        if wide == place.visible:
+            return
+        place.visible = wide  # at once: nobody else need begin with it
+        if wide:
+            if self.looks.tab == "plane":
+                self.tabs.active = self.names.index("intervals")
+            self._begun.add("plane")
+            self._leave(page)
+            yield  # two plots of one name must not be in one message
+            view = self._space = TABS["plane"][1](self.state)
+            yield
+            place[:] = [view.panel()]
+        else:
+            self._leave(place)
+            self._begun.discard("plane")
+        yield
+
+    def _leave(self, place: Any) -> None:
+        """Take force space away from a place; it is made anew for another."""
+        place[:] = []
+        if self._space is not None:
+            self._space.left = True
+
+    def filling(self, name: str) -> Iterator[None]:
+        """Make the view of a tab, once; a generator of pieces."""
+        if name not in self._begun and not self._has_place(name):
+            self._begun.add(name)
+            yield
+            view = TABS[name][1](self.state)
+            if name == "plane":
+                self._space = view
+            yield
+            pieces = list(view.panel())
+            # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
+            for k in range(-1, len(pieces), 2):
+                if self._has_place(name):
+                    return
+                self.pages[name].extend(pieces[max(k, 0) : k + 2])
+                yield
+            self.looks.views += 1
+
+    def _has_place(self, name: str) -> bool:
+        """Whether a tab's view is beside the packing instead, where there may be but one of it."""
+        return self.looks.wide and name == "plane"
+
+
+def pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
+    """Have parts (name, view) of other states than those asked for be pale; see player.js."""
+    for name, part in parts:
+        old = "growing" if name in GROWING else "still"
+        part.styles = part.styles | {
+            "opacity": f"var(--{old}, 1)",
+            "filter": f"var(--{old}-colours, none)",
+        }

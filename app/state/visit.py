@@ -1,0 +1,87 @@
+"""One visitor's page from its start to its end: its thread, who it is of, and what it waits for."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import panel as pn
+from bokeh.document import Document
+from tornado.ioloop import IOLoop
+
+from ..background import gc_pauses
+from ..background.jobs import Visitor
+from ..browser.panel_patches import in_transit, together, unseen_ms
+from .page_tasks import Work
+
+POLL_MS = 200  # how often the page asks running work how far it is
+# Without a browser, after which a page's work is ended; the page itself stays longer.
+GONE_MS = 3000
+
+
+def at_end(close: Callable[[], object]) -> None:
+    """Count the page as open, and call this when it is closed."""
+    closed = gc_pauses.opened()
+
+    def end(context: object) -> None:
+        close()
+        closed()
+
+    pn.state.on_session_destroyed(end)
+
+
+def turns(document: Document) -> Callable[[Callable[[], object]], None]:
+    """wake(function): call it on the page's thread, soon, when what it changes will be seen."""
+    waiting: list[Callable[[], object]] = []
+    loop = IOLoop.current()
+
+    def run(function: Callable[[], object]) -> None:
+        if in_transit(document):
+            waiting.append(function)
+        else:
+            together(function)
+
+    def come(function: Callable[[], object]) -> None:
+        if document.session_context is not None:  # else the page has ended
+            document.add_next_tick_callback(partial(run, function))
+
+    def wake(function: Callable[[], object]) -> None:
+        # From any thread; the page can end at any moment but within a turn of the loop.
+        loop.add_callback(come, function)
+
+    def arrived() -> None:
+        while waiting:
+            wake(waiting.pop(0))
+
+    pn.state.onload(arrived)
+    return wake
+
+
+def visitor(document: Document) -> Visitor | None:
+    """Who opened a page: from where, and which page it is."""
+    context: Any = document.session_context
+    if context is None:
+        return None
+    # Behind a proxy it is the proxy's, unless panel serve is told --use-xheaders.
+    return Visitor(getattr(context.request, "remote_ip", None) or "", context.id)
+
+
+def poll_while_running(work: Work, document: Document) -> None:
+    """Take over the progress of tasks while there are any; end them where nobody looks any more."""
+    polling: list[Any] = []
+    loaded: list[bool] = []
+
+    def poll() -> None:
+        if loaded and unseen_ms(document.session_context) > GONE_MS:
+            work.cancel()
+        if not in_transit(document):
+            work.poll()
+
+    def switch(*events: Any) -> None:
+        if work.busy and not polling:
+            polling.append(document.add_periodic_callback(partial(together, poll), POLL_MS))
+        elif polling and not work.busy:
+            document.remove_periodic_callback(polling.pop())
+
+    pn.state.onload(lambda: loaded.append(True))
+    work.param.watch(switch, "busy")
+    switch()

@@ -1,0 +1,68 @@
+// The header of every page: two doors as links, and tools that need no server.
+
+import { button, made } from "../browser/dom.js"
+import { copy } from "../browser/clipboard.js"
+
+const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
+const COPIED_MS = 1500
+const DOORS = [["explore", "Explore", ""], ["learn", "Learn", "learn"]]
+
+export function render({ model }) {
+  const root = document.createElement("div"), header = root.appendChild(document.createElement("header"))
+  const nav = made("nav", { ariaLabel: "granforce" }), tools = made("div", { className: "tools" })
+  header.append(made("b", { textContent: "granforce" }), nav, tools)
+
+  /** The address of a door, in the theme of this page. */
+  const address = (query) => {
+    const asked = [query, model.dark ? "dark=1" : ""].filter(Boolean).join("&")
+    return window.location.pathname + (asked && `?${asked}`)
+  }
+
+  function show() {
+    nav.replaceChildren(...DOORS.map(([door, textContent, query]) => {
+      const link = made("a", { textContent, href: address(query) })
+      if (door === model.door) link.ariaCurrent = "page"
+      return link
+    }))
+    theme.ariaLabel = theme.title = model.dark ? "Light theme" : "Dark theme"
+  }
+
+  const link = button("Copy link", async () => {
+    await copy(window.location.href)
+    link.textContent = "Copied ✓"
+    setTimeout(() => { link.textContent = "Copy link" }, COPIED_MS)
+  })
+  const theme = button("", () => { model.dark = !model.dark }, { innerHTML: HALF })
+  const help = helpOf(model, root)
+  const asked = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })
+  tools.append(link, asked, theme)
+
+  /** The key "?" lists the keys, but where it is typed into a field. */
+  function key(event) {
+    const at = event.composedPath()[0]
+    if (event.key !== "?" || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName) || help.open) return
+    help.showModal()
+    event.preventDefault()
+  }
+  window.addEventListener("keydown", key)
+  model.on("remove", () => window.removeEventListener("keydown", key))
+  model.on(["dark", "door"], show)
+  show()
+  return root
+}
+
+/** The dialog of "?": what is seen, and the keys. */
+function helpOf(model, root) {
+  const dialog = root.appendChild(document.createElement("dialog"))
+  const words = dialog.appendChild(document.createElement("div")), keys = document.createElement("dl")
+  dialog.append(made("h2", { textContent: "Keys" }), keys, button("Close", () => dialog.close(), { className: "soft" }))
+  dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close() })
+  dialog.addEventListener("keydown", (event) => event.stopPropagation()) // keys mean nothing else meanwhile
+  const show = () => {
+    words.innerHTML = model.help
+    keys.replaceChildren(...model.keys.flatMap(([key, does]) => [made("dt", { textContent: key }), made("dd", { textContent: does })]))
+  }
+  model.on(["help", "keys"], show)
+  show()
+  return dialog
+}

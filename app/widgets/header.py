@@ -1,0 +1,17 @@
+"""The thin header of every page: both doors, a copy of the link, help, and the theme."""
+
+import param
+
+from ..browser.bundle import Scripted
+
+
+class Header(Scripted):
+    """granforce, Explore and Learn, Copy link, ? and the theme; see header.js.
+
+    `middle` of a narrow page goes below the doors: nothing is ever covered.
+    """
+
+    door = param.Selector(default="explore", objects=["explore", "learn"])
+    dark = param.Boolean(doc="theme; changed by the page")
+    keys = param.List(doc="[keys, what they do], listed by ?")
+    help = param.String(doc="HTML above the keys")
