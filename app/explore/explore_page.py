@@ -85,7 +85,10 @@ GRID = {
                 " / min(40vw, 100dvh - 244px) minmax(0, 1fr) minmax(0, 1.1fr)"
             ),
         },
-        "& .space": {"gridArea": "space", "overflow": "hidden auto", "padding": 0, "minHeight": 0, "height": "auto"},
+        "& .space": {
+            "gridArea": "space", "overflow": "hidden auto", "padding": 0, "minHeight": 0,
+            "height": "auto",
+        },
     },
 }  # fmt: skip
 

@@ -7,9 +7,9 @@ import numpy as np
 import param
 
 from ..browser.messages import Message
-from ..results.selection import KINDS, SOLVERS
 from ..state.app_state import AppState
 from ..widgets.progress import Progress
+from . import result_values
 
 
 class StatusLine(Progress):
@@ -49,7 +49,7 @@ def facts(state: AppState) -> Iterator[str]:
     if state.missing:
         yield f"<b>Of μ = {cell.mu:g}, {cell.series}, while others are asked for</b>"
     yield bounds(state)
-    yield sampled(state)
+    yield str(result_values.sampling(state))
 
 
 def bounds(state: AppState) -> str:
@@ -62,21 +62,6 @@ def bounds(state: AppState) -> str:
     most = float(exact["max_gap"]) / state.replay.force_scale
     of = "" if count == wanted else f" of {wanted}"
     return f"{count}{of} bounds certified, gap ≤ {power(most)} ⟨fₙ⟩"
-
-
-def sampled(state: AppState) -> str:
-    """How the states were found, how many of those tried, and whether they mixed."""
-    asked, summary = state.cell.selection, state.replay.summary
-    how = f"random walk, {SOLVERS[asked.relax]}" if asked.kind == "walk" else KINDS[asked.kind]
-    parts = [f"{how}: {summary['states']} networks"]
-    if summary.get("acceptance") is not None and not summary.get("skipped"):
-        parts.append(f"{summary['acceptance']:.0%} of attempts accepted")
-    r_hat, size = summary.get("worst_r_hat"), summary.get("least_bulk_size")
-    if r_hat is not None:
-        parts.append(f"R̂ ≤ {r_hat:.2f}")
-    if size is not None:
-        parts.append(f"effective size ≥ {size:.0f}")
-    return ", ".join(parts)
 
 
 def power(value: float) -> str:

@@ -1,5 +1,7 @@
 """The thin header of every page: both doors, a copy of the link, help, and the theme."""
 
+from typing import Any
+
 import param
 
 from ..browser.bundle import Scripted
@@ -11,7 +13,7 @@ class Header(Scripted):
     `middle` of a narrow page goes below the doors: nothing is ever covered.
     """
 
-    door = param.Selector(default="explore", objects=["explore", "learn"])
+    door: Any = param.Selector(default="explore", objects=["explore", "learn"])
     dark = param.Boolean(doc="theme; changed by the page")
     keys = param.List(doc="[keys, what they do], listed by ?")
     help = param.String(doc="HTML above the keys")

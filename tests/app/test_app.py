@@ -22,12 +22,14 @@ from app.background.gc_pauses import settle
 from app.background.jobs import Job, Pool, Task, Visitor
 from app.background.limits import LIMITS, NAMES, Limits, read_limits
 from app.explore.controls import Controls
-from app.explore.results_line import left_out, of_which
+from app.explore.results_line import left_out
+from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import SOME, View, sorted_contacts
+from app.explore.tabs.tabs import TABS
 from app.packing import view as packing_view
 from app.packing.player import frames
 from app.packing.view import PackingView, exact_intervals
-from app.page import TABS, _turns
+from app.page import learns
 from app.results import compute, distributions, replays
 from app.results.geometry import MARGIN
 from app.results.library import Library
@@ -49,6 +51,7 @@ from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, read_view, spelled
 from app.state.pulls import Hand
 from app.state.view_settings import Looks
+from app.state.visit import turns
 from app.widgets.progress import Progress
 from granforce import measures
 from granforce.cli import parser
@@ -566,10 +569,29 @@ def test_a_link_keeps_what_single_tabs_show(state, visited):
 
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
-    line = of_which(state)
-    assert not line.visible
+    line = StatusLine(state)
+    assert "random walk" in line.facts[-1] and "while others" not in line.facts[0]
     state.param.update(missing=True)
-    assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
+    assert f"Of μ = {state.cell.mu:g}" in line.facts[0]
+
+
+def test_the_status_line_says_what_is_certified_and_what_failed(state):
+    line = StatusLine(state)
+    assert "not computed" in line.facts[0]
+    state.compute_exact()
+    wait_for(state)
+    count = 4 * state.replay.summary["contacts"]  # both ends of both components
+    assert f"{count} bounds certified, gap ≤ " in line.facts[0]
+    state.work.message = "nothing balances"
+    assert line.failed == "nothing balances"
+    line.hear({"read": True})
+    assert line.failed == state.work.message == ""
+    assert power(5.2e-9) == "5·10⁻⁹" and power(0.0) == "0"
+
+
+def test_learn_has_a_door_of_its_own():
+    assert learns("?learn") and learns("?learn=groove&dark=1")
+    assert not learns("") and not learns("?scene=groove") and not learns("?mu=0.1")
 
 
 def test_possible_is_in_the_legend_only_where_it_is_drawn(state):
@@ -629,7 +651,7 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
     view = PackingView(state)
-    assert "stronger or weaker than as packed" in view.player.legend
+    assert "change from the forces as packed</option>" in view.player.legend
     view.player.pulled = True
     assert "change by what was pulled" in view.player.legend
 
@@ -1282,7 +1304,7 @@ def test_a_page_is_only_called_within_the_loop_and_while_it_is_there():
 
     async def visit():
         page = Page()
-        wake = _turns(page)
+        wake = turns(page)
         await asyncio.to_thread(wake, print)
         await asyncio.sleep(0)
         page.session_context = None

@@ -381,37 +381,6 @@ def test_the_point_in_force_space_stays_within_the_outline(run, target, reached)
     assert normal == pytest.approx(reached, abs=1e-6)
 
 
-def test_who_is_new_sees_the_disks_around_what_is_to_be_dragged(run):
-    """Within the packing, both lines where force space asks of two, and all of a small one."""
-    views = run(
-        "obsolete/near",
-        """({ Near }, { half }) => {
-            const whole = { x: 10, y: 10, half }
-            const geometry = { radius: [0.5, 1], contact: [4, 7, 9] }
-            const lines = [[10, 9, 10, 11], [1, 1, 2, 1], [10, 3, 12, 3]] // of these contacts
-            const scene = { root: document.body, geometry, whole, pair: [], ends: (k) => lines[k] }
-            const later = { waits: true, listeners: [] }
-            const replay = { walk: { inviting: 0 } }
-            const player = { scene, later, replay, invite: { row: 0 }, live: {} }
-            const near = new Near(player), views = [near.view]
-            player.invite.row = 1
-            views.push(near.view)
-            scene.pair = [4, 9] // which counts where force space is looked at
-            views.push(near.view.half)
-            player.points = true
-            views.push(near.view)
-            later.waits = false
-            return [...views, near.view, later.listeners.length]
-        }""",
-        half=10.0,
-    )
-    middle, corner, other, both, none, listens = views
-    assert middle == {"x": 10, "y": 10, "half": 6.5}
-    assert corner == {"x": 6.5, "y": 6.5, "half": 6.5}  # nothing beyond the packing
-    assert other == 6.5 and both["half"] >= 4 + 2 and abs(both["y"] - 7) < 1e-9
-    assert none is None and listens == 1
-
-
 def test_a_guess_stands_on_the_axis_where_it_was_put(run):
     before, along, value, within = run(
         "learn/drawing/guess_marker",

@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import page
 from app.browser.bundle import APP, Scripted, module
 from app.browser.messages import FROM_BROWSER, TO_BROWSER, Array, fits, listed
-from app.explore import friction_slider, page_address
+from app.explore import explore_page, friction_slider, page_address, results_line, status_line
 from app.explore.tabs.intervals import known_forces
 from app.explore.tabs.push import load_slider
 from app.explore.tabs.your_packing import my_computations
 from app.learn import small_scene
-from app.obsolete import glimpse, tour
+from app.obsolete import glimpse
 from app.packing import player
 from app.packing.replay import stream
 from app.state.known import Knowledge
@@ -28,8 +27,7 @@ COMPONENTS = {
         page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider, glimpse.Glimpses,
         file_buttons.Handover, known_forces.Known, load_slider.LoadSlider,
         my_computations.Mine, number.NumberField, player.Player, progress.Progress,
-        small_scene.Small,
-        tour.Tour,
+        results_line.Results, small_scene.Small, status_line.StatusLine,
     )
 }  # fmt: skip
 # What a player's message is handed on to.
@@ -116,7 +114,7 @@ def test_what_is_listed_is_handled(name):
     """By name: on the server where it is heard, in the browser in the component's script."""
     heard = inspect.getsource(COMPONENTS[name]._heard)
     if name == "Player":  # which hands on what others hear
-        heard = inspect.getsource(page) + inspect.getsource(stream)
+        heard = inspect.getsource(explore_page) + inspect.getsource(stream)
     for shape in FROM_BROWSER[name]:
         for field, part in shape.items():
             handed = (f'hears["{field}"]', f'"{field}": state.')

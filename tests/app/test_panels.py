@@ -30,6 +30,7 @@ from app.explore.tabs.friction import study_figures as drawn_study
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.your_packing import upload as upload_view
 from app.obsolete.glimpse import FRAMES
+from app.packing.view import PackingView
 from app.results import distributions, planes, study_data, uploads
 from app.state import perturbations
 from app.widgets import label_places
@@ -716,18 +717,21 @@ def test_finished_results_say_where_they_have_states_and_where_there_are_none(st
 
 
 def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
-    controls = Controls(state)
-    assert not {"sign", "known"} & set(controls.colour.options.values())
-    assert not {"difference", "known"} & set(controls.thickness.options.values())
+    player = PackingView(state).player
+
+    def offered(*names):
+        return [f'<option value="{name}"' in player.legend for name in names]
+
+    assert not any(offered("sign", "difference", "known"))
     state.looks.reference = 2
-    assert "sign" in controls.colour.options.values()
-    assert "difference" in controls.thickness.options.values()
+    assert all(offered("sign", "difference")) and not any(offered("known"))
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
-    assert "known" in controls.colour.options.values()
-    state.looks.colour = "known"
+    assert all(offered("known"))
+    player.colour = "known"  # chosen in the legend
+    assert state.looks.colour == "known"
     state.knowledge.release(3)
     wait_for(state)
-    assert controls.colour.value == "known"  # what was chosen stays
+    assert '<option value="known" selected' in player.legend  # what was chosen stays
 
 
 @pytest.mark.parametrize("span", [(1.0, 1.0), (4.0, 0.5)])

@@ -19,7 +19,7 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
 @pytest.mark.parametrize(
     ("query", "scene", "mu", "step"),
     [
-        ("", "groove", None, 0),
+        ("", "many", None, 0),
         ("?scene=box&mu=0.3", "box", 0.3, 0),
         ("?scene=groove&tour=2", "groove", None, 2),
         ("?scene=elsewhere", "groove", None, 0),

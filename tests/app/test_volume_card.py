@@ -1,33 +1,38 @@
-"""The card with the volume of S: offered, measured in the background, found again."""
+"""The volume of S among the results: offered, measured in the background, found again."""
 
 import pytest
 from visitor import wait_for
 
+from app.explore.results_line import Results
 from app.explore.volume import Volume
 
 
 @pytest.fixture
-def view(state):
+def volume(state):
     made = Volume(state)
     wait_for(state)
     return made
 
 
-def test_the_volume_is_measured_once_and_found_again(state, view):
-    assert view.measure.visible and not view.tiles.object
-    view.measure.clicks += 1
-    assert state.work.measuring.running and not view.measure.visible
-    wait_for(state)
-    assert not view.measure.visible and "ln V" in view.tiles.object
-    assert 0 < view.found["log_volume_error"].item() <= 0.1
-    again = Volume(state)
-    wait_for(state)
-    assert again.tiles.object == view.tiles.object
+@pytest.fixture
+def results(state, volume):
+    return Results(state, volume)
 
 
-def test_it_is_that_of_the_packing_on_screen(state, view):
-    view.measure.clicks += 1
+def test_the_volume_is_measured_once_and_found_again(state, results):
+    assert "measure</button>" in results.html
+    results.hear({"measure": True})
+    assert state.work.measuring.running and "measure</button>" not in results.html
+    wait_for(state)
+    assert "measure</button>" not in results.html and " ± " in results.html
+    again = Results(state, Volume(state))
+    wait_for(state)
+    assert again.html == results.html
+
+
+def test_it_is_that_of_the_packing_on_screen(state, results):
+    results.hear({"measure": True})
     state.choose(mu=0)
     wait_for(state)
     # One network only: nothing to measure.
-    assert not view.measure.visible and view.found is None and not view.tiles.object
+    assert "measure</button>" not in results.html and "h free dimensions" in results.html

@@ -5,7 +5,6 @@ from html import unescape
 
 from small_store import ROOT
 
-from app.explore.results_line import TILES
 from app.results.selection import KINDS, SOLVERS
 from app.state.view_settings import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.widgets import hints
@@ -19,8 +18,6 @@ def test_every_symbol_and_option_has_its_sentence():
     for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PUSHES, FIGURES):
         for words in options.values():
             assert words in known, words
-    for _, _, _, term, _ in TILES:
-        assert term in TERMS
     for word, sentence, _ in TERMS.values():
         assert re.fullmatch(r"[^.].*\.", sentence) and len(sentence) < 320, word
 
