@@ -10,6 +10,10 @@ Here the same flow is integrated implicitly for a whole network at a time, with 
 each by Newton's method on the states of the contacts (sticking, sliding either way, open). That is
 independent of any order of the contacts, and ends at rounding error.
 
+Friction has a memory: which of the networks at rest a flow ends in, and whether it comes to rest at
+all, depends on the τ of its steps. So does the critical force: with full Newton steps, without the
+search for a length, other steps fail and are made shorter, and it changes by up to 0.1 ⟨f_n⟩.
+
 LANES of flows go side by side (see `lanes`), each with its own network, load, pace and Newton step;
 none changes a bit of another.
 """
@@ -204,13 +208,7 @@ def until_one_ends(step, flows, rest, stop, lanes):
     while not stop[0]:
         answer(step, flows, lanes)
         contact_matrix.copy(flows.merit, flows.least, lanes)
-        contact_matrix.copy(flows.before, flows.state, lanes)
-        for to, given in ((flows.base, flows.velocity), (flows.direction, flows.rest)):
-            contact_matrix.copy(to.rows, given.rows, lanes)
-            contact_matrix.copy(to.border, given.border, lanes)
-        factor(step, flows, stop, lanes)
-        direction = flows.direction
-        lu.solve(step.network, flows.factors, direction.rows, direction.border, lanes)
+        find_direction(step, flows, stop, lanes)
         _search(step, flows, lanes)
         _measure(step, flows, lanes)
         ended = False
@@ -347,7 +345,19 @@ def _measure(step, flows, lanes):
 
 
 @within
-def factor(step, flows, stop, lanes):
+def find_direction(step, flows, stop, lanes):
+    """The Newton direction from the velocities, which become the base, by the last `answer`."""
+    direction = flows.direction
+    contact_matrix.copy(flows.before, flows.state, lanes)
+    for to, given in ((flows.base, flows.velocity), (direction, flows.rest)):
+        contact_matrix.copy(to.rows, given.rows, lanes)
+        contact_matrix.copy(to.border, given.border, lanes)
+    _factor(step, flows, stop, lanes)
+    lu.solve(step.network, flows.factors, direction.rows, direction.border, lanes)
+
+
+@within
+def _factor(step, flows, stop, lanes):
     """Factor M + A (∂Π) τ D Aᵀ, not symmetric, as f_t of a sliding contact follows f_n."""
     network, m, factors = step.network, len(step.mass_border), flows.factors
     contact_matrix.begin(network, step.mass, factors, lanes)

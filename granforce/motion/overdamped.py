@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.motion.flow import Flows, answer, factor, make_flows, step_along
+from granforce.motion.flow import Flows, answer, find_direction, make_flows, step_along
 from granforce.motion.step import Step
-from granforce.numerics import contact_matrix, lu
+from granforce.numerics import contact_matrix
 from granforce.numerics.lanes import ONE, compiled, within
 from granforce.tolerances import BALANCED
 from granforce.types import Floats
@@ -104,13 +104,8 @@ def _solved(step, flows, counts, stop):
     contact_matrix.copy(flows.kept.border, border, ONE)
     answer(step, flows, ONE)
     for _ in range(NEWTON):
-        contact_matrix.copy(flows.before, flows.state, ONE)
-        for to, given in ((flows.base, flows.velocity), (direction, flows.rest)):
-            contact_matrix.copy(to.rows, given.rows, ONE)
-            contact_matrix.copy(to.border, given.border, ONE)
-        factor(step, flows, stop, ONE)
+        find_direction(step, flows, stop, ONE)
         counts[SYSTEMS] += 1
-        lu.solve(step.network, flows.factors, direction.rows, direction.border, ONE)
         step_along(rows, flows.base.rows, 1.0, direction.rows, ONE)
         step_along(border, flows.base.border, 1.0, direction.border, ONE)
         answer(step, flows, ONE)
