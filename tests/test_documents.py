@@ -19,7 +19,11 @@ from granforce.cli.parser import main, make_parser
 from granforce.paper import claims, documents, tables
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md"]
+PAGES = sorted(
+    str(path.relative_to(ROOT)) for path in (ROOT / "granforce/docs/pages").rglob("*.md")
+)
+DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md", *PAGES]
+RESULTS = ["README.md", "granforce/docs/pages/results.md"]
 LAMMPS = ROOT / "tests" / "lammps" / "lammps_n400_mu0.3"
 
 # The same at a size that takes no time: texts of commands and snippets, and what replaces them.
@@ -63,10 +67,11 @@ def commands(document):
     )
     found = []
     for line in [*lines, *quoted]:
-        words = shlex.split(line.partition("&&")[0]) if "granforce " in line else []
+        alone = line.partition("&&")[0]
+        words = shlex.split(alone, comments=True) if "granforce " in line else []
         while words and "=" in words[0]:
             words.pop(0)  # variables
-        if words[:1] == ["granforce"] and words[1:] and words[1].islower():
+        if "--help" not in words and words[:1] == ["granforce"] and "".join(words[1:2]).islower():
             found.append(words[1:])
     return found
 
@@ -90,16 +95,11 @@ def folder(away):
 
 def test_the_readme_is_short_and_gives_the_commands_that_install():
     lines = text("README.md").splitlines()
-    assert len(lines) <= 180
+    assert len(lines) <= 110
     for ends in ("panel serve app --show", "-m pytest"):
         assert any(
             line.startswith("python3 -m venv .venv") and line.endswith(ends) for line in lines
         )
-
-
-def test_the_readme_tells_every_command():
-    told = {words[0] for words in commands("README.md")}
-    assert told == known()
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
@@ -111,7 +111,7 @@ def test_every_command_is_understood(document):
             assert words[0] in known()
 
 
-@pytest.mark.parametrize("document", ["README.md", "data/README.md"])
+@pytest.mark.parametrize("document", [*DOCUMENTS[:3], *PAGES])
 def test_every_short_command_runs(document, folder, capsys):
     ran = 0
     for words in commands(document):
@@ -120,7 +120,7 @@ def test_every_short_command_runs(document, folder, capsys):
         words = shlex.split(small(shlex.join(words)))
         assert main(words) == 0, (words, capsys.readouterr().err)
         ran += 1
-    assert ran >= 4
+    assert ran or document not in DOCUMENTS[:1]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
@@ -133,13 +133,13 @@ def test_every_snippet_runs(document, folder):
             assert run.returncode == 0, run.stderr
             assert run.stdout
         else:
-            assert not language or language == "sh"
+            assert language in ("", "sh", "text")
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_every_link_leads_somewhere(document):
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text(document)):
-        if "://" not in target:
+        if "://" not in target and not target.startswith("reference/"):  # made with the site
             assert (ROOT / document).parent.joinpath(target).exists(), target
 
 
@@ -164,7 +164,7 @@ def study():
     return tables.load(ROOT / "data/study.zarr"), told
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
+@pytest.mark.parametrize("document", RESULTS)
 def test_what_the_study_tells_is_what_is_shipped(document, study, tmp_path):
     """Everything between marks is what the shipped study gives: no number was typed."""
     table, told = study
@@ -185,13 +185,11 @@ def test_the_claims_are_those_of_the_shipped_study(study):
             assert claim.value == pytest.approx(shipped["value"], rel=1e-6)
 
 
-def test_sentences_about_results_have_no_typed_numbers():
-    """Outside of generated parts the READMEs' results tell no measured number: none with a ±."""
-    for document, first in (("README.md", "## Results"), ("data/README.md", "## Main results")):
-        told = documents.MARK.sub("", text(document).partition(first)[2])
-        told = told.partition("## Words" if document == "README.md" else "## Accuracy")[0]
-        assert told
-        assert not re.findall(r"\d\S* ±|\d+\.\d+ \(|\b(?!95)\d+ %|\d+\.\d+ …", told)
+@pytest.mark.parametrize("document", RESULTS)
+def test_results_have_no_typed_numbers(document):
+    """Outside of generated parts no measured number is given: none with a ± or an interval."""
+    typed = documents.MARK.sub("", text(document))
+    assert not re.findall(r"\d\S* ±|\d+\.\d+ \(|\b(?!95)\d+ %|\d+\.\d+ …", typed)
 
 
 def test_the_map_shows_every_room():
@@ -201,7 +199,7 @@ def test_the_map_shows_every_room():
         name = line.split(" ")[0]
         room = name if name.endswith("/") else room if not name else ""
         rooms.setdefault(room, []).extend(re.findall(r"[\w/]+(?:\.py|/)(?=\W|$)", line))
-    folders = {f"{init.parent.name}/" for init in (ROOT / "granforce").glob("*/__init__.py")}
+    folders = {f"{path.parent.name}/" for path in (ROOT / "granforce").glob("*/*.py")}
     assert set(rooms) - {""} == folders
     for room, names in rooms.items():
         for name in names:

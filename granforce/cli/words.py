@@ -395,12 +395,12 @@ def add_docs(commands: Commands) -> None:
     command = subcommand(
         commands,
         "docs",
-        "open the reference of all public names, with examples and sources, in a browser",
-        "granforce docs\n  granforce docs --out reference.html",
+        "build the documentation and open it in a browser",
+        "granforce docs\n  granforce docs --out site",
         reports=False,
     )
     command.add_argument(
-        "--out", type=Output, metavar="FILE.html", help="write it to this file, open nothing"
+        "--out", type=Output, metavar="FOLDER", help="build it in this folder, open nothing"
     )
 
 

@@ -1,10 +1,10 @@
 """The study's tables in documents, renewed between two marks: no number is copied by hand.
 
 A document has <!-- study: NAME -->, what was put there last, and <!-- end -->. Names: "measures"
-(η against μ), "beside" (what else there is at each μ), "results" (the main claims in a few lines),
-"claims" (all of them), "findings" (what there is beyond them), "sweeps" (where the paper's sweeps
-end, and how far outside of S), "preparation" (what packings depend on), "counts" (how many packings
-each part has).
+(η against μ), "beside" (other measures at each μ), "highlights" (ten findings, a sentence each),
+"headlines" (the first four of them), "claims" (all claims), "findings" (numbers beyond the claims),
+"sweeps" (where the paper's sweeps end, and how far outside of S), "preparation" (what packings
+depend on), "counts" (how many packings each part has).
 """
 
 import re
@@ -19,6 +19,7 @@ from granforce.measures import statistics
 from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
+from granforce.paper.highlights import highlights
 from granforce.paper.tables import Table
 from granforce.records import InputError
 from granforce.system.files import written
@@ -31,16 +32,8 @@ _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on the main table s
 _NOTHING = 1e-9  # η below this is rounding
 _MOST_DIGITS = 6  # after the point; more are told as a power of ten
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Claims of the paper that a few lines tell, and by which samplers.
-MAIN = (
-    "η3(μ) is not monotonic",
-    "η3(μ) is largest near μ = 0.1",
-    "z → 3 at the largest μ",
-    "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3",
-    "corr(f_n, ΔF_n) is significant at intermediate μ",
-    "F_crit rises with η",
-)
-_TOLD = ("gauss_seidel", "nearest", "exact", "")
+FIGURES = "../../../data/figures"  # from the page of results
+HEADLINES = 4  # highlights in the first document that people read
 # Findings that are too many for a table: `claims.json` has them.
 _LONG = "departure of P("
 _HEADS = {
@@ -71,7 +64,8 @@ def renew(paths: Sequence[Path], table: Table, claims: Rows, findings: Rows) -> 
     known = {
         "measures": lambda: measures(table),
         "beside": lambda: beside(table),
-        "results": lambda: results(claims),
+        "highlights": lambda: highlighted(table, claims, findings),
+        "headlines": lambda: headlines(table, claims, findings),
         "claims": lambda: claim_table(claims),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
@@ -271,20 +265,19 @@ def _apart(rows: Rows, others: Rows, name: str) -> float:
     return float(apart.mean() / (apart.std(ddof=1) / np.sqrt(len(apart))))
 
 
-def results(claims: Rows) -> str:
-    """The main claims in a few lines: for each its number and its verdict, by each sampler."""
-    lines = []
-    for statement in MAIN:
-        told = [
-            f"{_HEADS[claim['sampler']]} {_verdict(claim)}"
-            for claim in claims
-            if claim["statement"] == statement
-            and claim["sampler"] in _TOLD
-            and np.isfinite(claim["value"])
-        ]
-        if told:
-            lines.append(f"- **{statement}**: {'; '.join(told)}.\n")
-    return "".join(lines)
+def headlines(table: Table, claims: Rows, findings: Rows) -> str:
+    """The first highlights as a list."""
+    found = highlights(table, claims, findings)[:HEADLINES]
+    return "".join(f"- {one.sentence}\n" for one in found)
+
+
+def highlighted(table: Table, claims: Rows, findings: Rows) -> str:
+    """All highlights as a numbered list, each with its figure and how it was measured."""
+    return "".join(
+        f"{k}. {one.sentence} ([figure]({FIGURES}/{one.figure}.png), "
+        f"[method](method.md#{one.method}))\n"
+        for k, one in enumerate(highlights(table, claims, findings), 1)
+    )
 
 
 def finding_table(findings: Rows) -> str:

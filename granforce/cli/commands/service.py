@@ -1,10 +1,13 @@
-"""The study, the page, the reference, the benchmark and the store."""
+"""The study, the page, the documentation, the benchmark and the store."""
 
 import argparse
+import importlib.util
 import json
+import os
 import re
 import runpy
 import socket
+import subprocess
 import sys
 import webbrowser
 from pathlib import Path
@@ -14,7 +17,7 @@ import platformdirs
 from granforce.cli.parsing import ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
-from granforce.system.files import make_folder, written
+from granforce.system.files import make_folder
 from granforce.system.terminal import print_list, print_report
 
 
@@ -72,17 +75,25 @@ def _check_address(address: str, port: int) -> None:
 
 
 def docs(arguments: argparse.Namespace) -> None:
-    """The reference, written to a file, or to the user's cache folder and opened from there."""
-    from granforce.cli import reference
-
-    path = Path(
-        arguments.out or make_folder(platformdirs.user_cache_path("granforce")) / "reference.html"
+    """Build the documentation in a folder, or in the user's cache folder and open it from there."""
+    if importlib.util.find_spec("mkdocs") is None:
+        raise InputError("the documentation needs more packages: pip install 'granforce[docs]'")
+    folder = Path(arguments.out or make_folder(platformdirs.user_cache_path("granforce")) / "docs")
+    folder = folder.absolute()
+    if not folder.parent.is_dir():
+        raise InputError(f"--out: there is no folder {folder.parent}")
+    settings = Path(__file__).parents[2] / "docs" / "mkdocs.yml"
+    build = (sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict")
+    done = subprocess.run(
+        [*build, "--config-file", settings, "--site-dir", folder],
+        stdout=sys.stderr,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
     )
-    with written(path) as file:
-        file.write(reference.page().encode())
-    print(path)
+    if done.returncode:
+        raise InputError("the documentation could not be built: see above")
+    print(folder / "index.html")
     if not arguments.out:
-        webbrowser.open(path.as_uri())
+        webbrowser.open((folder / "index.html").as_uri())
 
 
 def completion(arguments: argparse.Namespace) -> None:

@@ -1,0 +1,141 @@
+"""Pages of the documentation that are made from the code: library, command line and symbols."""
+
+import argparse
+import importlib
+import json
+import re
+from pathlib import Path
+
+from mkdocs.structure.files import File, Files
+
+import granforce
+from granforce import glossary
+from granforce.cli.parser import make_parser
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE / "examples.md"
+DATA = next(  # inside an installed wheel, beside the package in a checkout
+    folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
+)
+DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as links of the sources are
+BENCH = re.compile(r"<!-- bench: (\w+) -->")
+
+# Sections of the library reference, by the module that a name comes from.
+SECTIONS = {
+    "records": "Records and errors",
+    "cell": "Records and errors",
+    "packing": "Packings",
+    "experiment": "Experiments",
+    "forces": "Force networks",
+    "motion": "Contact dynamics",
+    "explore": "Exploring S",
+    "perturb": "Local perturbation",
+    "study": "Stored results",
+}
+
+
+def on_files(files, config):
+    """Add generated pages and the study's figures."""
+    for name, text in (
+        ("reference/library.md", library()),
+        ("reference/cli.md", command_line()),
+        ("reference/symbols.md", symbols()),
+    ):
+        files.append(File.generated(config, name, content=text))
+    for path in (*sorted((DATA / "figures").glob("*.png")), DATA / "bench.png"):
+        files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
+    return Files(list(files))
+
+
+def on_page_markdown(markdown, page, **_):
+    """Fill in the tables of the benchmark, and link figures where the site has them."""
+    up = "../" * page.url.count("/")
+    markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
+    return BENCH.sub(lambda match: bench_table(match[1]), markdown)
+
+
+def bench_table(part: str) -> str:
+    """The rows of a part of the benchmark as a table."""
+    rows = json.loads((DATA / "bench.json").read_text())[part]
+    if isinstance(rows, dict):
+        libraries = rows.pop("libraries")
+        rows |= {name: version for name, version in libraries.items() if version}
+        return table(["", "value"], [[name, str(value)] for name, value in rows.items()])
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
+    heads = [name.replace("_", " ") for name in names]
+    return table(heads, [[cell(row.get(name)) for name in names] for row in rows])
+
+
+def table(heads: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join(f"| {' | '.join(escaped(text) for text in line)} |\n" for line in lines)
+
+
+def cell(value) -> str:
+    if value is None:
+        return ""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def library() -> str:
+    """Every public name by section, with its example."""
+    shown = examples()
+    sections: dict[str, list[str]] = {}
+    for name, home in granforce._HOME.items():
+        if home:
+            section = SECTIONS.get(home.partition(".")[0], "Other")
+            sections.setdefault(section, []).append(entry(f"{home}.{name}", name, shown))
+        else:  # a module
+            names = importlib.import_module(f"granforce.{name}").__all__
+            sections[f"gf.{name}"] = [
+                entry(f"{name}.{one}", f"{name}.{one}", shown) for one in names
+            ]
+    text = "# Library\n\nAll public names, as `import granforce as gf` gives them.\n"
+    for section, entries in sections.items():
+        text += f"\n## {section}\n\n" + "\n".join(entries)
+    rest = "".join(f"\n### {name}\n{example}" for name, example in shown.items())
+    return text + (f"\n## More examples\n{rest}" if rest else "")
+
+
+def entry(path: str, name: str, shown: dict[str, str]) -> str:
+    """The entry of a public name, with its example."""
+    heading = f"::: granforce.{path}\n    options:\n      heading_level: 3\n"
+    return heading + shown.pop(f"gf.{name}", "")
+
+
+def examples() -> dict[str, str]:
+    """{name: Markdown} of the tested examples."""
+    parts = re.split(r"^## (gf\.[\w.]+)\n", EXAMPLES.read_text(), flags=re.M)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def command_line() -> str:
+    """The help of every command."""
+    text = "# Command line\n\nThe help of every command, as `granforce COMMAND --help` prints it.\n"
+    for name, parser in commands(make_parser()):
+        text += f"\n## granforce {name}\n\n```text\n{parser.format_help()}```\n"
+    return text
+
+
+def commands(parser: argparse.ArgumentParser, prefix: str = ""):
+    """(name, parser) of each command and subcommand."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, sub in action.choices.items():
+                yield f"{prefix}{name}", sub
+                yield from commands(sub, f"{prefix}{name} ")
+
+
+def symbols() -> str:
+    """The glossary as a table."""
+    rows = "".join(
+        f"| {escaped(term.symbol)} | {term.word} | {escaped(term.sentence)} |\n"
+        for term in sorted(glossary.TERMS.values(), key=lambda term: not term.symbol)
+    )
+    return f"# Symbols\n\n| symbol | name | meaning |\n|---|---|---|\n{rows}"
+
+
+def escaped(text: str) -> str:
+    return text.replace("|", "\\|")
