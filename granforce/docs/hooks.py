@@ -4,9 +4,13 @@ import argparse
 import importlib
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 import granforce
 from granforce import glossary
@@ -34,7 +38,7 @@ SECTIONS = {
 }
 
 
-def on_files(files, config):
+def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add generated pages and the study's figures."""
     for name, text in (
         ("reference/library.md", library()),
@@ -47,7 +51,7 @@ def on_files(files, config):
     return Files(list(files))
 
 
-def on_page_markdown(markdown, page, **_):
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Fill in the tables of the benchmark, and link figures where the site has them."""
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
@@ -56,7 +60,9 @@ def on_page_markdown(markdown, page, **_):
 
 def bench_table(part: str) -> str:
     """The rows of a part of the benchmark as a table."""
-    rows = json.loads((DATA / "bench.json").read_text())[part]
+    rows = json.loads((DATA / "bench.json").read_text()).get(part)
+    if not rows:
+        return "*Not measured.*\n"
     if isinstance(rows, dict):
         libraries = rows.pop("libraries")
         rows |= {name: version for name, version in libraries.items() if version}
@@ -73,7 +79,7 @@ def table(heads: list[str], rows: list[list[str]]) -> str:
     return "".join(f"| {' | '.join(escaped(text) for text in line)} |\n" for line in lines)
 
 
-def cell(value) -> str:
+def cell(value: Any) -> str:
     if value is None:
         return ""
     return f"{value:.3g}" if isinstance(value, float) else str(value)
@@ -119,7 +125,9 @@ def command_line() -> str:
     return text
 
 
-def commands(parser: argparse.ArgumentParser, prefix: str = ""):
+def commands(
+    parser: argparse.ArgumentParser, prefix: str = ""
+) -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """(name, parser) of each command and subcommand."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
