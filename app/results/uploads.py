@@ -63,9 +63,7 @@ def role(name: str, content: bytes) -> str:
         if b"ITEM: ENTRIES" in content:
             return "contacts"
         raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
-    head = content.lstrip(b"\xef\xbb\xbf \t\r\n").split(b"\n", 1)[0][:2000]
-    words = head.decode("utf-8", "replace").lower().replace(";", ",").replace("\t", ",")
-    columns = {word.strip().strip('"') for word in words.split(",")}
+    columns = _columns(content)
     if {"x", "y", "r"} <= columns:
         return "grains"
     if {"i", "j"} <= columns:
@@ -77,6 +75,19 @@ def role(name: str, content: bytes) -> str:
         f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
         "(disks) or i, j (contacts), nor a photoelastic list of positions or of forces"
     )
+
+
+def _columns(content: bytes) -> set[str]:
+    """The names in the first line of a table."""
+    head = content.lstrip(b"\xef\xbb\xbf \t\r\n").split(b"\n", 1)[0][:2000]
+    words = head.decode("utf-8", "replace").lower().replace(";", ",").replace("\t", ",")
+    return {word.strip().strip('"') for word in words.split(",")}
+
+
+def needs_box(files: Files) -> bool:
+    """Whether these are tables that say nothing of what holds the disks: no load, no force."""
+    named = [_columns(files[part][1]) for part in ("grains", "joined") if part in files]
+    return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn"}
 
 
 def _photoelastic(content: bytes) -> str | None:

@@ -176,6 +176,21 @@ def test_files_are_known_by_their_content(kind):
         assert len(read.contacts.i) == len(touching) >= len(packing.contacts.i)
 
 
+def test_disks_without_a_box_ask_for_it(state):
+    """A table of disks alone is no error: what holds them is still to be said."""
+    packing = state.library.packing(state.cell.params["packing"])
+    view = upload_view.View(state)
+    view.mu.value = "0.1"
+    view._dropped([("disks.csv", table(packing))])
+    assert view.waiting.visible and view.waiting.title.startswith("Fill in Box")
+    assert view.box.visible and view.box.error_state and view.read.visible
+    assert not view.error.visible and not view.task.running
+    view.box.value = ", ".join(map(repr, map(float, packing.box)))
+    press(view.read)
+    wait_for(state, lambda: "disks.csv" in view.report.object)
+    assert not view.waiting.visible and not view.box.error_state
+
+
 @pytest.mark.parametrize("contacts", [False, True])
 def test_tables_of_tilted_boxes_are_read(state, contacts):
     """Sides and tilt are typed in one field."""

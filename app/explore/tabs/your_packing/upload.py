@@ -29,6 +29,11 @@ y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <c
 of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a
 packing is kept, in the cache; a frame is not, unless it is opened as one.
 """
+BOX_WANTED = (
+    "Fill in Box: the two sides of the box in which these disks are periodic, such as 30, 30, and "
+    "its tilt, if it has one; then press Read. Disks in an open set need columns fx, fy, torque "
+    "with the load on each."
+)
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
 """
@@ -111,10 +116,7 @@ class View:
             return
         self._ask()
         absent = [uploads.WORDS[part] for part in uploads.missing(self.files)]
-        self.waiting.param.update(
-            title=f"Now drop the {' and the '.join(absent)}." if absent else "",
-            visible=bool(absent),
-        )
+        self._wait(f"Now drop the {' and the '.join(absent)}." if absent else "")
         if not absent:
             self._read()
 
@@ -124,6 +126,11 @@ class View:
             options = self._options()
         except InputError as error:
             self._refuse(str(error))
+            return
+        box_wanted = uploads.needs_box(self.files) and not options["box"]
+        self.box.error_state = box_wanted
+        self._wait(BOX_WANTED if box_wanted else "")
+        if box_wanted:
             return
         if uploads.family(self.files) in ("pegs", "solved"):
             self._clear()
@@ -181,6 +188,10 @@ class View:
     def _clear(self) -> None:
         self.report.object = ""
         self.frame[:] = []
+
+    def _wait(self, line: str) -> None:
+        """Say what is still to be given; nothing where all is there."""
+        self.waiting.param.update(title=line, visible=bool(line))
 
     def _refuse(self, line: str) -> None:
         self.error.param.update(title=line, visible=bool(line))
