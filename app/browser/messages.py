@@ -19,7 +19,6 @@ FROM_BROWSER = {
     "Address": ({"query": str},),  # gone back or forward to
     "Dropper": ({"begin": True}, {"name": str, "data": object}, {"end": True}),  # pieces of files
     "FrictionSlider": ({"typed": str},),
-    "Glimpses": ({"pick": int},),  # the number of a picture
     "Handover": ({"key": str},),  # of a file that is asked for
     "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; what to measure next
     "LoadSlider": ({"push": True}, {"gave": True}),  # was moved; has come to where disks move

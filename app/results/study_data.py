@@ -16,9 +16,19 @@ DATA = Path(__file__).resolve().parents[2] / "data"
 # What the claims of each statistic begin with; see data/claims.json.
 ABOUT = {
     "eta": ("η", "z "),
-    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "S is more elongated"),
-    "correlation": ("corr(", "strong contacts"),
-    "store": ("F_crit", "α "),
+    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "ΔF_n is", "S is more elongated"),
+    "correlation": (
+        *("corr(", "the paper's error bar", "f_n > 2", "strong contacts", "ΔF_n/F_orig"),
+        "weak contacts",
+    ),
+    "other": (
+        "distances between",
+        "the original network",
+        "with only",
+        "and not in",
+        "with frozen",
+    ),
+    "store": ("F_crit", "α ", "the first motion"),
 }
 
 _reading = threading.Lock()

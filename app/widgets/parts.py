@@ -137,7 +137,11 @@ CLAIMS = """
 .claims { border-collapse: collapse; margin-top: 10px; font-size: 12.5px; }
 .claims caption { text-align: left; padding-bottom: 4px; font-weight: 600; }
 .claims td { border-top: 1px solid rgba(128, 128, 128, 0.35); padding: 3px 12px 3px 0; }
+.claims th { text-align: left; font-weight: 500; padding: 3px 12px 3px 0; vertical-align: bottom; }
+.claims td, .claims th { min-width: 64px; }
+.claims td:first-child { min-width: 150px; }
 .claims td + td { vertical-align: top; }
+.claims td small { display: block; opacity: 0.85; }
 """
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bokeh.models import CustomJS, HoverTool, Title
+from bokeh.models import CustomJS, HoverTool, Title, WheelZoomTool
 from bokeh.plotting import figure as Figure
 
 # Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
@@ -21,6 +21,9 @@ EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 GUESS = "#888888"  # what a visitor thought before
+
+# The page's font, which canvases do not inherit.
+FONT = 'Inter, Roboto, "Helvetica Neue", sans-serif'
 
 COLOURS = 33
 
@@ -86,21 +89,34 @@ def _faded(colour: tuple[int, ...], part: float) -> str:
 
 
 def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
-    """A figure that fills its width, titled and labelled, with a quiet toolbar."""
+    """A figure that fills its width, with a toolbar inside its frame that shows on hover.
+
+    The wheel zooms with Ctrl held, and scrolls the page otherwise.
+    """
     settled = {
-        "tools": "pan,wheel_zoom,box_zoom,reset",
+        "tools": "pan,box_zoom,reset",
         "toolbar_location": "above",
+        "toolbar_inner": True,
         "sizing_mode": "stretch_width",
         "min_border_left": 56,
         "min_border_right": 18,
     }
     fig = Figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
+    if fig.toolbar.tools:
+        fig.add_tools(WheelZoomTool(modifiers={"ctrl": True}))
     fig.toolbar.logo = None
     fig.toolbar.autohide = True
     if title:
-        fig.title.text_font_size = "13px"
-    fig.axis.axis_label_text_font_style = "normal"
+        fig.title.update(text_font=FONT, text_font_size="13px")
+    for axis in fig.axis:
+        axis.update(
+            axis_label_text_font=FONT, axis_label_text_font_style="normal",
+            axis_label_text_font_size="13px", major_label_text_font=FONT,
+            major_label_text_font_size="12px", axis_line_color=EDGE, major_tick_line_color=EDGE,
+            minor_tick_line_color=None, axis_label_standoff=4,
+        )  # fmt: skip
     fig.grid.grid_line_alpha = 0.4
+    fig.outline_line_color = None
     return fig
 
 
@@ -124,7 +140,8 @@ def legend_above(fig: Figure, columns: int = 4) -> None:
     legend = fig.legend[0]
     fig.center.remove(legend)
     legend.update(
-        orientation="horizontal", ncols=columns, location="left", label_text_font_size="11px",
+        orientation="horizontal", ncols=columns, location="left", label_text_font=FONT,
+        label_text_font_size="12px",
         border_line_alpha=0, background_fill_alpha=0, padding=0, margin=2, spacing=8,
         glyph_width=16, glyph_height=14, label_height=14, label_standoff=3,
     )  # fmt: skip

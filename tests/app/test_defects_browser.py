@@ -20,9 +20,6 @@ from serving import (
 )
 from small_store import KEPT, ROOT
 
-STATISTICS = "measured in networks found at random"
-
-
 # 1: Back and Forward
 
 
@@ -271,7 +268,7 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
 # 9: Small things
 
 
-@pytest.mark.parametrize("tab, least", [("intervals", 1), ("statistics", 2)])
+@pytest.mark.parametrize("tab, least", [("intervals", 1), ("statistics", 1)])
 def test_legends_lie_where_no_curve_goes(lasting, tab, least):
     page = lasting(f"?tab={tab}")
     page.wait_for_function(
@@ -293,7 +290,7 @@ def test_legends_lie_where_no_curve_goes(lasting, tab, least):
 
 def test_ticks_of_friction_stand_apart(lasting):
     page = lasting("?tab=statistics")
-    page.get_by_text("Forces vary most at friction").wait_for()
+    page.get_by_text("Forces are least determined at").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -314,7 +311,7 @@ def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page.get_by_role("button", name="Let the push grow").click()
     page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Friction").click()
-    page.get_by_text("Forces vary most at friction").wait_for()
+    page.get_by_text("Forces are least determined at").wait_for()
     assert "already known" not in (served[1] / "log").read_text()
 
 
@@ -327,14 +324,6 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
     page.locator("input[type=file]").set_input_files(ROOT / "LICENSE")
     page.get_by_text("neither an NPZ of granforce").wait_for()
     page.get_by_text("dimension h of S").wait_for(state="detached")
-
-
-def test_nothing_old_stands_under_a_new_statistic(visit):
-    page = visit("?tab=statistics")
-    page.get_by_text("Forces vary most at friction").wait_for()
-    page.get_by_role("combobox", name="Question").select_option("correlation")
-    page.get_by_text("Forces vary most at friction").wait_for(state="detached")
-    page.get_by_text("the correlation lies between").wait_for()
 
 
 # What is said must be so
@@ -353,34 +342,16 @@ def test_curves_of_the_shown_states_end_at_their_targets(page):
     assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
 
 
-def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
+def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces vary most at friction").wait_for()
-    page.get_by_text("What the published study found, and what was found here").click()
-    assert page.get_by_role("cell", name="reproduced").count() >= 5
-    most = page.evaluate(
-        """() => Math.max(...[...Bokeh.documents[0].all_models]
-            .filter((m) => m.type === "ColumnDataSource").map((m) => m.get_length() ?? 0))"""
-    )
-    assert most >= 15  # frictions of the study above 0
-
-
-@pytest.mark.parametrize(
-    "tab, words",
-    [
-        ("intervals", ("possible: exact; seen: in the networks so far",)),
-        ("plane", ("outline: exact; dots: networks found at random",)),
-        ("statistics", (STATISTICS, "dashed exact, others measured")),
-    ],
-)
-def test_plots_say_whether_they_show_exact_seen_or_measured_values(lasting, tab, words):
-    page = lasting(f"?tab={tab}")
-    for line in words:
-        page.wait_for_function(
-            """line => [...Bokeh.documents[0].all_models]
-                .some((m) => m.type === "Title" && m.text === line)""",
-            arg=line,
-        )
+    for words in ("Forces are least determined at", "How long are the intervals?"):
+        page.get_by_text(words).wait_for()
+    page.get_by_text("Are the strong contacts the undetermined ones?").wait_for()
+    page.wait_for_function(f"() => {MODEL}('indeterminacy_here')?.get_length() === 3")
+    page.wait_for_function(f"() => {MODEL}('coordination_here')?.get_length() === 1")
+    page.get_by_role("cell", name="η1(μ) is not monotonic").wait_for()
+    verdicts = page.get_by_role("cell").filter(has_text="✓")
+    assert verdicts.count() >= 5 and "criterion" in verdicts.first.inner_html()
 
 
 # Colour and width by limit load

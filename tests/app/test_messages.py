@@ -14,7 +14,6 @@ from app.explore.tabs.intervals import known_forces
 from app.explore.tabs.push import load_slider
 from app.explore.tabs.your_packing import my_computations
 from app.learn import small_scene
-from app.obsolete import glimpse
 from app.packing import player
 from app.packing.replay import stream
 from app.state.known import Knowledge
@@ -24,7 +23,7 @@ from app.widgets import file_buttons, file_drop, number, progress
 COMPONENTS = {
     kind.__name__: kind
     for kind in (
-        page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider, glimpse.Glimpses,
+        page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider,
         file_buttons.Handover, known_forces.Known, load_slider.LoadSlider,
         my_computations.Mine, number.NumberField, player.Player, progress.Progress,
         results_line.Results, small_scene.Small, status_line.StatusLine,

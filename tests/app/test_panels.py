@@ -12,10 +12,10 @@ import xarray as xr
 import zarr
 from bokeh.document import Document
 from bokeh.io.doc import patch_curdoc
-from bokeh.models import CustomJS, FreehandDrawTool, Scatter
+from bokeh.models import CustomJS
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
-from small_store import KEPT, STATES
+from small_store import KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
@@ -26,10 +26,10 @@ from app.explore.tabs.export import export as export_view
 from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
-from app.explore.tabs.friction import study_figures as drawn_study
+from app.explore.tabs.friction.claims import VERDICTS
 from app.explore.tabs.push import push as perturb_view
+from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
-from app.obsolete.glimpse import FRAMES
 from app.packing.view import PackingView
 from app.results import distributions, planes, study_data, uploads
 from app.state import perturbations
@@ -366,124 +366,69 @@ def test_groups_spread_over_mu_and_hold_the_one_on_screen():
     assert min(chosen) == 0.1 and max(chosen) == 10
 
 
-@pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])
-@pytest.mark.parametrize("scale", ["linear", "log"])
-def test_every_statistic_is_drawn_from_the_data(state, what, scale):
-    view = statistics_view.View(state)
-    view.what.value, view.scale.value = what, scale
-    assert not view.plots.objects and not view.task.running
-    state.looks.tab = view.name
-    wait_for(state)
-    figures = [pane.object for pane in [*view.plots.select(Bokeh), *view.more.select(Bokeh)]]
-    assert len(figures) == (4 if what == "eta" else 1)
-    columns = [r.data_source.data for fig in figures for r in fig.renderers]
-    drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
-    row = distributions.rows([state.cell])[0]
-    wanted = {
-        "eta": row["eta2"],
-        "correlation": row["correlation"],
-        "scatter": float(np.float32(row["extent"][3])),
-    }
-    if what in wanted:
-        assert np.isclose(drawn, wanted[what], rtol=1e-6).any()
-    assert len(drawn) > 5 and view.told.object
-    most = max(study_data.hill(), key=lambda point: point[1])[0]
-    assert f"at friction {most:g}" in view.lead.object or what != "eta"
-    assert view.lead.object  # what to look for
-
-
-def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
-    state.looks.param.update(tab="statistics", guess=True)
-    view = statistics_view.View(state)
-    wait_for(state)
-    fig = view.plots.objects[0].object
-
-    def seen():
-        return [r.visible for r in fig.renderers if r.name not in ("own", "guess", "draw")]
-
-    ring, guess, asked = (fig.select(name=name)[0] for name in ("own", "guess", "draw"))
-    assert ring.visible and guess.visible and asked.visible
-    assert not any(seen()) and not fig.select(name="peak")[0].visible
-    assert isinstance(fig.toolbar.active_drag, FreehandDrawTool) and "<svg" in view.meant.object
-    assert view.guesses.visible and not view.more.visible and "at friction" not in view.lead.object
-    view.what.value = "scatter"  # another figure asks for nothing
-    assert not view.guesses.visible and view.lead.object
-    view.what.value = "eta"
-    wait_for(state)
-    fig = view.plots.objects[0].object
-    assert view.guesses.visible and not any(seen())
-    view.guesses.objects[2].clicks += 1  # more, then less
-    guess, asked = (fig.select(name=name)[0] for name in ("guess", "draw"))
-    assert guess.visible and not asked.visible and fig.toolbar.active_drag == "auto"
-    assert all(seen()) and fig.select(name="peak")[0].visible
-    assert not view.guesses.visible and view.more.visible and not state.looks.guess
-    assert view.lead.object.startswith("Well guessed.") and "at friction" in view.lead.object
-
-
-def test_where_packings_of_three_frictions_are_at_hand_one_is_chosen_among_pictures(
-    state, monkeypatch
-):
-    offered = {cell.mu: "" for cell in state.catalogue if cell.mu}  # of this small store
-    monkeypatch.setattr(statistics_view, "OFFERED", offered)
-    state.looks.param.update(tab="statistics", guess=True)
-    view = statistics_view.View(state)
-    wait_for(state, lambda: view.glimpses.visible)
-    assert not view.guesses.visible and not view.plots.visible
-    assert [words for *_, words in view.glimpses.items] == [f"friction {mu:g}" for mu in offered]
-    for picture, widths, _ in view.glimpses.items:
-        lines = picture.count("<path")
-        assert picture.count("<circle") > 10 and lines > 10
-        assert (
-            len(widths) == FRAMES * lines and np.ptp(np.reshape(widths, (FRAMES, -1)), axis=0).any()
-        )
-    measured = [row["eta1"] for row in distributions.rows(view.offered)]
-    view.glimpses.hear({"pick": len(offered)})  # none of them
-    assert state.looks.guess
-    view.glimpses.hear({"pick": int(np.argmax(measured))})
-    assert not state.looks.guess and not view.glimpses.visible and view.plots.visible
-    assert view.lead.object.startswith("Well guessed.")
-
-
-def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
+def friction_tab(state):
+    """The tab Friction, drawn."""
     state.looks.tab = "statistics"
     view = statistics_view.View(state)
-    wait_for(state)
-    fig = view.plots.objects[0].object
-    means = statistics.means(study_data.rows("walk"), "eta1")
-    most = max(means, key=lambda point: point[1])
-    (peak,) = fig.select(name="peak")
-    assert peak.text == "↓ most here: click" and peak.x == most[0]
-    assert f"at friction {most[0]:g}" in view.lead.object and "Click a point" in view.lead.object
-    line, here = (r for r in fig.renderers if isinstance(r.glyph, Scatter))
-    assert list(here.data_source.data["x"]) == [0.1]
-    assert fig.legend[0].items[-1].label.value == "this packing"
-    points = line.data_source
+    wait_for(state, lambda: view.scatter is not None)
+    return view
+
+
+def drawn_points(column):
+    """Every number that the figures of a column hold."""
+    found = [r.data_source.data for pane in column.select(Bokeh) for r in pane.object.renderers]
+    return np.concatenate([np.ravel(v).astype(float) for c in found for v in c.values()])
+
+
+def test_nothing_of_friction_is_computed_before_it_is_seen(state):
+    view = statistics_view.View(state)
+    assert not view.task.running and not view.figures[0].objects
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state, scale):
+    state.looks.axis = scale
+    view = friction_tab(state)
+    row = distributions.rows([state.cell])[0]
+    wanted = {0: row["eta2"], 2: row["correlation"]}
+    for k, column in enumerate(view.figures):
+        points = drawn_points(column)
+        assert len(points) > 5 and (k not in wanted or np.isclose(points, wanted[k]).any())
+    here = view.indeterminacy.etas.here.data
+    assert list(here["x"]) == [0.1] * 3
+    np.testing.assert_allclose(here["y"], [row["eta1"], row["eta2"], 0.15 * row["eta3"]])
+    assert list(view.indeterminacy.z.here.data["y"]) == [row["coordination"]]
+
+
+def test_what_is_said_of_friction_is_made_from_the_study(state):
+    view = friction_tab(state)
+    points = statistics.means(study_data.rows("walk"), "eta2")
+    mu, value, _ = max(points, key=lambda point: point[1])
+    assert f"μ = {mu:g}: η₂ = {value:.3f}" in view.first.object
+    told = view.told.object
+    assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
+    assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
+    every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
+    shown = [c for about in study_data.ABOUT for c in study_data.claims(about)]
+    assert len(shown) == len(every)  # each once
+
+
+def test_a_tap_on_a_point_opens_such_a_packing_or_computes_it(state):
+    view = friction_tab(state)
+    points = view.indeterminacy.etas.points[1].data_source
     points.selected.indices = [list(points.data["x"]).index(1)]
-    wait_for(state)
+    wait_for(state, lambda: list(view.indeterminacy.etas.here.data["x"]) == [1, 1, 1])
     assert state.cell.mu == 1 and not state.missing  # the store has it
     points.selected.indices = [list(points.data["x"]).index(0.3)]
     assert state.selection.mu == 0.3 and state.work.computation.running
     state.work.cancel()
 
 
-def test_a_tap_on_a_point_selects_its_contact(state):
-    view = statistics_view.View(state)
-    view.what.value = "scatter"
-    state.looks.tab = view.name
-    fig = view.plots.objects[0].object
-    fig.renderers[0].data_source.selected.indices = [5]
-    assert state.looks.contact == 5 and view.chosen.data["x"] == [float(state.replay.normal[0, 5])]
-
-
-def test_a_tap_on_a_mu_shows_its_states(state):
-    view = statistics_view.View(state)
-    state.looks.tab = view.name
-    wait_for(state)
-    fig = view.plots.objects[0].object
-    source = next(r.data_source for r in fig.renderers if r.glyph.__class__.__name__ == "Scatter")
-    mus = list(next(iter(source.data.values())))
-    source.selected.indices = [mus.index(1)]
-    wait_for(state, lambda: state.cell.mu == 1)
+def test_a_tap_on_a_dot_selects_its_contact(state):
+    view = friction_tab(state)
+    view.scatter.figure.renderers[0].data_source.selected.indices = [5]
+    assert state.looks.contact == 5
+    assert list(view.scatter.chosen.data["x"]) == [state.replay.normal[0, 5]]
 
 
 # Export
@@ -776,7 +721,7 @@ def test_labels_beside_points_collide_neither_with_each_other_nor_with_points(sp
 
 
 def test_the_study_names_its_frictions_once(state):
-    figures, _, _ = drawn_study.responses([])
+    figures, _, _ = responses([])
     for fig in figures:
         (text,) = fig.select(name="frictions")
         assert len(text.data_source.data["text"]) > 8  # of 14

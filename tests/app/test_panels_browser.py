@@ -15,7 +15,6 @@ from serving import (
     PATIENCE,
     bars_drawn,
     column,
-    picture,
     scene,
     searched,
     serve,
@@ -117,30 +116,11 @@ def test_one_contact_in_its_cone(visit):
     assert np.all(np.abs(tangential) <= 0.1 * normal + 1e-3)
 
 
-def test_statistics_are_drawn_one_after_another(visit):
-    page = visit("?tab=statistics")
-    drawn(page, 2)
-    page.get_by_text("Forces vary most at friction").wait_for()
-    for what, text in (
-        ("extent", "one contact's force differs by"),
-        ("correlation", "the correlation lies between"),
-        ("scatter", "Each dot is one contact"),
-        ("force", "of the forces are smaller than the mean force"),
-        ("eta", "Forces vary most at friction"),
-    ):
-        page.get_by_role("combobox", name="Question").select_option(what)
-        page.get_by_text(text).wait_for()
-        drawn(page)
-        picture(page, f"statistics-{what}")
-    page.get_by_text("How was this computed?").click()
-    page.get_by_text("by how much a contact's force varies").wait_for()
-
-
-def test_statistics_by_night_on_a_narrow_screen(visit):
+def test_friction_by_night_on_a_narrow_screen(visit):
     page = visit("?tab=statistics&dark=1", width=400, height=2200)
-    drawn(page)
-    page.get_by_role("button", name="Why it falls again").click()
     drawn(page, 2)
+    page.get_by_role("button", name="how many forces are large").click()
+    page.get_by_text("of the forces are smaller than the mean force").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 

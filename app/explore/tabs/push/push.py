@@ -20,8 +20,9 @@ from ....widgets.hints import term
 from ....widgets.parts import LATER, PRIMARY, TabView, figure, folded, note, plotted, question
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 from ....widgets.progress import Progress
-from ..friction import study_figures
+from ..friction import claims
 from .load_slider import LoadSlider
+from .over_packings import responses
 
 TILE = (
     '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)"{}>'
@@ -335,8 +336,16 @@ def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job
         job.begin("reading the stores")
         found = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
-        drawn, lead, text = study_figures.responses(found)
-        return folded(text) + study_figures.claims("store"), drawn, "", lead
+        drawn, lead, text = responses(found)
+        return (
+            folded(text)
+            + claims.claims(
+                "store", "What the paper claims, and what the study found", opened=True
+            ),
+            drawn,
+            "",
+            lead,
+        )
 
     return work
 

@@ -1,0 +1,105 @@
+"""A figure against friction: lines of the study with error bars, and what is on the page on top."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from bokeh.models import ColumnDataSource, FixedTicker, GlyphRenderer, TapTool
+
+from granforce.types import Floats
+
+from ....widgets.parts import figure
+from ....widgets.plot_style import DOT, SERIES, hover
+
+Points = Sequence[tuple[float, float, float]]  # x, y and standard error
+
+COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
+MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
+DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
+HERE, OWN = "this packing", "others on this page"
+
+
+class Line(NamedTuple):
+    """One quantity of a figure: what it is called, and its points in the study."""
+
+    label: str
+    points: Points
+    dash: str = "solid"
+    colour: int | None = None  # by default its place among the lines
+
+
+class AgainstFriction:
+    """Lines of the study against μ; `mark` puts rings where the page's packings lie."""
+
+    def __init__(
+        self, name: str, label: str, lines: Sequence[Line], *, log: bool = False, **options: Any
+    ) -> None:
+        """name: of the file that the figure is saved as; label: of the axis of values."""
+        kind = "log" if log else "linear"
+        fig = figure(
+            name, None, "friction μ", label, x_axis_type="log", y_axis_type=kind, **options
+        )
+        fig.xaxis.ticker = FixedTicker(ticks=DECADES)
+        fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
+        fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
+        self.figure, self.log = fig, log
+        self.points: list[GlyphRenderer] = []
+        self.own: list[ColumnDataSource] = []
+        self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
+        for k, line in enumerate(lines):
+            self._draw(k if line.colour is None else line.colour, line)
+        fig.scatter(
+            "x", "y", source=self.here, size=13, fill_alpha=0, line_color=DOT, line_width=2,
+            legend_label=HERE,
+        )  # fmt: skip
+
+    def _draw(self, k: int, line: Line) -> None:
+        fig, colour, marker = self.figure, COLOURS[k], MARKERS[k % len(MARKERS)]
+        x, y, error = shown(line.points, self.log)
+        own = ColumnDataSource({"x": [], "y": []})
+        self.own.append(own)
+        rings = fig.scatter(
+            "x", "y", source=own, size=9, marker=marker, fill_alpha=0, line_color=colour,
+            line_alpha=0.7,
+        )  # fmt: skip
+        self.points.append(rings)
+        if not len(x):
+            return
+        fig.line(x, y, color=colour, line_width=1.6, line_dash=line.dash, legend_label=line.label)
+        low = np.maximum(y - error, 0.1 * y) if self.log else y - error
+        fig.segment(x, low, x, y + error, color=colour, line_width=1.4)
+        source = ColumnDataSource({"x": x, "y": y, "error": error})
+        dots = fig.scatter(
+            "x", "y", source=source, color=colour, size=6, marker=marker, legend_label=line.label
+        )
+        values = line.label, "@y{0.0000} ± @error{0.0000}"
+        fig.add_tools(hover([dots], ("μ", "@x{0.[00000]}"), values))
+        self.points.append(dots)
+
+    def mark(self, own: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
+        """Open symbols at `own` points, of each line, and rings at `here`, (μ, value)."""
+        for source, points in zip(self.own, own, strict=True):
+            x, y, _ = shown(points, self.log)
+            source.data = {"x": x, "y": y}
+        x, y, _ = shown([(mu, value, 0.0) for mu, value in here], self.log)
+        self.here.data = {"x": x, "y": y}
+
+    def choosable(self, choose: Callable[[float], object]) -> None:
+        """choose(μ): a point was clicked."""
+        for renderer in self.points:
+            source = renderer.data_source
+            renderer.nonselection_glyph = renderer.selection_glyph = renderer.glyph
+
+            def tapped(name: str, old: Any, new: list[int], of: ColumnDataSource = source) -> None:
+                if new:
+                    choose(float(of.data["x"][new[0]]))
+                    of.selected.indices = []
+
+            source.selected.on_change("indices", tapped)
+        self.figure.add_tools(TapTool(renderers=self.points))
+
+
+def shown(points: Points, log: bool) -> Floats:
+    """Columns x, y, error of those points that logarithmic axes of μ, and of values, can show."""
+    kept = [p for p in points if p[0] > 0 and np.isfinite(p[1]) and (not log or p[1] > 1e-12)]
+    return np.array(kept, dtype=float).reshape(-1, 3).T

@@ -1,0 +1,91 @@
+"""The paper's claims and what the study found, as tables."""
+
+import html
+import re
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from ....results import study_data
+
+VERDICTS = {
+    "reproduced": "✓",
+    "differs": "≈",
+    "not reproduced": "✗",
+    "undecided": "?",
+    "too few data": "…",
+    "not measured": "…",
+}
+# Columns: whose numbers a claim is judged by, and heading.
+SAMPLERS = {
+    "gauss_seidel": "paper’s sweeps, to 10⁻³",
+    "nearest": "random walk",
+    "uniform": "uniform in S",
+    "exact": "exact",
+    "": "packings alone",
+}
+PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
+HEAD = "<tr><th>claim</th>{}</tr>"
+TABLE = "<div style='overflow-x:auto'><table class='claims'>{}</table></div>"
+
+
+def claims(about: str, heading: str, opened: bool = False) -> str:
+    """The paper's claims about one of `study_data.ABOUT`, a column for each sampler, as HTML."""
+    found = study_data.claims(about)
+    if not found:
+        return ""
+    by_statement: dict[str, dict[str, dict[str, Any]]] = {}
+    for claim in found:
+        by_statement.setdefault(claim["statement"], {})[claim["sampler"]] = claim
+    used = [name for name in SAMPLERS if any(name in one for one in by_statement.values())]
+    rows = [HEAD.format("".join(f"<th>{SAMPLERS[name]}</th>" for name in used))]
+    for statement, one in by_statement.items():
+        cells = "".join(f"<td>{_cell(one[name]) if name in one else ''}</td>" for name in used)
+        rows.append(f"<tr><td>{typeset(statement)}</td>{cells}</tr>")
+    return (
+        f"<details{' open' if opened else ''}><summary>{heading}: {_counted(found)}</summary>"
+        f"{TABLE.format(''.join(rows))}</details>"
+    )
+
+
+def legend() -> str:
+    """What the tables hold, as HTML."""
+    marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
+    return (
+        f"<b>What the paper claims, and what the study found</b> ({PAPER}). Each cell: verdict, "
+        f"value, 95 % interval over packings; point at it for the criterion. {marks}."
+    )
+
+
+def _counted(found: list[dict[str, Any]]) -> str:
+    counts = Counter(claim["verdict"] for claim in found)
+    return ", ".join(f"{counts[word]} {word}" for word in VERDICTS if counts[word])
+
+
+def _cell(claim: dict[str, Any]) -> str:
+    told = f"{claim['verdict']}: {claim['measured']}; criterion {claim['criterion']}"
+    if claim["why"]:
+        told += f"; {claim['why']}"
+    words = VERDICTS.get(claim["verdict"], claim["verdict"])
+    if np.isfinite(claim["value"]):
+        words += f" {_number(claim['value'])}"
+    if np.isfinite([claim["low"], claim["high"]]).all():
+        words += f" <small>({_number(claim['low'])} … {_number(claim['high'])})</small>"
+    title = html.escape(plain(told), quote=True)
+    return f'<span title="{title}" aria-label="{title}">{words}</span>'
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
+
+
+def plain(text: str) -> str:
+    """A text with its symbols where there is no HTML."""
+    return text.replace("F_n", "Fₙ").replace("f_n", "fₙ").replace("F_orig", "fₙ as packed")
+
+
+def typeset(text: str) -> str:
+    """A claim with its symbols as HTML: F_n with its index below, η1 as η₁."""
+    text = re.sub(r"([A-Za-z])_([a-z]+)", r"\1<sub>\2</sub>", html.escape(text))
+    return re.sub(r"η([123])", r"η<sub>\1</sub>", text)
