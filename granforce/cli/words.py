@@ -395,12 +395,12 @@ def add_docs(commands: Commands) -> None:
     command = subcommand(
         commands,
         "docs",
-        "build the documentation and open it in a browser",
+        "build the documentation and serve it to a browser, until interrupted",
         "granforce docs\n  granforce docs --out site",
         reports=False,
     )
     command.add_argument(
-        "--out", type=Output, metavar="FOLDER", help="build it in this folder, open nothing"
+        "--out", type=Output, metavar="FOLDER", help="build it in this folder only"
     )
 
 

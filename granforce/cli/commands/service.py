@@ -1,6 +1,7 @@
 """The study, the page, the documentation, the benchmark and the store."""
 
 import argparse
+import http.server
 import importlib.util
 import json
 import os
@@ -10,7 +11,9 @@ import socket
 import subprocess
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
@@ -75,13 +78,28 @@ def _check_address(address: str, port: int) -> None:
 
 
 def docs(arguments: argparse.Namespace) -> None:
-    """Build the documentation in a folder, or in the user's cache folder and open it from there."""
+    """Build the documentation; without a folder for it, serve it until interrupted."""
     if importlib.util.find_spec("mkdocs") is None:
         raise InputError("the documentation needs more packages: pip install 'granforce[docs]'")
-    folder = Path(arguments.out or make_folder(platformdirs.user_cache_path("granforce")) / "docs")
-    folder = folder.absolute()
-    if not folder.parent.is_dir():
-        raise InputError(f"--out: there is no folder {folder.parent}")
+    if arguments.out:
+        folder = Path(arguments.out).absolute()
+        if not folder.parent.is_dir():
+            raise InputError(f"--out: there is no folder {folder.parent}")
+        _build_docs(folder)
+        print(folder / "index.html")
+        return
+    folder = make_folder(platformdirs.user_cache_path("granforce")) / "docs"
+    _build_docs(folder)
+    # Over HTTP, as browsers run no search in pages that are opened from files.
+    handler = partial(_QuietHandler, directory=str(folder))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        address = f"http://127.0.0.1:{server.server_address[1]}/index.html"
+        print(address, flush=True)
+        webbrowser.open(address)
+        server.serve_forever()
+
+
+def _build_docs(folder: Path) -> None:
     settings = Path(__file__).parents[2] / "docs" / "mkdocs.yml"
     build = (sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict")
     done = subprocess.run(
@@ -91,9 +109,11 @@ def docs(arguments: argparse.Namespace) -> None:
     )
     if done.returncode:
         raise InputError("the documentation could not be built: see above")
-    print(folder / "index.html")
-    if not arguments.out:
-        webbrowser.open((folder / "index.html").as_uri())
+
+
+class _QuietHandler(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *arguments: Any) -> None:
+        pass
 
 
 def completion(arguments: argparse.Namespace) -> None:
