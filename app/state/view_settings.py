@@ -42,7 +42,7 @@ SORTS = {
     "position": "place as packed in its interval",
     "shortened": "how much what is known shortened it",
 }
-DRAWN = {"some": "a few", "all": "all"}
+DRAWN = {"all": "all", "some": "a few"}
 # What single tabs can show.
 FIGURES = {
     "eta": "How does friction matter?",
@@ -109,7 +109,7 @@ class Looks(Seen):
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
     drawn: Any = param.Selector(
-        default="some", objects=list(DRAWN), doc="of which contacts intervals are drawn"
+        default="all", objects=list(DRAWN), doc="of which contacts intervals are drawn"
     )
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"

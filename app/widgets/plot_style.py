@@ -58,7 +58,7 @@ def palettes(dark: bool) -> dict[str, Any]:
         "sign": [BLUE, GREY, ORANGE],
         "neutral": NEUTRAL[dark],
         "plots": {
-            **{"seen": DARK, "original": ORIGINAL, "now": DOT, "states": STATES},
+            **{"seen": DARK, "original": ORIGINAL, "now": DOT, "states": STATES, "dots": now(dark)},
             **dict(zip(("eta1", "eta2", "eta3"), SERIES, strict=True)),
         },
         "scene": {
@@ -82,6 +82,11 @@ def lines(dark: bool) -> tuple[str, str]:
 def text(dark: bool) -> str:
     """Colour of words in plots, as the page's theme has it."""
     return "#ffffff" if dark else "rgba(0, 0, 0, 0.87)"
+
+
+def now(dark: bool) -> str:
+    """Colour of the small dots of the network on screen, over bars."""
+    return "#ffffff" if dark else "#12324f"
 
 
 def _faded(colour: tuple[int, ...], part: float) -> str:

@@ -24,9 +24,9 @@ from app.background.limits import LIMITS, NAMES, Limits, read_limits
 from app.explore.controls import Controls
 from app.explore.results_line import left_out
 from app.explore.status_line import StatusLine, power
-from app.explore.tabs.intervals.intervals import SOME, View, sorted_contacts
+from app.explore.tabs.intervals.intervals import View
+from app.explore.tabs.intervals.order import SOME, ordered
 from app.explore.tabs.tabs import TABS
-from app.packing import view as packing_view
 from app.packing.player import frames
 from app.packing.view import PackingView, exact_intervals
 from app.page import learns
@@ -50,7 +50,7 @@ from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, read_view, spelled
 from app.state.pulls import Hand
-from app.state.view_settings import Looks
+from app.state.view_settings import SORTS, Looks
 from app.state.visit import turns
 from app.widgets.progress import Progress
 from granforce import measures
@@ -594,50 +594,39 @@ def test_learn_has_a_door_of_its_own():
     assert not learns("") and not learns("?scene=groove") and not learns("?mu=0.1")
 
 
-def test_possible_is_in_the_legend_only_where_it_is_drawn(state):
+def test_the_sentence_of_the_intervals_says_what_is_drawn(state):
     state.choose(mu=1)
     wait_for(state)
     view = View(state)
-    assert not view.exact_item.visible
+    assert "pale" not in view.lead.object and f"dark: {STATES} random ones" in view.lead.object
     state.compute_exact()
-    assert view.exact_item.visible  # bounds are drawn as they arrive
+    assert "pale: exact bounds, as they are found" in view.lead.object
     wait_for(state)
-    assert view.exact_item.visible and view.exact_item.label.value == "possible"
+    assert "pale: every admissible network" in view.lead.object
+    state.choose(mu=0)
+    wait_for(state)
+    assert "Nowhere" in view.lead.object and "dark" not in view.lead.object
 
 
-def test_the_bar_of_the_line_to_be_dragged_says_what_is_to_be_reached(state):
+def test_the_axis_holds_every_bar_and_names_the_order_that_there_is(state):
+    state.looks.sort = "exact"
     view = View(state)
-    assert not len(view.invited.data["rank"])  # no exact intervals yet
+    label = view.drawing.figure.xaxis[0].axis_label
+    assert label.endswith("sorted by force as packed: no exact ΔFₙ yet")
     state.compute_exact()
+    label = view.drawing.figure.xaxis[0].axis_label
+    assert label.endswith("sorted by force as packed: exact bounds are being computed")
     wait_for(state)
-    replay, (goal,) = state.seen, view.invited.data["at"]
-    contact = replay.invited
-    assert view.contacts[int(view.invited.data["rank"][0]) - 1] == contact
-    assert goal == packing_view.goal(replay, exact_intervals(state.exact, replay))
-    high = state.exact["high"].values[contact, 0] / replay.force_scale
-    assert 0.9 * high - 0.1 < goal < high
-    state.looks.contact = 0
-    assert not len(view.invited.data["rank"])
-
-
-def test_one_bar_without_its_ends_is_drawn_until_a_force_was_dragged(state):
-    state.compute_exact()
-    wait_for(state)
-    state.looks.fresh = True
-    view = View(state)
-    assert view.contacts.tolist() == [state.seen.invited] and not view.exact_item.visible
-    assert np.isnan(view.bars.data["exact_high"]).all() and len(view.unknown.data["at"]) == 2
-    assert not len(view.invited.data["rank"])  # what is to be found out
-    assert "your guess" in view.guess_words.text and not view.guess.visible
-    assert view.guess_words.visible
-    view._guess(SimpleNamespace(y=3.5))
-    assert view.guess.visible and view.guess.location == 3.5 and "3.5" in view.guess_words.text
-    state.looks.contact = next(c for c in range(9) if c != state.seen.invited)
-    assert not view.guess.visible and "click" in view.guess_words.text  # of another force
-    state.looks.contact = None
-    state.looks.fresh = False
-    assert len(view.contacts) > 8 and view.exact_item.visible
-    assert np.isfinite(view.bars.data["exact_high"]).all() and not len(view.unknown.data["at"])
+    data, every = view.drawing.bars.data, len(state.replay.order)
+    assert view.drawing.figure.xaxis[0].axis_label == f"{every} contacts, sorted by exact ΔFₙ"
+    assert np.all(np.diff(data["exact_high"] - data["exact_low"]) > -1e-6)
+    assert view.drawing.figure.y_range.end > np.nanmax(data["exact_high"])
+    for sort in SORTS:  # all of them in any order
+        state.looks.sort = sort
+        assert sorted(view.drawing.bars.data["at"]) == list(range(every))
+        line, dots = view.drawing.line.glyph, view.drawing.packed.glyph
+        ascending = np.all(np.diff(view.drawing.bars.data["original"]) >= 0)
+        assert (line.line_alpha, dots.fill_alpha) == ((1, 0) if ascending else (0, 1))
 
 
 def test_another_friction_is_packed_as_is_usual_there(state):
@@ -1253,7 +1242,7 @@ def test_contacts_are_sorted_by_what_is_named(state, by):
         "exact": extent,
         "position": (replay.normal[0] - exact["low"]) / extent,
     }[by]
-    order = sorted_contacts(replay, exact, by)
+    order = ordered(replay, exact, by).contacts
     assert sorted(order) == list(range(len(value)))
     assert np.all(np.diff(value[order]) >= 0)
 
@@ -1263,29 +1252,30 @@ def test_intervals_take_nothing_over_while_hidden(state):
     view = View(state)
     state.choose(mu=1)
     wait_for(state)
-    assert len(view.bars.data["rank"]) == 0
-    state.looks.tab, state.looks.drawn = "intervals", "all"
-    assert len(view.bars.data["rank"]) == state.replay.normal.shape[1]
+    assert len(view.drawing.bars.data["rank"]) == 0
+    state.looks.tab = "intervals"
+    assert len(view.drawing.bars.data["rank"]) == state.replay.normal.shape[1]
 
 
 def test_few_bars_are_drawn_evenly_and_the_selected_one_among_them(state):
-    view, all_of_them = View(state), len(state.replay.order)
-    shown = view.bars.data["at"]
+    state.looks.drawn = "some"
+    drawing, all_of_them = View(state).drawing, len(state.replay.order)
+    shown = drawing.bars.data["at"]
     assert SOME / 2 <= len(shown) <= SOME < all_of_them
-    assert view.figure.xaxis.axis_label.startswith(f"{len(shown)} of {all_of_them} contacts")
+    assert drawing.figure.xaxis.axis_label.startswith(f"{len(shown)} of {all_of_them} contacts")
     state.looks.contact = int(np.setdiff1d(state.replay.order, shown)[0])
-    assert np.array_equal(np.sort(view.bars.data["at"]), np.sort([*shown, state.looks.contact]))
-    assert np.all(np.diff(view.bars.data["original"]) >= 0)
+    assert np.array_equal(np.sort(drawing.bars.data["at"]), np.sort([*shown, state.looks.contact]))
+    assert np.all(np.diff(drawing.bars.data["original"]) >= 0)
     state.looks.drawn = "all"
-    assert np.array_equal(view.bars.data["at"], state.replay.order)
+    assert np.array_equal(drawing.bars.data["at"], state.replay.order)
 
 
 def test_a_tap_on_a_bar_selects_its_contact(state):
     view = View(state)
     state.looks.drawn = "all"
-    view.bars.selected.indices = [4]
+    view.drawing.bars.selected.indices = [4]
     assert state.looks.contact == state.replay.order[4]
-    assert view.chosen.data["rank"] == [5.0]
+    assert view.drawing.chosen.data["rank"] == [5.0]
 
 
 def test_left_out_work_is_counted(library):

@@ -426,17 +426,15 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
     assert re.fullmatch(r"\de-\d+", page.locator("b.residual").text_content())
 
 
-def test_intervals_grow_with_the_walk_and_shrink_on_the_way_back(page):
-    def extent():
-        pairs = zip(column(page, "bars", "high"), column(page, "bars", "low"), strict=True)
-        return sum(high - low for high, low in pairs)
-
-    grown = []
-    for frame in (1, 4, KEPT, 4):
-        page.locator("input.scrub").fill(str(frame))
-        grown.append(extent())
-    assert grown[0] == 0 and grown[0] < grown[1] < grown[2]
-    assert grown[3] == pytest.approx(grown[1])
+def test_what_was_seen_stands_still_while_dots_move(page):
+    seen = [column(page, "bars", name) for name in ("low", "high")]
+    before = column(page, "bars", "now")
+    page.locator("input.scrub").fill("4")
+    page.wait_for_function(f"now => {MODEL}('bars').get_column('now')[0] !== now", arg=before[0])
+    assert [column(page, "bars", name) for name in ("low", "high")] == seen
+    now = column(page, "bars", "now")
+    inside = [a - 1e-6 <= x <= b + 1e-6 for a, x, b in zip(seen[0], now, seen[1], strict=True)]
+    assert all(inside)
 
 
 def test_to_and_fro_between_the_pinned_state_and_this_one(page):

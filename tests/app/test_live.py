@@ -74,7 +74,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     assert "as they are found" in state.source
     begun = browser.player.walk
     assert begun["room"] == 21 and len(begun["number"]) == 1 and begun["mu"] == 0.23
-    assert len(tab.growth.data["state"]) == 21
+    assert len(tab.growth.growth.data["state"]) == 21
     browser.run()
     assert not state.growing and state.work.live is None and not state.asked
     assert not browser.player.live and browser.player.walk["room"] == 0

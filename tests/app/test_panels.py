@@ -644,7 +644,7 @@ def test_figure_2_takes_what_the_stores_hold(state):
     view = perturb_view.View(state)
     view.what.value = "store"
     wait_for(state)
-    assert "like those on screen (2)" in view.told.object and len(view.plots.objects) == 2
+    assert "open symbols: 2 packings" in view.told.object and len(view.plots.objects) == 2
     force = view.plots.objects[0].object
     drawn = [r.data_source.data for r in force.renderers]
     rings = [np.asarray(d["x"]) for d in drawn if "x" in d and len(d["x"]) == 2]

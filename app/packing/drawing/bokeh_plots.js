@@ -3,8 +3,6 @@
 
 import { Handles, Layer, LAYERS } from "./plot_layer.js"
 
-const OFF_SCALE = 0.005 // of the bars, which may be longer than the axis
-
 export class Plots {
   /** hands: what takes hold of the dots of the bars, and of the point in force space. */
   constructor(document, onData, { dots, point }) {
@@ -96,31 +94,39 @@ export class Plots {
     const bars = this.find("bars"), at = bars?.get_column("at")
     if (!at) return
     this.filled = bars.data
-    const bottom = bars.get_column("exact_low"), top = bars.get_column("exact_high"), range = []
+    const bottom = bars.get_column("exact_low"), top = bars.get_column("exact_high")
+    let most = 0
     for (let k = 0; k < at.length; k++) {
       const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
       const [low, high] = [bounds.low[c], bounds.high[c]], none = isNaN(low) && isNaN(high)
       bottom[k] = none ? NaN : (isNaN(low) ? walk.low[c] : low) / unit
       top[k] = none ? NaN : (isNaN(high) ? walk.high[c] : high) / unit
-      if (!none) range.push(top[k])
+      if (top[k] > most) most = top[k]
     }
-    if (scale === "own") return
-    const axis = named(this.document, "bars_range"), most = range.sort((a, b) => b - a)
-    const end = 1.04 * most[Math.floor(OFF_SCALE * at.length)]
-    if (end > axis?.end) axis.end = end
+    if (scale !== "own") this.reachBars(most)
   }
 
-  showBars(bars, { walk, mixed, seen, low, high, held }, scale) {
+  /** The axis of forces reaches as far as the bars do. */
+  reachBars(most) {
+    const axis = named(this.document, "bars_range")
+    if (1.04 * most > axis?.end) axis.end = 1.04 * most
+  }
+
+  /** The forces now; of a walk under way what was seen, too, which stands still otherwise. */
+  showBars(bars, { walk, mixed, seen, low, high }, scale) {
     const column = (name) => bars.get_column(name)
     const at = column("at"), bottom = column("low"), top = column("high"), now = column("now")
+    const grows = Boolean(walk.numbers)
+    let reached = 0
     for (let k = 0; k < now.length; k++) {
       const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
       now[k] = mixed.normal[c] / unit
-      const least = seen ? low[c] / unit : now[k], most = seen ? high[c] / unit : now[k]
-      // What is on its way to a network not seen before is seen, too; what is pulled is no network found.
-      bottom[k] = held ? least : Math.min(least, now[k])
-      top[k] = held ? most : Math.max(most, now[k])
+      if (!grows) continue
+      bottom[k] = Math.min(seen ? low[c] / unit : now[k], now[k])
+      top[k] = Math.max(seen ? high[c] / unit : now[k], now[k])
+      if (top[k] > reached) reached = top[k]
     }
+    if (grows && scale !== "own") this.reachBars(reached)
     this.changed(bars, "bars")
   }
 

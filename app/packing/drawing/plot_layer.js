@@ -5,6 +5,7 @@ import { made } from "../../browser/dom.js"
 import { circle, line } from "../../browser/canvas_paths.js"
 
 const TRAIL = 4 // states that the trail in force space reaches back
+const PACKED = 1.25 // radius of a dot of the force as packed, px
 const DOT_REACH = 9 // px from a dot that still mean it
 const TOUCH_REACH = 22 // the same of a finger
 
@@ -75,16 +76,13 @@ export const LAYERS = {
       const top = y(high[k])
       context.fillRect(x(rank[k]) - half, top, 2 * half, y(low[k]) - top)
     }
-    context.strokeStyle = plots.colours.original
+    context.strokeStyle = context.fillStyle = plots.colours.original
     context.lineWidth = 1.5
-    curve(context, rank, original, x, y, rank.length)
+    if (fig.tags.includes("sorted")) curve(context, rank, original, x, y, rank.length)
+    else dots(context, rank, original, x, y, PACKED)
+    context.fillStyle = plots.colours.dots
+    dots(context, rank, now, x, y, radius)
     context.fillStyle = plots.colours.now
-    context.beginPath()
-    for (let k = 0; k < rank.length; k++) {
-      context.moveTo(x(rank[k]) + radius, y(now[k]))
-      context.arc(x(rank[k]), y(now[k]), radius, 0, 2 * Math.PI)
-    }
-    context.fill()
     const chosen = plots.find("chosen")?.get_column("rank")?.[0]
     const at = chosen === undefined ? -1 : rank.indexOf(chosen)
     if (at < 0) return
@@ -132,6 +130,15 @@ function spot(context, [px, py], plots) {
   circle(context, [px, py], 6)
   context.fill()
   context.stroke()
+}
+
+function dots(context, xs, ys, x, y, radius) {
+  context.beginPath()
+  for (let k = 0; k < xs.length; k++) {
+    context.moveTo(x(xs[k]) + radius, y(ys[k]))
+    context.arc(x(xs[k]), y(ys[k]), radius, 0, 2 * Math.PI)
+  }
+  context.fill()
 }
 
 function curve(context, xs, ys, x, y, count, from = 0) {

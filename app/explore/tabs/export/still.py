@@ -51,4 +51,4 @@ def figures(
     if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):
         space._outlined(replay, outlined)
     space.figure.sizing_mode = "scale_width"
-    return bars.figure, bars.growth_figure, space.figure
+    return bars.drawing.figure, bars.growth.figure, space.figure

@@ -1,0 +1,139 @@
+"""The plot of intervals: a pale and a dark bar for each contact, and a dot for its force now."""
+
+from collections.abc import Callable
+
+import numpy as np
+from bokeh.models import ColumnDataSource, Range1d, TapTool
+
+from granforce.types import Floats, Integers
+
+from ....packing.view import Bounds
+from ....results.replays import Replay
+from ....widgets.parts import MOVES, figure
+from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, now
+
+COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
+COLUMNS += ("whole_low", "whole_high")  # exact intervals without what is known
+APART = 100  # bars up to which there is room between them, and for large dots
+# Widths of what was possible before, is possible, and was seen, in that of one contact, and size
+# of dots, px; of few bars, and of many.
+FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.6)
+CARRYING = 0.1  # ⟨f_n⟩ as packed from which on a contact counts for the axis of its own unit
+SORTED = "sorted"  # tag of the figure where forces as packed ascend; see plot_layer.js
+
+
+class BarsFigure:
+    """Bars of the contacts drawn; the player rewrites `now`, and of a walk under way low, high."""
+
+    def __init__(self, choose: Callable[[int], object]) -> None:
+        """choose(contact): a bar was clicked."""
+        self.bars = ColumnDataSource({column: [] for column in COLUMNS}, name="bars")
+        self.chosen = ColumnDataSource({"rank": [], "low": [], "high": []}, name="chosen")
+        self.contacts: Integers = np.array([], dtype=int)
+        self.figure = fig = figure(
+            "intervals", None, "contacts", "normal force fₙ", height=320,
+            x_range=Range1d(0, 1), y_range=Range1d(0, 1, name="bars_range"),
+        )  # fmt: skip
+        fig.name = "bars_figure"
+        fig.xgrid.visible = False
+        fig.xaxis.update(major_label_text_alpha=0, major_tick_line_color=None)
+        self.layers = [
+            fig.vbar(
+                x="rank", bottom=f"{of}low", top=f"{of}high", width=1, source=self.bars,
+                line_color=None, fill_color=colour, fill_alpha=alpha,
+            )
+            for of, colour, alpha in (
+                ("whole_", PALE, 0.3), ("exact_", PALE, 1.0), ("", DARK, 1.0),
+            )
+        ]  # fmt: skip
+        _, exact, seen = self.layers
+        for layer in self.layers:
+            layer.nonselection_glyph = None
+        seen.name = "seen"  # see plot_layer.js
+        look = {"source": self.bars, "color": ORIGINAL, "nonselection_alpha": 1}
+        self.line = fig.line("rank", "original", source=self.bars, color=ORIGINAL, line_width=1.5)
+        self.packed = fig.scatter("rank", "original", size=2.5, **look)
+        self.dots = fig.scatter(
+            "rank", "now", source=self.bars, color=now(False), nonselection_alpha=1, name="dots"
+        )
+        for moving in (seen, self.line, self.packed, self.dots):
+            moving.tags = MOVES
+        fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
+        fig.add_tools(
+            hover(
+                [seen, exact],
+                ("contact", "@contact"),
+                ("now", "@now{0.000}"),
+                ("as packed", "@original{0.000}"),
+                ("seen", "@low{0.000} … @high{0.000}"),
+                ("possible", "@exact_low{0.000} … @exact_high{0.000}"),
+            ),
+            TapTool(renderers=[exact, seen, self.dots]),
+        )
+
+        def tapped(name: str, old: object, new: list[int]) -> None:
+            if new:
+                choose(int(self.contacts[new[0]]))
+                self.bars.selected.indices = []
+
+        self.bars.selected.on_change("indices", tapped)
+
+    def show(
+        self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, own: bool
+    ) -> int:
+        """Draw these contacts; how many bars reach beyond the axis.
+
+        before: exact bounds without what is known; own: forces in units of that as packed.
+        """
+        self.contacts = contacts
+        original = replay.normal[0, contacts]
+        unit = original if own else np.ones_like(original)
+        ends = {
+            **_ends("whole_", before, contacts),
+            **_ends("exact_", exact, contacts),
+            "low": replay.low[contacts, 0],
+            "high": replay.high[contacts, 0],
+            "now": original,
+            "original": original,
+        }
+        with np.errstate(invalid="ignore", divide="ignore"):
+            scaled = {name: (values / unit).astype(np.float32) for name, values in ends.items()}
+        self.bars.data = scaled | {
+            "rank": np.arange(1, len(contacts) + 1, dtype=np.float32),
+            "at": contacts.astype(np.int32),
+            "contact": replay.backbone[contacts].astype(np.int32),
+        }
+        *widths, size = FEW if len(contacts) <= APART else MANY
+        for renderer, width in zip(self.layers, widths, strict=True):
+            renderer.glyph.width = width
+        self.dots.glyph.size = size
+        set_range(self.figure.x_range, 0, len(contacts) + 1)
+        highest = np.fmax.reduce([scaled[name] for name in ("whole_high", "exact_high", "high")])
+        counted = original >= CARRYING if own else np.ones(len(original), dtype=bool)
+        top = 1.04 * float(np.nanmax(highest[counted], initial=1.0))
+        set_range(self.figure.y_range, 0, top)
+        return int(np.sum(highest > top))
+
+    def draw_packed(self, ascending: bool) -> None:
+        """Forces as packed as a line where they ascend; else as dots."""
+        # Not by `visible`, which the player sets.
+        self.line.glyph.line_alpha = float(ascending)
+        self.packed.glyph.update(fill_alpha=float(not ascending), line_alpha=float(not ascending))
+        self.figure.tags = [SORTED] if ascending else []
+
+    def mark(self, contact: int | None) -> None:
+        """Show where a contact stands, if it is drawn."""
+        at = np.flatnonzero(self.contacts == contact)
+        low, high = self.figure.y_range.start, self.figure.y_range.end
+        rank = self.bars.data["rank"][at].tolist() if len(at) else []
+        self.chosen.data = {"rank": rank, "low": [low] * len(at), "high": [high] * len(at)}
+
+
+def _ends(of: str, bounds: Bounds, contacts: Integers) -> dict[str, Floats]:
+    none = np.full(len(contacts), np.nan)
+    return {f"{of}{side}": bounds[side][contacts] if bounds else none for side in ("low", "high")}
+
+
+def set_range(axis: Range1d, low: float, high: float) -> None:
+    """Have an axis reach from low to high, also after a reset."""
+    axis.update(start=low, end=high, reset_start=low, reset_end=high)

@@ -1,0 +1,64 @@
+"""In which order contacts are drawn, and which of them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.types import Floats, Integers
+
+from ....packing.view import Bounds
+from ....results.replays import Replay
+from ....state.known import Narrowed
+from ....state.view_settings import SORTS
+
+MOST_BARS = 3000  # more than there are pixels would only cost time; of more, evenly many are drawn
+SOME = 16  # bars that can be told apart at a glance
+USUAL = "original"
+
+
+class Order(NamedTuple):
+    """Contacts (N_c,) as positions in the backbone, and what they are sorted by in words."""
+
+    contacts: Integers
+    words: str
+    as_packed: bool  # whether forces as packed ascend
+
+
+def ordered(
+    replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None = None, coming: bool = False
+) -> Order:
+    """All contacts in the order that `by`, one of SORTS, names, as far as it is known.
+
+    narrowed: what known forces leave open; coming: whether exact bounds are being computed.
+    """
+    value = _value(replay, exact, by, narrowed)
+    if value is None:
+        why = "exact bounds are being computed" if coming else f"no {SORTS[by]} yet"
+        if by == "shortened":
+            why = "no force is held"
+        return Order(replay.order, f"{SORTS[USUAL]}: {why}", as_packed=True)
+    order = replay.order if by == USUAL else np.argsort(value, kind="stable")
+    return Order(order, SORTS[by], as_packed=by == USUAL)
+
+
+def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) -> Floats | None:
+    """What contacts are sorted by, ascending; None where it is not known."""
+    if by == USUAL:
+        return replay.normal[0]
+    if by == "extent":
+        return replay.high[:, 0] - replay.low[:, 0]
+    if by == "shortened":
+        return None if narrowed is None else -narrowed.shortened
+    if not exact:
+        return None
+    extent = exact["high"] - exact["low"]
+    if by == "exact":
+        return extent
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (replay.normal[0] - exact["low"]) / extent
+
+
+def picked(order: Integers, most: int, named: list[int]) -> Integers:
+    """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
+    step = -(-len(order) // most)
+    return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))
