@@ -9,4 +9,4 @@ how much a visitor may ask for, see app/limits.py.
 # work goes on that may still need them: nothing but the call belongs here.
 from .page import page
 
-page().servable(location=False)  # see page._query
+page().servable()

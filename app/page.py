@@ -4,7 +4,6 @@ from typing import Any
 from urllib.parse import parse_qs
 
 import panel as pn
-from bokeh.document import Document
 
 from .browser.panel_patches import answer_with_lock, mend_late_views
 from .explore.explore_page import explore_page
@@ -19,20 +18,11 @@ def page() -> Any:
     assert document is not None  # a page is made for one
     mend_late_views(document)
     answer_with_lock()
-    query = _query(document)
+    query = (pn.state.location.search if pn.state.location else "") or ""
     asked = small_scenes.asked(query)
     if learns(query) or asked.scene != small_scenes.MANY:
         return learn_page(document, query)
     return explore_page(document, asked.query)
-
-
-def _query(document: Document) -> str:
-    """The query of the link that opened a page, unread.
-
-    Panel's Location reads numbers in it, and fails on those of more than 4300 digits.
-    """
-    context: Any = document.session_context
-    return "" if context is None else "".join(context.request.uri.partition("?")[1:])
 
 
 def learns(query: str) -> bool:

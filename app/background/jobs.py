@@ -91,26 +91,18 @@ class Pool:
         """The job to be run now, taken from those that wait; None: none of them yet."""
         now = time.monotonic()
         self._waiting = [job for job in self._waiting if not job.ended]
-        ready = [job for job in self._waiting if job.not_before <= now and self._has_place(job)]
-        if not ready:
+        ready = [job for job in self._waiting if job.not_before <= now]
+        if not ready or len(self._running) >= self._workers + self._extra:
             return None
         job = min(ready, key=self._under_way)  # of several the one that came first
+        if len(self._running) >= self._workers:
+            of_address, of_page = self._under_way(job)
+            long = sum(now - since > LONG for _, since in self._running)
+            # One place is left to those of another address, however many pages one has.
+            if long < self._workers or of_page or of_address > self._workers:
+                return None
         self._waiting.remove(job)
         return job
-
-    def _has_place(self, job: Job) -> bool:
-        """Whether a thread may take this job just now."""
-        count = len(self._running)
-        if count < self._workers or count >= self._workers + self._extra:
-            return count < self._workers
-        of_address, of_page = self._under_way(job)
-        now = time.monotonic()
-        long = sum(now - since > LONG for _, since in self._running)
-        # The last place is kept for addresses with nothing under way and for cheap work, however
-        # many pages others have: behind a proxy all visitors may share one address.
-        last = count == self._workers + self._extra - 1
-        kept = of_address > (0 if last else self._workers) and not job.cheap
-        return long >= self._workers and not of_page and not kept
 
     def _under_way(self, job: Job) -> tuple[int, int]:
         """How many jobs of its visitor's address, and of its page, are run just now."""
@@ -134,14 +126,10 @@ reading = Pool(2, "granforce-read")
 
 @dataclass(frozen=True)
 class Work:
-    """Work for a Job that will take turns: `wants` names them, so that others wait for it.
-
-    cheap: whether it is known to take some seconds only.
-    """
+    """Work for a Job that will take turns: `wants` names them, so that others wait for it."""
 
     run: Callable[[Job], Any]
     wants: tuple[Any, ...]
-    cheap: bool = False
 
     def __call__(self, job: Job) -> Any:
         """Do it."""
@@ -184,7 +172,6 @@ class Job:
         self.keeps = False  # whether what it has so far is a result
         self._stop = threading.Event()
         self.turns: list[Turn] = []  # that it has just now
-        self.cheap = isinstance(work, Work) and work.cheap
         self._wants = [turn_of(named) for named in (work.wants if isinstance(work, Work) else ())]
         for turn in self._wants:
             turn.join(self)

@@ -21,6 +21,7 @@ FROM_BROWSER = {
     "FrictionSlider": ({"typed": str},),
     "Handover": ({"key": str},),  # of a file that is asked for
     "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; what to measure next
+    "Lesson": ({"want": str, "name": str},),  # what a chapter shows
     "LoadSlider": ({"push": True}, {"gave": True}),  # was moved; has come to where disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
     "NumberField": ({"typed": str},),  # and is no number
@@ -42,7 +43,7 @@ FROM_BROWSER = {
     ),
     "Progress": ({"stop": True}, {"cancel": True}),
     "Results": ({"measure": True},),  # the volume of S
-    "Small": (
+    "Workbench": (
         {"scene": str},
         {"scene": str, "mu": float},
         {"query": str},  # gone back or forward to
@@ -79,6 +80,10 @@ TO_BROWSER = {
         {"name": str, "caption": dict, "width": int},  # with the plots, in mm
         {"rest": True},  # nothing comes
     ),
+    "Lesson": (
+        {"what": str, "name": str, "given": dict},  # what was asked for
+        {"what": str, "name": str, "error": str},
+    ),
     "Player": (
         {"held": None},  # the states are on screen again
         {"held": NETWORK | {"pull": list}},
@@ -90,7 +95,7 @@ TO_BROWSER = {
         {"states": STATES, "number": int},
         {"bounds": {"low": Array, "high": Array}, "number": int},
     ),
-    "Small": (
+    "Workbench": (
         {"error": str},
         {"fall": [float, ...]},  # motion (3 N) of the disks; empty where nothing falls
         {"file": str},  # base64

@@ -1,25 +1,44 @@
-"""The page of Learn: small scenes under the header of both doors."""
+"""The page of Learn: the lesson, or the workbench of a small scene."""
 
+from functools import partial
 from typing import Any
+from urllib.parse import parse_qs
 
+import panel as pn
 from bokeh.document import Document
 
 from ..background.jobs import Task, computing
+from ..results.library import Library
 from ..state import visit
 from ..widgets.header import Header
 from ..widgets.page_frame import framed
+from .lesson import Lesson
 from .model import small_scenes
-from .small_scene import FIRST_STEPS, Small
+from .model.lesson_data import Packings
+from .workbench.workbench import Workbench
+
+KEYS = [
+    ["arrows", "move the marker, or the dot"],
+    ["Tab", "goes from the plot to the buttons"],
+]
 
 
 def learn_page(document: Document, query: str) -> Any:
-    """What an address shows of Learn; it asks no store."""
+    """What an address shows of Learn: chapters, or with `scene` the workbench."""
     asked = small_scenes.asked(query)
-    if asked.scene == small_scenes.MANY:
-        asked = asked._replace(scene=small_scenes.FIRST)
-    task = Task(computing, visit.turns(document), visit.visitor(document))
-    header = Header(door="learn", dark=asked.dark)
-    view = Small(asked, task, len(FIRST_STEPS), step=asked.step, dark=asked.dark)
-    header.link(view, dark="dark")
-    visit.at_end(task.close)
+    wake, visitor = visit.turns(document), visit.visitor(document)
+    given = parse_qs(query.lstrip("?"), keep_blank_values=True)
+    alone = given.get("embed") == ["1"]
+    header = None if alone else Header(door="learn", dark=asked.dark, keys=KEYS)
+    if "learn" in given:
+        library = pn.state.as_cached("library", Library)
+        packings = pn.state.as_cached("packings of the lesson", partial(Packings, library))
+        view: Any = Lesson(packings, wake, visitor, dark=asked.dark, alone=alone)
+        visit.at_end(view.close)
+    else:
+        task = Task(computing, wake, visitor)
+        view = Workbench(asked, task, dark=asked.dark)
+        visit.at_end(task.close)
+    if header is not None:
+        header.link(view, dark="dark")
     return framed(header, [view], dark=asked.dark)

@@ -65,8 +65,7 @@ def states(library: Library, selection: Selection) -> Work:
                 raise InputError("these states were removed from the cache; ask for them again")
         return library.shown(cell)
 
-    wants = (selection.kind, params), ("packing", selection.packing)
-    return Work(work, wants, cheap=not selection.dear)
+    return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
 
 
 @contextmanager

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
@@ -12,7 +10,7 @@ from granforce.records import InputError, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 
-from ..background.limits import Limits, short
+from ..background.limits import Limits
 
 # Names on screen of kinds.RELAXATIONS; the first is what a new walk takes unless told otherwise.
 SOLVERS = {
@@ -255,33 +253,22 @@ def _read_selection(given: dict[str, str]) -> Selection:
         raise InputError("this link names an unknown source of states")
     mu = friction(given.pop("mu"))
     packed = friction(given.pop("packed", mu))
-    rest = {
-        "states": _whole("states", given.pop("states", "200")),
-        "seed": _whole("walkseed", given.pop("walkseed", "0")),
-    }
+    rest = {"states": int(given.pop("states", 200)), "seed": int(given.pop("walkseed", 0))}
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
         return Selection(packing, mu, kind, relax, **rest)
     made = select(
-        _whole("n", given.pop("n", "400")),
+        int(given.pop("n", 400)),
         mu,
-        _whole("seed", given.pop("seed", "1")),
+        int(given.pop("seed", 1)),
         packed,
         given.pop("box", "square"),
         kind=kind,
         relax=relax,
         **rest,
     )
-    casts: dict[str, Callable[[str], Any]] = {"radii": str, "sweeps": partial(_whole, "sweeps")}
+    casts = {"radii": str, "sweeps": int}
     options = {name: casts.get(name, float)(given.pop(name)) for name in OPTIONS if name in given}
     if ":" not in options.get("radii", ":"):
         raise InputError("radii in a link are named distributions")
     return made._replace(packing=made.packing | options)
-
-
-def _whole(name: str, text: str) -> int:
-    """The whole number that is written; InputError otherwise, and beyond 4300 digits."""
-    try:
-        return int(text)
-    except ValueError:
-        raise InputError(f"{name} is no readable whole number: {short(text)}") from None

@@ -1,7 +1,9 @@
 """A small store, the app served from it, and pages of a browser, for the app's tests."""
 
+import json
 import re
 
+import numpy as np
 import pytest
 from serving import (
     CHROMIUM,
@@ -23,6 +25,7 @@ from serving import (
 from small_store import cell_parameters
 from visitor import wait_for
 
+from app.browser.bundle import APP
 from app.results.library import Library
 from app.state.app_state import AppState
 from granforce.study import cells as study
@@ -219,3 +222,40 @@ def visited(library):
 def state(visited):
     """The state of a page that has come to rest."""
     return visited()
+
+
+SCRIPTS = "http://scripts/"
+
+
+@pytest.fixture(scope="module")
+def blank(chromium):
+    """A page that imports scripts as the modules they are, and nothing else."""
+    page = chromium.new_page()
+    page.route(f"{SCRIPTS}**", _answer)
+    page.goto(SCRIPTS)
+    return page
+
+
+def _answer(route):
+    name = route.request.url.removeprefix(SCRIPTS)
+    if name.endswith(".js"):
+        route.fulfill(path=APP / name, content_type="text/javascript")
+    else:
+        route.fulfill(body="<!doctype html>", content_type="text/html")
+
+
+@pytest.fixture
+def run(blank):
+    """run(scripts, function, given): what a function of their exports and of given returns."""
+
+    def run(scripts, function, **given):
+        imports = ", ".join(f'import("./{name}.js")' for name in scripts.split())
+        return blank.evaluate(
+            f"""async (given) => {{
+                const parts = await Promise.all([{imports}])
+                return ({function})(Object.assign({{}}, ...parts), given)
+            }}""",
+            json.loads(json.dumps(given, default=np.ndarray.tolist)),
+        )
+
+    return run

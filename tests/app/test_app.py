@@ -19,7 +19,7 @@ import granforce as gf
 from app.background import jobs as app_jobs
 from app.background import limits
 from app.background.gc_pauses import settle
-from app.background.jobs import Job, Pool, Task, Visitor, Work
+from app.background.jobs import Job, Pool, Task, Visitor
 from app.background.limits import LIMITS, NAMES, Limits, read_limits
 from app.explore.controls import Controls
 from app.explore.results_line import left_out
@@ -854,7 +854,7 @@ class Gate:
     def __init__(self, pool):
         self.pool, self.begun, self.doors = pool, [], {}
 
-    def job(self, name, visitor, cheap=False):
+    def job(self, name, visitor):
         """A job of this name for a visitor."""
         door = self.doors[name] = threading.Event()
 
@@ -862,7 +862,7 @@ class Gate:
             self.begun.append(name)
             door.wait(30)
 
-        return Job(Work(work, wants=(), cheap=cheap), self.pool, visitor=visitor)
+        return Job(work, self.pool, visitor=visitor)
 
     def until(self, *names):
         """Wait until exactly these have begun."""
@@ -907,35 +907,6 @@ def test_who_has_nothing_under_way_does_not_wait_for_long_jobs_of_others(monkeyp
     gate.until("hostile 0", "hostile 1", "hostile 6")  # of a third page
     jobs.append(gate.job("of another", OTHER))
     gate.until("hostile 0", "hostile 1", "hostile 6", "of another")
-    for door in gate.doors.values():
-        door.set()
-    assert all(job.wait(30) for job in jobs)
-
-
-def test_cheap_work_does_not_wait_for_long_jobs_of_its_own_address(monkeypatch):
-    """As behind a proxy, where all visitors share one."""
-    monkeypatch.setattr(app_jobs, "LONG", 0.0)
-    gate = Gate(Pool(2, "test", extra=2))
-    jobs = [gate.job(f"hostile {k}", HOSTILE[k]) for k in range(4)]
-    gate.until("hostile 0", "hostile 1", "hostile 2")
-    jobs.append(gate.job("cheap", Visitor("there", "e"), cheap=True))
-    gate.until("hostile 0", "hostile 1", "hostile 2", "cheap")
-    for door in gate.doors.values():
-        door.set()
-    assert all(job.wait(30) for job in jobs)
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_the_last_place_is_kept_from_addresses_with_work_under_way(workers, monkeypatch):
-    monkeypatch.setattr(app_jobs, "LONG", 0.0)
-    gate = Gate(Pool(workers, "test", extra=workers))
-    visitors = [Visitor(address, page) for page in "ab" for address in ("one", "two")[:workers]]
-    jobs = []
-    for k, visitor in enumerate(visitors):
-        jobs.append(gate.job(f"hostile {k}", visitor))
-        gate.until(*(f"hostile {other}" for other in range(min(k + 1, 2 * workers - 1))))
-    jobs.append(gate.job("third", OTHER))
-    gate.until(*(f"hostile {other}" for other in range(2 * workers - 1)), "third")
     for door in gate.doors.values():
         door.set()
     assert all(job.wait(30) for job in jobs)

@@ -1,47 +1,9 @@
 """Arithmetic of what the page draws, script by script: on a blank page, without a server."""
 
-import json
-
 import numpy as np
 import pytest
 
 from app.browser.bundle import APP
-
-ADDRESS = "http://scripts/"
-
-
-@pytest.fixture(scope="module")
-def blank(chromium):
-    """A page that imports scripts as the modules they are, and nothing else."""
-    page = chromium.new_page()
-    page.route(f"{ADDRESS}**", _answer)
-    page.goto(ADDRESS)
-    return page
-
-
-def _answer(route):
-    name = route.request.url.removeprefix(ADDRESS)
-    if name.endswith(".js"):
-        route.fulfill(path=APP / name, content_type="text/javascript")
-    else:
-        route.fulfill(body="<!doctype html>", content_type="text/html")
-
-
-@pytest.fixture
-def run(blank):
-    """run(scripts, function, given): what a function of their exports and of given returns."""
-
-    def run(scripts, function, **given):
-        imports = ", ".join(f'import("./{name}.js")' for name in scripts.split())
-        return blank.evaluate(
-            f"""async (given) => {{
-                const parts = await Promise.all([{imports}])
-                return ({function})(Object.assign({{}}, ...parts), given)
-            }}""",
-            json.loads(json.dumps(given, default=np.ndarray.tolist)),
-        )
-
-    return run
 
 
 def test_every_script_is_a_module_by_itself(run):
@@ -379,23 +341,3 @@ def test_the_point_in_force_space_stays_within_the_outline(run, target, reached)
         target=target,
     )  # fmt: skip
     assert normal == pytest.approx(reached, abs=1e-6)
-
-
-def test_a_guess_stands_on_the_axis_where_it_was_put(run):
-    before, along, value, within = run(
-        "learn/drawing/guess_marker",
-        """({ Flag }) => {
-            const flag = new Flag(), [near, far] = [[], []]
-            flag.on({ d: 0, at: 300, ends: [50, 550], now: 200, zero: 100, one: 300 })
-            const before = [flag.value, flag.along > 200, flag.near(flag.along, 292)]
-            flag.move(400, 250)
-            const put = [flag.along, flag.value]
-            flag.move(9000, 250)
-            const most = flag.along
-            flag.on({ d: 1, at: 60, ends: [500, 10], now: 300, zero: 400, one: 200 })
-            flag.move(60, 450) // below nothing
-            return [before, ...put, [most, flag.value]]
-        }""",
-    )
-    assert before == [None, True, True]
-    assert along == 400 and value == 1.5 and within == [550, 0]

@@ -118,15 +118,6 @@ def test_a_link_with_the_largest_numbers_computes_nothing(page, address, names, 
     assert page.get_by_role("button", name="Cancel").count() == 0
 
 
-@pytest.mark.parametrize("name", ["seed", "n", "states", "sweeps"])
-def test_a_number_of_5000_digits_is_told_in_one_line(page, address, name):
-    """Python reads no more than 4300 of them."""
-    page.goto(f"{address}?mu=0.2&{name}={'9' * 5000}")
-    painted(page)
-    told = page.get_by_text(f"this link cannot be read: {name} is no readable whole number: '999")
-    told.filter(visible=True).first.wait_for()
-
-
 def test_the_largest_allowed_of_everything_can_be_cancelled(page, address):
     # But of μ: at 1000 a packing may have one network only, whose walk ends before it is seen.
     largest = {

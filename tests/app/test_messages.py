@@ -13,7 +13,8 @@ from app.explore import explore_page, friction_slider, page_address, results_lin
 from app.explore.tabs.intervals import known_forces
 from app.explore.tabs.push import load_slider
 from app.explore.tabs.your_packing import my_computations
-from app.learn import small_scene
+from app.learn import lesson
+from app.learn.workbench import workbench
 from app.packing import player
 from app.packing.replay import stream
 from app.state.known import Knowledge
@@ -24,9 +25,9 @@ COMPONENTS = {
     kind.__name__: kind
     for kind in (
         page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider,
-        file_buttons.Handover, known_forces.Known, load_slider.LoadSlider,
+        file_buttons.Handover, known_forces.Known, lesson.Lesson, load_slider.LoadSlider,
         my_computations.Mine, number.NumberField, player.Player, progress.Progress,
-        results_line.Results, small_scene.Small, status_line.StatusLine,
+        results_line.Results, status_line.StatusLine, workbench.Workbench,
     )
 }  # fmt: skip
 # What a player's message is handed on to.

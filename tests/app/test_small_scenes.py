@@ -8,7 +8,7 @@ import pytest
 import granforce as gf
 from app.background.jobs import Task
 from app.learn.model import small_scenes
-from app.learn.small_scene import Small
+from app.learn.workbench.workbench import Workbench
 from granforce.records import InputError
 from granforce.study import hulls
 
@@ -17,21 +17,20 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
 
 
 @pytest.mark.parametrize(
-    ("query", "scene", "mu", "step"),
+    ("query", "scene", "mu"),
     [
-        ("", "many", None, 0),
-        ("?scene=box&mu=0.3", "box", 0.3, 0),
-        ("?scene=groove&tour=2", "groove", None, 2),
-        ("?scene=elsewhere", "groove", None, 0),
-        ("?scene=many", "many", None, 0),
-        ("?mu=0.1&n=30", "many", 0.1, 0),  # links from before there were scenes
-        ("?tour=3", "many", None, 3),
-        ("?scene=box&mu=steep", "box", None, 0),
+        ("", "many", None),
+        ("?scene=box&mu=0.3", "box", 0.3),
+        ("?scene=groove", "groove", None),
+        ("?scene=elsewhere", "groove", None),
+        ("?scene=many", "many", None),
+        ("?mu=0.1&n=30", "many", 0.1),  # links from before there were scenes
+        ("?scene=box&mu=steep", "box", None),
     ],
 )
-def test_links_name_a_scene(query, scene, mu, step):
+def test_links_name_a_scene(query, scene, mu):
     asked = small_scenes.asked(query)
-    assert (asked.scene, asked.mu, asked.step) == (scene, mu, step)
+    assert (asked.scene, asked.mu) == (scene, mu)
     assert "scene" not in asked.query
     assert not asked.dark and small_scenes.asked(f"{query or '?scene=groove'}&dark=1").dark
 
@@ -160,7 +159,7 @@ def test_what_cannot_be_built_is_refused(text):
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Small(small_scenes.asked("?scene=column"), Task(), 10)
+    view = Workbench(small_scenes.asked("?scene=column"), Task())
     told = []
     view.tell = told.append
     _at_rest(view)

@@ -8,11 +8,8 @@ const SEEN = 0.03 // part of the rail: how wide a bar is at least, to be seen be
 export class Bars {
   constructor(host) { this.host = host; this.rows = [] }
 
-  /**
-   * ends: [least, largest] of each contact, known otherwise where S is not drawn whole; fresh: nothing was
-   * dragged yet, and what there is to find out is not told.
-   */
-  draw(body, lit, ends, fresh) {
+  /** ends: [least, largest] of each contact, known otherwise where S is not drawn whole. */
+  draw(body, lit, ends) {
     this.host.hidden = body.empty
     if (body.empty) return
     if (this.rows.length !== body.count) this.begin(body.count)
@@ -26,7 +23,7 @@ export class Bars {
       const wide = high - low < 1e-9 * body.scaleOf() ? 0 : Math.max(SEEN, (at(high) - at(low)) / 100)
       row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
       row.tell("dot", `translateX(${at(value)}%)`)
-      row.tell("value", `${number(value)}${fresh && wide ? "" : range(low, high, body.scaleOf())}`)
+      row.tell("value", `${number(value)}${range(low, high, body.scaleOf())}`)
     })
   }
 

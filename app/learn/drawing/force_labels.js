@@ -52,7 +52,7 @@ export function drawNames(arrows, F) {
     write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
   }
   const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])
-  if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
+  if (load > 1e-9) write(cx, cy - 0.55 * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
   drawParts(arrows, arrows.ends()[0], F)
 }
 

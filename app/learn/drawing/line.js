@@ -3,27 +3,23 @@
 import { line } from "../../browser/canvas_paths.js"
 import { forceName, number } from "../model/sentences.js"
 
-const UNKNOWN = 56 // pixels beyond what was found of a line, where a question mark stands: clear of the number
 const TICKS = 70 // pixels between two numbers of an axis, at least
 
-/** The line, with what stops it at its ends; in fog only what was found of it. */
+/** The line, with what stops it at its ends. */
 export function drawSegment(space) {
   const { context: g, body, look, easel } = space
-  const whole = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = whole[0][1]
-  const known = space.fog ? space.been.reached(space, whole) : whole.map((at) => ({ at, found: true })), ends = known.map(({ at }) => at)
+  const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
   const index = axisForce(body, look.contact)
-  if (index !== null) drawAxis(space, index, space.fog ? y0 : Math.min(easel.high - 46, y0 + 80)) // in fog the dot is on it
+  if (index !== null) drawAxis(space, index, Math.min(easel.high - 46, y0 + 80))
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
-  known.forEach(({ at, found }, k) => { if (!found && !look.fresh) space.write(at[0] + (at[0] < whole[k][0] ? UNKNOWN : -UNKNOWN), y0, "?", look.edge, 22) })
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"
   let before = null // words of the other end
   for (const side of ends.length > 1 ? body.sides : []) {
-    if (!known[side.corners[0]].found) continue
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
     const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
@@ -48,17 +44,12 @@ export function drawAxis(space, index, at, d = 0) {
   const [zero, slope] = space.over ? [0, 1] : [body.origin[index], value(space.moving(body.u, 1, 0)) - value(body.u)]
   const place = (v) => space.px(d ? [0, (v - zero) / slope] : [(v - zero) / slope, 0])[d]
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
-  const told = look.fresh || space.fog ? [] : extremes(space, value, d) // once something was dragged: they are there to be found
-  const marked = [...told.map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
+  const marked = [...extremes(space, value, d).map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
     .map((mark) => ({ ...mark, x: mark.place[d] }))
   const own = look.axes?.get(index) // the colour that its arrows have
   const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
-  const goal = space.goal !== undefined && index === 2 * space.read.at(-1) ? place(space.goal) : NaN
-  const beside = (x, text, colour) => {
-    const left = goal > x && goal < x + 50 // or the goal's line would run through it
-    return d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(left ? x - 5 : x + 5, at - 10, text, colour, 12, left ? "right" : "left")
-  }
+  const beside = (x, text, colour) => (d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(x + 5, at - 10, text, colour, 12, "left"))
   g.strokeStyle = own ?? look.edge
   g.lineWidth = 1
   const least = index % 2 ? ends[0] : (d ? Math.min : Math.max)(ends[0], place(0)) // no normal force is below 0
@@ -71,8 +62,6 @@ export function drawAxis(space, index, at, d = 0) {
     ticks.push([x, String(Number((k * step).toPrecision(6)))])
   }
   for (const [x, text] of ticks) write(x, text, look.ink, 11)
-  if (index === 2 * space.read.at(-1)) space.flag.on({ d, at, ends, now: place(value(body.u)), zero: place(0), one: place(1) })
-  if (goal > Math.min(...ends) && goal < Math.max(...ends)) drawGoal(space, goal, at, d)
   g.lineWidth = 1
   g.setLineDash([2, 4])
   for (const { x, place: there, colour } of marked) {
@@ -93,19 +82,6 @@ function extremes(space, value, d) {
   const all = body.whole ? body.corners.map(({ u, cap }) => ({ v: value(u), place: space.px(space.flat(u)), cap })) : shadow
   all.sort((a, b) => a.v - b.v)
   return all.length ? [all[0], all.at(-1)].filter(({ cap }) => !cap) : []
-}
-
-/** What the force on an axis is to pass: a line across S, with its number. */
-function drawGoal(space, x, at, d) {
-  const { context: g, body, look, easel } = space, far = d ? easel.wide - 16 : space.px(space.flat(body.u))[1] - 52
-  g.strokeStyle = look.hand
-  g.lineWidth = 1.2
-  g.setLineDash([6, 5])
-  line(g, ...[at, far].map((end) => (d ? [end, x] : [x, end])))
-  g.setLineDash([])
-  const [px, py] = d ? [far - 46, x - 12] : [x, far - 10]
-  space.write(px, py, `goal: below ${space.goal}`, look.hand, 13)
-  for (const place of [[px, py], d ? [far, x] : [x, far + 30]]) space.free(place, 60, 24)
 }
 
 /** The name of an axis: below it, at y, or along the left edge. */

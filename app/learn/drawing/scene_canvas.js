@@ -8,7 +8,6 @@ import { circle, line } from "../../browser/canvas_paths.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
-const QUIET = 0.5 // opacity of forces that are not spoken of yet
 const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */
@@ -238,7 +237,6 @@ export class Arrows {
       g.globalAlpha = 1
       this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
-    g.globalAlpha = look.fresh && body.crowded && !own && !lit ? QUIET : 1 // at first only those that are plotted count
     const colour = lit ? look.hand : slides ? look.warm : (!apart && own) || look.cold, thick = lit || (own && !apart) ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
     if (apart) this.arrow(px, py, inward.map((v) => v * normal), own, 3.5)

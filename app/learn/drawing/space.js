@@ -3,9 +3,6 @@
 
 import { distance, dot, solve } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
-import { Flag } from "./guess_marker.js"
-import { Fog } from "../../obsolete/fog.js"
-import { shadeGoal } from "../../obsolete/goal.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { circle, line, polygon } from "../../browser/canvas_paths.js"
 import { drawName, readBy } from "./axis_readings.js"
@@ -32,8 +29,6 @@ export class Space {
     this.shadow = [0, 2] // forces that are its axes above three dimensions: 2 c for f_n, 2 c + 1 for f_t
     this.outline = { points: [], stale: true } // of S on them, flat, by linear programs
     this.dots = []
-    this.flag = new Flag() // a guess of what is asked, while `flagged`
-    this.been = new Fog() // what was found of S, while that is in fog
     const at = (event) => this.easel.at(event)
     canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
     canvas.addEventListener("pointermove", (event) => this.moved(...at(event)))
@@ -192,7 +187,6 @@ export class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    if (this.fog) this.been.visit(this)
     if (body.h === 1) drawSegment(this)
     if (this.over) {
       drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
@@ -201,44 +195,23 @@ export class Space {
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) drawSolid(this)
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
-    if (this.fog && this.over) this.been.draw(this)
-    if (this.flagged && this.flag.axis) this.flag.draw(this)
     this.drawPath(path)
-    const at = this.flat(body.u), [x, y] = this.px(at)
+    const [x, y] = this.px(this.flat(body.u))
     circle(g, [x, y], 8)
     g.fillStyle = look.hand
     g.fill()
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
-    if (this.ray) this.write(x + 12, y + 18, `${(at[1] / at[0]).toFixed(1)} ×`, look.hand, 13, "left")
     const determined = !body.h || (body.whole && body.corners.length === 1)
     if (determined) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
-    else if (look.fresh && !(this.flagged && this.flag.value === null)) this.invite(x, y)
     return moves
-  }
-
-  /** The first gesture, pointed out. */
-  invite(x, y) {
-    const { context: g, look } = this
-    g.font = "13px sans-serif"
-    const wide = g.measureText("drag me").width + 12, ways = [[1, -1], [-1, -1], [1, 1], [-1, 1]]
-    const places = [20, 30, 50, 75, 100].flatMap((off) => ways.map(([a, b]) => [x + a * (off / 2 + wide / 2), y + b * off]))
-    const [px, py] = places.find(([a, b]) => this.free([a, b], wide, 24)) ?? places[0]
-    g.strokeStyle = g.fillStyle = look.hand
-    g.lineWidth = 1.5
-    line(g, [x, y], [px - Math.sign(px - x) * (wide / 2 - 4), py])
-    g.fillRect(px - wide / 2, py - 11, wide, 21)
-    g.textAlign = "center"
-    g.textBaseline = "middle"
-    g.fillStyle = look.paper
-    g.fillText("drag me", px, py)
   }
 
   /** What decides how that looks which stands still while a point goes through S. */
   standing() {
-    const { body, look, dots, outline, centre, half, shadow, view, fog, ray, goal } = this
-    return [fog, ray, goal, body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
+    const { body, look, dots, outline, centre, half, shadow, view } = this
+    return [body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
   }
 
   write(x, y, text, colour, size = 13, align = "center") {
@@ -309,17 +282,12 @@ export class Space {
     const places = corners.map(({ u }) => this.px(this.flat(u)))
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
-    if (!this.fog) {
-      const around = order.map((k) => places[k])
-      polygon(g, around)
-      g.fillStyle = look.shade
-      g.fill()
-      shadeGoal(this, around)
-    }
+    polygon(g, order.map((k) => places[k]))
+    g.fillStyle = look.shade
+    g.fill()
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
-      if (this.fog && !this.been.touched(side, a, b)) continue
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
       g.setLineDash(side.cap ? [3, 7] : [])
@@ -343,7 +311,7 @@ export class Space {
       }
       this.labels.push({ side, a, b, reach: 14 })
     }
-    if (this.fog || places.length < 3) return // or a line among two dimensions
+    if (places.length < 3) return // or a line among two dimensions
     drawName(this, places, middle)
   }
 
@@ -388,10 +356,6 @@ export class Space {
     if (!body || body.empty) return
     const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 24
     this.canvas.setPointerCapture(event.pointerId)
-    if (this.flagged && this.fog && !near && this.flag.near(px, py)) {
-      this.held = { flag: true }
-      return event.preventDefault()
-    }
     this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
     this.told("begin")
     this.told("point", this.read)
@@ -408,10 +372,6 @@ export class Space {
     if (!held) {
       const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 14
       return near ? this.told("point", this.read) : this.told("side", this.sideAt(px, py))
-    }
-    if (held.flag) {
-      this.flag.move(px, py)
-      return this.told("guess")
     }
     if (held.turns) {
       this.turn((px - held.px) * TURN, (py - held.py) * TURN)

@@ -3,6 +3,7 @@
 
 const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside, to find rays along which it goes on
 const SMALL = 1e-9
+const STEERED = 12 // projections on S at most, while the hand moves
 export const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
 /** From the segment between two points to a third. */
@@ -324,6 +325,18 @@ export class Body {
     if (inverse.some((column) => !column)) return false
     const gain = this.u.map((_, a) => B[0][a] * miss[0] + B[1][a] * miss[1])
     return this.goTo(this.u.map((v, k) => v + dot(inverse[k], gain)), inverse)
+  }
+
+  /** Towards a network with these values of these forces, changing all others as little as possible. */
+  steer(forces, values) {
+    const rows = forces.map((force) => this.axes.map((axis) => axis[force]))
+    const square = rows.map((a) => rows.map((b) => dot(a, b)))
+    for (let round = 0; round < STEERED; round++) {
+      const now = this.forces(), miss = forces.map((force, k) => values[k] - now[force])
+      if (Math.max(...miss.map(Math.abs)) < 1e-9 * this.scaleOf()) return
+      const part = solve(square, miss) ?? miss.map((v, k) => (k ? 0 : v / square[0][0]))
+      this.goTo(this.u.map((v, d) => v + part.reduce((sum, p, k) => sum + p * rows[k][d], 0)))
+    }
   }
 
   /** A uniform draw by hit-and-run from u: a point of a random chord. */

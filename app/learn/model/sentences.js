@@ -6,7 +6,6 @@ export const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) <
 const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
-const FREE = "There is more than one because friction may be anything up to μ times the normal force."
 const BOTH = "at the left wall and at the right wall"
 // A disk between two walls cannot slide down both: what is so is that friction does all it can.
 const AT_BOTH = {
@@ -61,8 +60,8 @@ function slips(body) {
   return Array.from(body.scene.i).some((_, c) => F[2 * c] > 1e-9 && body.slides(F[2 * c], F[2 * c + 1]))
 }
 
-/** Forces less equations, as HTML; in fog, what is free is what the hand moves; where S is empty, that no solution is allowed. */
-export function counted({ h, count, scene, empty, consistent, whole, corners }, fog) {
+/** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
+export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + ", each with a normal and a tangential component"
   if (empty && !scene.idle) {
@@ -71,8 +70,8 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }, 
     return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  const free = h === 1 ? "number" : "numbers", dot = fog ? `: the red dot's position${h > 2 ? `, and ${h - 2} more` : ""}` : ""
-  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point || dot}</b>`
+  const free = h === 1 ? "number" : "numbers"
+  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point}</b>`
   return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
 }
 
@@ -91,9 +90,9 @@ export function barred({ empty, h, scene }) {
   return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
 }
 
-/** What is special about a scene, besides its forces; empty for most, and where the sentence over it says so. */
-export function special({ scene }, fog) {
-  if (!scene.box[0] || fog) return ""
+/** What is special about a scene, besides its forces; empty for most. */
+export function special({ scene }) {
+  if (!scene.box[0]) return ""
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
@@ -101,13 +100,11 @@ export function special({ scene }, fog) {
 }
 
 /** What the picture of S is. */
-export function pictured(body, { filled: dotted, fog }) {
+export function pictured(body, { filled: dotted }) {
   const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  if (fog && h < 3) return h < 2 ? "the red dot goes only as far as friction allows" : "the red dot goes only where friction allows: find the edge"
-  if (fog && h > 3) return "one pair of green and violet forces: drag to find the limits"
   return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
@@ -128,8 +125,6 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fog && scene.box[0]) return `${scene.r.length} disks under pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats endlessly (pale disks are copies). Drag the red dot: it sets the green and violet forces, and the others change as little as they must. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
-  if (h > 3 && now.fresh) return `${h} numbers are free; the red dot sets the green and violet forces. Drag it: the others change as little as they must to keep every disk in balance. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
@@ -138,8 +133,6 @@ export function sentence(body, mu, now) {
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
   const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, disks can press with more than their weight." : ""
-  if (now.fog) return `Each position of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}${wedged}`
-  if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 
@@ -156,12 +149,12 @@ function gripped(body) {
 }
 
 /** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */
-function falling({ scene: { r, pressing, load: own }, load }, mu, { fall, enough }) {
+function falling({ scene: { r, box, pressing, load: own }, load }, mu, { fall, enough }) {
   const moving = fall ? Array.from({ length: fall.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...fall.slice(3 * k, 3 * k + 3)) > 0.05) : []
   const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length
   const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
   const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
-  const loads = pressing.length ? "the press does" : `the weights${pushed} do`
+  const loads = pressing.length ? "the press does" : box[0] ? `the pressure${pushed} does` : `the weights${pushed} do`
   const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and no contact force that friction allows can stop it.` : ""
   const mended = enough ? ` With friction of at least μ = ${enough} it would hold.` : ""
   return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${mended}${why}`

@@ -27,7 +27,6 @@ class Asked(NamedTuple):
 
     scene: str  # MANY for the page of large packings
     mu: float | None
-    step: int  # of the tour, 0 for none
     dark: bool
     built: str  # a scene of the visitor's, as text
     query: str  # for the page of large packings
@@ -47,11 +46,10 @@ def asked(query: str) -> Asked:
         mu = friction(given["mu"])
     except (KeyError, InputError):
         mu = None
-    step = int(given["tour"]) if re.fullmatch("[1-9]", given.get("tour", "")) else 0
     if named:
         query = f"?{urlencode(given)}" if given else ""
     dark = given.get("dark") == "1"
-    return Asked(name, mu, step, dark, given.get("built", "")[:LONGEST], query)
+    return Asked(name, mu, dark, given.get("built", "")[:LONGEST], query)
 
 
 def titles() -> list[list[str]]:

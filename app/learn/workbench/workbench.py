@@ -1,4 +1,4 @@
-"""A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
+"""A small scene and the whole of its S: drawn, cut and pulled in the browser by workbench.js."""
 
 import base64
 from typing import Any
@@ -8,67 +8,23 @@ import param
 from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
-from ..background.jobs import Job, Task
-from ..browser.bundle import Scripted
-from ..browser.messages import Message
-from .model import small_scenes
-
-# Title, text, and what the scene shows, of the steps of the tour before those of large packings.
-FIRST_STEPS = (
-    (
-        "One disk, two walls",
-        "A disk of weight 1 lies in a groove. Each wall presses on it and rubs: four forces. But "
-        "there are only three equations: no net force sideways, none up or down, no turning. One "
-        "number stays free: how hard the walls squeeze the disk. Squeezed hard, it would pop up if "
-        "friction did not hold it down.",
-        {"scene": "groove", "mu": 0.5},
-    ),
-    (
-        "Every way to hold it, at once",
-        "The line is S: each of its points is one set of forces that holds the disk. Drag the "
-        "point, or an arrow: the forces change and stay in balance. S ends where a force meets the "
-        "edge of its wedge, the friction cone: there the disk is about to slide.",
-        {"scene": "groove", "mu": 0.5},
-    ),
-    (
-        "What friction does",
-        "Drag the friction μ. At μ = 0 the wedges are closed, and S is one point. More friction "
-        "opens the wedges, and S grows. At μ = 1, as steep as the walls, it has no end any more: "
-        "the disk has jammed itself.",
-        {"scene": "groove", "mu": 0.8, "see": "strip"},
-    ),
-    (
-        "More disks, more free numbers",
-        "Thirteen disks pressed together from all sides leave eight numbers free: S has eight "
-        "dimensions, of which only a shadow can be drawn, on two of the forces. Drag the point, or "
-        "an arrow: all forces follow. Next: 400 disks, with hundreds of free numbers.",
-        {"scene": "thirteen"},
-    ),
-)
+from ...background.jobs import Job, Task
+from ...browser.bundle import Scripted
+from ...browser.messages import Message
+from ..model import small_scenes
 
 
-class Small(Scripted):
-    """The page of a small scene."""
+class Workbench(Scripted):
+    """A small scene, and everything that can be done with it."""
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
     titles = param.List(doc="[name, title] of every scene")
-    steps = param.List(doc="title, text and what is shown, of each step of the tour")
-    all = param.Integer(doc="steps of the whole tour")
-    step = param.Integer(doc="of the tour, to begin with; 0 for none")
     note = param.String(doc="what was wrong with the link")
-    first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    def __init__(
-        self, asked: small_scenes.Asked, task: Task, all_steps: int, **params: Any
-    ) -> None:
-        """asked: small_scenes.Asked. task: a jobs.Task of the page, for slow scenes."""
-        super().__init__(
-            titles=small_scenes.titles(),
-            steps=[list(step) for step in FIRST_STEPS],
-            all=all_steps,
-            **params,
-        )
+    def __init__(self, asked: small_scenes.Asked, task: Task, **params: Any) -> None:
+        """asked: what the link asks for. task: of the page, for what takes longer."""
+        super().__init__(titles=small_scenes.titles(), **params)
         self._task = task
         self._made = True  # the scene that was asked for last
         task.param.watch(self._failed, "message")

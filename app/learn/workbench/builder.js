@@ -1,6 +1,6 @@
 // Build your own: disks and walls are put, moved and removed by hand; what comes near snaps into contact.
 
-import { distance, solve } from "./model/polytope.js"
+import { distance, solve } from "../model/polytope.js"
 
 const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
 const MOST_DISKS = 30, MOST_WALLS = 12
@@ -34,18 +34,18 @@ export class Builder {
     this.host = host
     host.innerHTML = `
       <span role="radiogroup" aria-label="What presses the disks">
-        <button type="button" role="radio" data-load="gravity">Gravity</button>
-        <button type="button" role="radio" data-load="pressure">Pressure</button>
+        <button type="button" class="soft" role="radio" data-load="gravity">Gravity</button>
+        <button type="button" class="soft" role="radio" data-load="pressure">Pressure</button>
       </span>
       <span role="radiogroup" aria-label="What the hand does">
-        <button type="button" role="radio" data-tool="disk">Add or move</button>
-        <button type="button" role="radio" data-tool="wall">Draw a wall</button>
-        <button type="button" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Make a wall press</button>
-        <button type="button" role="radio" data-tool="remove">Remove</button>
-        <button type="button" role="radio" data-tool="pull">Drag arrows</button>
+        <button type="button" class="soft" role="radio" data-tool="disk">Add or move</button>
+        <button type="button" class="soft" role="radio" data-tool="wall">Draw a wall</button>
+        <button type="button" class="soft" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Make a wall press</button>
+        <button type="button" class="soft" role="radio" data-tool="remove">Remove</button>
+        <button type="button" class="soft" role="radio" data-tool="pull">Drag arrows</button>
       </span>
       <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
-      <button type="button" class="anew" title="Begin anew, with one disk on the floor">Clear</button>
+      <button type="button" class="soft anew" title="Begin anew, with one disk on the floor">Clear</button>
       <span class="how"></span>
       <span class="presses">No gravity. A pressing wall pushes with a force equal to its length.</span>`
     host.addEventListener("click", (event) => {

@@ -3,17 +3,17 @@
 const LEG_MS = 450
 const PATH = 60 // corners of its path that are kept
 
-export class Going {
+export class RandomWalk {
   /** button: it begins and ends a walk; moved(path): another point of it is on screen. */
   constructor(button, moved) { Object.assign(this, { button, moved, frame: null }) }
 
   pause() {
     if (this.frame) cancelAnimationFrame(this.frame)
     this.frame = null
-    this.tell()
+    this.show()
   }
 
-  tell() {
+  show() {
     this.button.textContent = this.frame ? "Stop" : "Random walk"
     this.button.classList.toggle("on", Boolean(this.frame))
   }
@@ -36,6 +36,6 @@ export class Going {
       this.frame = requestAnimationFrame(go)
     }
     this.frame = requestAnimationFrame(go)
-    this.tell()
+    this.show()
   }
 }

@@ -1,0 +1,129 @@
+// The seven chapters: their words, as functions of the numbers on screen, and what is played in each.
+
+import { Chance } from "./experiments/chance.js"
+import { Friction } from "./experiments/friction.js"
+import { Grab } from "./experiments/grab.js"
+import { Push } from "./experiments/push.js"
+import { SceneExperiment } from "./experiments/scene_experiment.js"
+
+const two = (v) => v.toFixed(2)
+const percent = (v) => `${Math.round(100 * v)} %`
+const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
+const PRESSED = "− 2, since the forces between disks cancel in the sum over all of them; + 1 for the pressure"
+
+/** How free numbers are counted, line by line: {rows, head}, head null where the last row is the sum. */
+function counted({ contacts, disks, equations, free }, pressed, disksNote = "") {
+  const whole = 3 * disks
+  const rows = [
+    [`${contacts} contacts × 2 forces, normal and tangential`, 2 * contacts],
+    [`${disks} ${disks > 1 ? "disks" : "disk"}${disksNote} × 3 equations: no net force sideways, none up or down, no turning`, whole],
+    ...(pressed ? [[PRESSED, equations]] : []),
+    [`free numbers: ${2 * contacts} − ${equations}`, free],
+  ]
+  return { head: null, rows }
+}
+
+/**
+ * Each chapter: name in links; title in the list; heading; text and ask, what is read before the hand acts; doing, what
+ * it then does; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
+ */
+export const CHAPTERS = [
+  {
+    name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
+    text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall presses on it with a normal force, and by friction holds it along the wall, with at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
+    ask: "How large can the left wall’s normal force become?",
+    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance.",
+    see: ({ high, mu }) => [
+      `Pressed this hard, the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}.`,
+      `So each wall can press harder than the disk weighs, and a picture of the disk does not show whether it does. The line is called S: each of its points is one set of forces that holds the disk.`,
+    ],
+    count: (facts) => counted(facts, false),
+    x: { low: 0, high: 3, label: "normal force at the left wall (weight of the disk = 1)" }, y: null,
+    experiment: SceneExperiment, options: { scene: "groove", x: 0, y: null },
+  },
+  {
+    name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
+    text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The plot shows it over two of the forces, green and violet.`,
+    ask: "How large can the floor’s normal force become?",
+    doing: "Drag the dot to the right as far as it goes. Where it was, it paints S.",
+    see: ({ high, weight }) => [
+      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: wedged between them, the disks are pulled down by friction as hard as it can.`,
+      `So the floor can carry more than the disks weigh. Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip.`,
+    ],
+    count: (facts) => counted(facts, false),
+    x: { low: 0, high: 5, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" },
+    experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0 },
+  },
+  {
+    name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
+    text: ({ contacts, equations, free, disks, start }) => `${disks === 13 ? "Thirteen" : disks} disks are squeezed from all sides, without gravity; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: ${free} numbers stay free. S has ${free} dimensions, so the plot shows its shadow on two of the forces. The green one is ${two(start)} now.`,
+    ask: "How large can the green force become?",
+    doing: "Drag the dot to the right as far as it goes. The other forces follow and keep every disk in balance.",
+    see: ({ low, high, free }) => [
+      `Every contact must press, and friction is limited at each: near this end so many contacts are about to open or to slip that none of the ${free} numbers can help any more.`,
+      `Between ${two(low)} and ${two(high)} every value is possible, although no disk moves. What you painted is a shadow: behind each of its points lie many sets of forces.`,
+    ],
+    count: (facts) => counted(facts, true),
+    x: { low: 0, high: 8, label: "normal force between disks 1 and 12 (green)" }, y: { low: 0, high: 5, label: "between disks 8 and 13 (violet)" },
+    experiment: SceneExperiment, options: { scene: "thirteen", x: 6, y: 40 },
+  },
+  {
+    name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
+    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. Counted as before, ${free} numbers are free. The marked line carries ${two(start)} times the mean force.`,
+    ask: "How large can you make its force while no disk moves?",
+    doing: "Drag the dot to the right, or the marked line upwards. Orange lines gain force, blue ones lose it.",
+    see: ({ opened, sliding, changed }) => [
+      `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the network can give no more.`,
+      `To get here, ${changed} other forces changed by more than a tenth of the mean force, yet no disk moved. On a photograph of the packing you would see no difference.`,
+    ],
+    count: (facts) => counted(facts, true, ` that carry (of ${facts.all})`),
+    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
+    experiment: Grab, options: {},
+  },
+  {
+    name: "chance", title: "Chance sees little", heading: "How far does chance go?",
+    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now chance decides: a random walk leads from one admissible network to the next, and in each the marked force is read off.`
+      + ` It takes ${states} steps.`,
+    ask: "What is the largest value that chance finds?",
+    doing: "Drag the dot upwards: network after network.",
+    see: ({ part, mean, free }) => [
+      `Chance covers ${percent(part)} of what is possible for this force, and ${percent(mean)} on average over all. To come to an end, most of the ${free} free numbers must work together, which chance hardly ever arranges.`,
+      `And that is one force alone. A body half as wide in each of ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of the whole: what was never seen need not be impossible.`,
+    ],
+    count: null,
+    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks (every 20th drawn)", dragged: true },
+    experiment: Chance, options: {},
+  },
+  {
+    name: "friction", title: "Friction", heading: "Which friction leaves most open?",
+    text: ({ all }) => `${all} disks run through their random networks at μ = 0.1; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
+    ask: "At which friction μ do the forces vary most?",
+    doing: "Drag the dot along the axis. Each stop shows a packing made with that friction.",
+    see: ({ rows }) => {
+      const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), last = rows.at(-1)
+      return [
+        `From the left, forces vary more as friction lets them lean further. Then contacts vanish, and free numbers with them: at μ = ${most.mu} there are ${most.free} in ${most.contacts} contacts, at μ = ${last.mu} only ${last.free} in ${last.contacts}.`,
+        `So more friction does not mean more freedom: with very much of it, forces are nearly determined again. The line is the mean over many packings.`,
+      ]
+    },
+    count: ({ rows }) => ({
+      head: ["friction μ", "2 × contacts − equations = free numbers", "forces vary by"],
+      rows: rows.map(({ mu, contacts, equations, free, spread }) => [mu, `2 × ${contacts} − ${equations} = ${free}`, percent(spread)]),
+    }),
+    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.25, label: "how much forces vary (mean force = 1)" },
+    experiment: Friction, options: {},
+  },
+  {
+    name: "push", title: "Why it matters", heading: "When does something move?",
+    text: ({ mu, carried }) => `The same packing at μ = ${mu}. Two marked disks, which press on each other with ${two(carried)} times the mean force, are pushed apart. The other forces change to carry the push, as long as they can.`,
+    ask: "How hard can you push before a disk moves?",
+    doing: "Drag the dot to the right: the arrows grow.",
+    see: ({ high, limit, opened, slid }) => [
+      `Then ${opened} contacts open, ${slid} slip, and disks set off; their motion is drawn enlarged.`,
+      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: which forces it really has decides, and no picture of the disks shows them. That is why it matters how much they leave open.`,
+    ],
+    count: null,
+    x: { low: 0, high: 6, label: "push (mean force = 1)" }, y: null,
+    experiment: Push, options: {},
+  },
+]

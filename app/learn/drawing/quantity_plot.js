@@ -1,0 +1,209 @@
+// A plot of one quantity, or two: where the hand has been, the prediction, the dot, and, once it is found, the
+// answer. Drawn as SVG, so that its handles have roles, focus and keys.
+
+const NS = "http://www.w3.org/2000/svg"
+const PILL = { high: 26, letter: 6.8, padding: 18 } // px
+const GRAB = 26 // px from the dot within which it is taken where it is
+const STEPS = 60 // of the keyboard along an axis
+
+function element(parent, tag, attributes = {}) {
+  const made = parent.appendChild(document.createElementNS(NS, tag))
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value)
+  return made
+}
+
+/** One axis: {low, high, label, log, ticks, stops}, and its place in pixels. */
+class Scale {
+  constructor(axis, from, to) { Object.assign(this, { axis, from, to }) }
+
+  part(value) {
+    const { low, high, log } = this.axis, turn = log ? Math.log10 : (v) => v
+    return (turn(value) - turn(low)) / (turn(high) - turn(low))
+  }
+
+  px(value) { return this.from + this.part(value) * (this.to - this.from) }
+
+  value(px) {
+    const { low, high, log } = this.axis, part = Math.min(1, Math.max(0, (px - this.from) / (this.to - this.from)))
+    return log ? low * (high / low) ** part : low + part * (high - low)
+  }
+
+  /** The value one step of the keyboard further: the next stop, where there are stops. */
+  step(value, sign) {
+    const { stops } = this.axis
+    if (!stops) return this.value(this.px(value) + (sign * (this.to - this.from)) / STEPS)
+    const further = stops.filter((stop) => sign * (stop - value) > 1e-9 * stop)
+    return (sign > 0 ? further[0] : further.at(-1)) ?? value
+  }
+
+  get ticks() {
+    const { low, high, ticks } = this.axis
+    if (ticks) return ticks
+    const size = Math.abs(this.to - this.from) < 340 ? 4 : 7, raw = (high - low) / size, ten = 10 ** Math.floor(Math.log10(raw))
+    const step = ten * [1, 2, 5, 10].find((k) => k * ten >= raw)
+    return Array.from({ length: Math.floor((high - low) / step + 1e-9) + 1 }, (_, k) => low + k * step)
+  }
+}
+
+export class QuantityPlot {
+  /** axes: {x, y}, y null where one quantity is enough. hears: {marker(value), dot(x, y)}: moved by the hand. */
+  constructor(host, { x, y = null }, hears) {
+    Object.assign(this, { host, axes: { x, y }, hears, movable: null, state: {} })
+    const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
+    this.frame = element(svg, "g")
+    this.exact = element(svg, "path", { class: "exact" })
+    this.seen = element(svg, "path", { class: "seen" })
+    this.dots = element(svg, "path", { class: "dots" })
+    this.answer = this.flag("answer")
+    this.marker = this.flag("marker")
+    const slider = { role: "slider", tabindex: -1, "aria-orientation": y?.dragged ? "vertical" : "horizontal" }
+    for (const [name, value] of Object.entries({ ...slider, "aria-label": `your prediction: ${x.label}` })) this.marker.group.setAttribute(name, value)
+    this.dot = element(svg, "g", { class: "now", ...slider, "aria-label": y?.dragged ? y.label : `now: ${x.label}` })
+    element(this.dot, "circle", { r: 9 })
+    this.reading = element(this.dot, "text", { y: -18, "text-anchor": "middle" })
+    this.listen()
+  }
+
+  flag(name) {
+    const group = element(this.svg, "g", { class: name })
+    return { group, line: element(group, "line"), box: element(group, "rect", { height: PILL.high, rx: 6 }), text: element(group, "text", { "text-anchor": "middle" }) }
+  }
+
+  /** Take the size of the host; everything has its place anew. */
+  fit() {
+    const { clientWidth: wide, clientHeight: high } = this.host
+    if (!wide || !high) return
+    this.svg.setAttribute("viewBox", `0 0 ${wide} ${high}`)
+    const left = this.axes.y ? 66 : 26, bottom = high - 54
+    Object.assign(this, { wide, high, left, bottom, top: 52 })
+    this.x = new Scale(this.axes.x, left, wide - 26)
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - 8, this.top + 16) : null
+    this.drawAxes()
+    this.draw(this.state)
+  }
+
+  /** Height of what is drawn where there is but one quantity. */
+  get level() { return (this.top + this.bottom) / 2 }
+
+  place([x, y]) { return [this.x.px(x), this.y ? this.y.px(y) : this.level] }
+
+  drawAxes() {
+    const { frame, left, wide, bottom, top, x, y } = this
+    frame.replaceChildren()
+    element(frame, "path", { class: "axis", d: `M${left} ${bottom}H${wide - 26}${y ? `M${left} ${bottom}V${top - 16}` : ""}` })
+    for (const tick of x.ticks) {
+      const at = x.px(tick)
+      element(frame, "path", { class: "axis", d: `M${at} ${bottom}v5` })
+      element(frame, "text", { x: at, y: bottom + 19, "text-anchor": "middle" }).textContent = name(tick)
+    }
+    element(frame, "text", { x: (left + wide - 26) / 2, y: bottom + 42, "text-anchor": "middle", class: "label" }).textContent = x.axis.label
+    for (const tick of y?.ticks ?? []) {
+      const at = y.px(tick)
+      element(frame, "path", { class: "axis", d: `M${left} ${at}h-5` })
+      element(frame, "text", { x: left - 9, y: at + 4, "text-anchor": "end" }).textContent = name(tick)
+    }
+    if (y) element(frame, "text", { transform: `translate(16 ${(top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle", class: "label" }).textContent = y.axis.label
+  }
+
+  /**
+   * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
+   * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact is an area; thin: it is a curve.
+   */
+  draw(state) {
+    this.state = state
+    if (!this.x) return
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10 } = state
+    const path = (lines, end = "") => lines.map((points) => `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}`).join("")
+    this.exact.setAttribute("d", path(exact, exact[0]?.length > 2 && filled ? "Z" : ""))
+    this.exact.classList.toggle("filled", filled)
+    this.exact.classList.toggle("thin", thin)
+    this.seen.setAttribute("d", path(seen))
+    this.seen.style.strokeWidth = brush
+    this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
+    this.show(this.marker, marker, this.bottom - PILL.high - 8)
+    this.show(this.answer, answer, this.top - 40)
+    this.dot.style.display = now ? "" : "none"
+    if (now) {
+      const [px, py] = this.place(now)
+      this.dot.setAttribute("transform", `translate(${px} ${py})`)
+      const half = (words.length * PILL.letter) / 2
+      this.reading.setAttribute("x", Math.min(0, this.wide - 4 - half - px) + Math.max(0, 4 + half - px))
+      this.reading.textContent = words
+      this.dot.setAttribute("aria-valuetext", words)
+      this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
+    }
+    if (marker) {
+      this.marker.group.setAttribute("aria-valuenow", marker.value)
+      this.marker.group.setAttribute("aria-valuetext", marker.words)
+    }
+  }
+
+  /** A vertical line with words on it. */
+  show({ group, line, box, text }, what, y) {
+    group.style.display = what ? "" : "none"
+    if (!what) return
+    const px = this.x.px(what.value), wide = what.words.length * PILL.letter + PILL.padding
+    const middle = Math.min(Math.max(px, (this.y ? this.left : 0) + wide / 2 + 2), this.wide - wide / 2 - 2)
+    for (const [key, value] of Object.entries({ x1: px, x2: px, y1: group === this.answer.group ? y : this.top - 8, y2: this.bottom })) line.setAttribute(key, value)
+    for (const [key, value] of Object.entries({ x: middle - wide / 2, y, width: wide })) box.setAttribute(key, value)
+    for (const [key, value] of Object.entries({ x: middle, y: y + 17.5 })) text.setAttribute(key, value)
+    text.textContent = what.words
+  }
+
+  /** Which handle the hand has: "marker", "dot" or none. */
+  allow(handle) {
+    this.movable = handle
+    for (const [one, group] of [["marker", this.marker.group], ["dot", this.dot]]) {
+      group.setAttribute("tabindex", one === handle ? 0 : -1)
+      group.classList.toggle("movable", one === handle)
+    }
+    this.svg.style.touchAction = !handle ? "auto" : this.axes.y && handle === "dot" ? "none" : "pan-y"
+  }
+
+  // The hand
+
+  listen() {
+    const { svg } = this
+    let held = null
+    const at = (event) => {
+      const box = svg.getBoundingClientRect()
+      return [event.clientX - box.left, event.clientY - box.top]
+    }
+    svg.addEventListener("pointerdown", (event) => {
+      if (!this.movable || event.button !== 0) return
+      const [px, py] = at(event), [nx, ny] = this.state.now ? this.place(this.state.now) : [px, py]
+      const near = this.movable === "dot" && Math.hypot(px - nx, py - ny) < GRAB
+      held = near ? [nx - px, ny - py] : [0, 0]
+      svg.setPointerCapture(event.pointerId)
+      ;(this.movable === "dot" ? this.dot : this.marker.group).focus({ preventScroll: true })
+      this.move(px + held[0], py + held[1])
+      event.preventDefault()
+    })
+    svg.addEventListener("pointermove", (event) => {
+      if (!held) return
+      const [px, py] = at(event)
+      this.move(px + held[0], py + held[1])
+    })
+    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { held = null })
+    svg.addEventListener("keydown", (event) => this.key(event))
+  }
+
+  move(px, py) {
+    if (this.movable === "marker") this.hears.marker(this.x.value(px))
+    if (this.movable === "dot") this.hears.dot(this.x.value(px), this.y ? this.y.value(py) : 0)
+  }
+
+  key(event) {
+    const [right, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? []
+    if (right === undefined || !this.movable) return
+    event.preventDefault()
+    event.stopPropagation()
+    if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up))
+    const [x, y] = this.state.now
+    if (!this.y) return this.hears.dot(this.x.step(x, right || up), 0)
+    this.hears.dot(right ? this.x.step(x, right) : x, up ? this.y.step(y, up) : y)
+  }
+}
+
+/** A number on an axis. */
+const name = (value) => String(Number(value.toPrecision(3))).replace("-", "−")

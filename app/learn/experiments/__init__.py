@@ -1,0 +1,1 @@
+"""What is played with in the chapters, one class a chapter or kind of them."""

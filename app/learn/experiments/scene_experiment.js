@@ -1,0 +1,112 @@
+// Chapters of small scenes: the disks with their forces, and S over one force or two, drawn where the hand was.
+
+import { Arrows } from "../drawing/scene_canvas.js"
+import { Body } from "../model/polytope.js"
+import { middleOf } from "../model/middle.js"
+import { palette } from "../drawing/palette.js"
+
+const FOUND = 0.01 // of what is possible: this near to the end it has been found
+const WAY = 1500 // places of the hand's way that are kept
+
+export class SceneExperiment {
+  /** options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. */
+  constructor(host, options, changed) {
+    Object.assign(this, { host, options, changed, way: [], locked: true, found: false, lit: new Set() })
+    this.canvas = host.appendChild(document.createElement("canvas"))
+    Object.assign(this.canvas, { role: "img", ariaLabel: "Disks, and the force on them at every contact" })
+    this.arrows = new Arrows(this.canvas, (what, given) => this.heard(what, given))
+  }
+
+  async load(source) {
+    const scene = await source.get("scene", this.options.scene)
+    this.scene = scene
+    this.body = new Body(scene).cut(scene.mu)
+    if (this.body.whole) this.body.u = [...this.body.middle]
+    else {
+      this.body.goInside()
+      this.body.u = middleOf(this.body)
+    }
+    const outline = [...scene.outline]
+    this.outline = Array.from({ length: outline.length / 2 }, (_, k) => [outline[2 * k], outline[2 * k + 1]])
+    ;[this.low, this.high] = scene.bounds[this.options.x / 2]
+    this.start = this.at
+  }
+
+  get at() {
+    const F = this.body.forces(), { x, y } = this.options
+    return [F[x], y === null ? 0 : F[y]]
+  }
+
+  get value() { return this.at[0] }
+  get answer() { return this.high }
+
+  /** Numbers that the words need. */
+  get facts() {
+    const { scene, body } = this
+    const named = (c) => scene.names[c]
+    const F = body.forces(), weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
+    return {
+      contacts: body.count, disks: scene.r.length, equations: scene.equations, free: body.h, mu: scene.mu,
+      low: this.low, high: this.high, weight, start: this.start[0], name: named(this.options.x / 2), force: F[this.options.x],
+    }
+  }
+
+  /** The dot is moved to these values, as far as S goes. */
+  drag(x, y) {
+    const { body, options } = this
+    if (options.y !== null) body.steer([options.x, options.y], [x, y])
+    body.steer([options.x], [x]) // at the edge of S the other force gives way
+    this.moved()
+  }
+
+  moved() {
+    const { at, way } = this, before = way.at(-1) ?? this.start
+    if (!way.length) way.push(this.start)
+    if (Math.hypot(at[0] - before[0], at[1] - before[1]) > 1e-3) way.push(at)
+    if (way.length > WAY) way.splice(1, 1)
+    if (this.high - at[0] < FOUND * (this.high - this.low)) this.found = true
+    this.changed()
+  }
+
+  heard(what, given) {
+    if (what === "hover" && !this.arrows.held) {
+      this.lit = new Set(given && !given.loose ? [given.contact] : [])
+      this.changed()
+    }
+    if (this.locked) return what === "press"
+    if (what === "pull") {
+      this.body.pull(given.contact, given.normal, given.tangential)
+      this.moved()
+    }
+    return false
+  }
+
+  /** What the plot shows. */
+  get picture() {
+    const { way, found, options: { y }, low, high, outline } = this, xs = way.map(([x]) => x)
+    const line = way.length ? [[[Math.min(...xs), 0], [Math.max(...xs), 0]]] : []
+    return {
+      now: this.at,
+      seen: y === null ? line : way.length ? [way] : [],
+      exact: !found ? [] : y === null ? [[[low, 0], [high, 0]]] : [outline],
+      filled: y !== null,
+      brush: y === null ? 10 : 14,
+    }
+  }
+
+  draw(dark) {
+    const { arrows, body, canvas, options: { x, y } } = this
+    if (!body || !canvas.clientWidth) return
+    if (arrows.body !== body || arrows.wide !== canvas.clientWidth) {
+      arrows.fit(body)
+      arrows.wide = canvas.clientWidth
+    }
+    const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]])
+    arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null })
+  }
+
+  /** How many things were found: the words follow where it grows. */
+  get finds() { return 1 }
+
+  stop() { /* nothing moves by itself */ }
+}

@@ -1,0 +1,126 @@
+// Learn: seven chapters, one on screen; which, and how far the reader is, is in the address and in the browser.
+
+import { button, made } from "../browser/dom.js"
+import { plain } from "../browser/to_object.js"
+import { CHAPTERS } from "./chapters.js"
+import { PredictDoSee } from "./predict_do_see.js"
+import { Progress } from "./progress.js"
+import { Source } from "./source.js"
+
+class Lesson {
+  constructor(model, view) {
+    Object.assign(this, { model, source: new Source(model, view), progress: new Progress(), asked: 0 })
+    this.root = made("div", { className: model.alone ? "course alone" : "course" })
+    this.list = made("ol", {})
+    const nav = made("nav", { ariaLabel: "Chapters" })
+    nav.append(this.list, made("p", { innerHTML: `<a href="?scene=pyramid">More small scenes</a><a href="?scene=own">Build your own</a>` }))
+    this.main = made("article", {})
+    this.root.append(nav, this.main)
+    this.returned = () => this.open(this.named)
+    window.addEventListener("popstate", this.returned)
+    model.on("dark", () => this.paint())
+    model.on("palettes", () => this.paint())
+    model.on("remove", () => this.leave())
+    this.sized = new ResizeObserver(() => this.paint())
+    this.open(this.named)
+  }
+
+  leave() {
+    window.removeEventListener("popstate", this.returned)
+    this.close()
+  }
+
+  close() {
+    this.experiment?.stop()
+    this.mechanism?.stop()
+    this.sized.disconnect()
+    this.experiment = this.mechanism = null
+  }
+
+  /** The chapter that the address names; else the first that is not done. */
+  get named() {
+    const name = new URLSearchParams(window.location.search).get("learn")
+    const chapter = CHAPTERS.find((one) => one.name === name) ?? CHAPTERS.find((one) => !this.progress.of(one.name).done)
+    return Math.max(0, CHAPTERS.indexOf(chapter))
+  }
+
+  /** The address of a chapter, with all else that this page's says. */
+  address(name) {
+    const query = new URLSearchParams(window.location.search)
+    query.set("learn", name)
+    return `?${query}`
+  }
+
+  go(number) {
+    window.history.pushState(null, "", this.address(CHAPTERS[number].name))
+    this.open(number)
+    window.scrollTo({ top: 0 })
+    this.root.querySelector("h1").focus({ preventScroll: true })
+  }
+
+  async open(number) {
+    this.close()
+    const chapter = CHAPTERS[number], turn = ++this.asked
+    this.number = number
+    this.show()
+    const parts = this.lay(chapter)
+    const { model, source } = this, palettes = () => plain(model.palettes)
+    const experiment = new chapter.experiment(parts.picture, chapter.options, () => this.mechanism?.show(), palettes())
+    this.experiment = experiment
+    try {
+      await experiment.load(source, [...model.frictions])
+    } catch (error) {
+      parts.voice.textContent = error.message
+      return
+    }
+    if (turn !== this.asked) return experiment.stop()
+    const x = model.frictions.length && chapter.x.log ? { ...chapter.x, stops: [...model.frictions], ticks: [...model.frictions] } : chapter.x
+    parts.text.textContent = chapter.text(experiment.facts)
+    parts.text.append(" ", made("strong", { textContent: chapter.ask }))
+    const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
+    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name).prediction, kept, () => this.paint())
+    this.sized.observe(parts.picture)
+  }
+
+  /** The parts of a chapter's page. */
+  lay(chapter) {
+    const { number } = this, last = number === CHAPTERS.length - 1
+    const heading = made("h1", { textContent: chapter.heading, tabIndex: -1 }), text = made("p", { className: "text" })
+    const pictures = made("div", { className: "pictures" }), voice = made("div", { className: "voice", ariaLive: "polite" })
+    const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(made("figure", { className })))
+    const row = made("div", { className: "row" }), turn = made("span", { className: "turn" })
+    const move = (words, by) => button(words, () => this.go(number + by), { disabled: !CHAPTERS[number + by] })
+    turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
+    row.append(turn)
+    const { pathname } = window.location, { scene } = chapter.options
+    const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with these disks</a>` : ""
+    const after = made("p", { className: "after", innerHTML: onwards })
+    this.main.replaceChildren(heading, text, pictures, voice, row, after)
+    return { text, picture, plot, voice, row }
+  }
+
+  /** The list of chapters, with those that are done. */
+  show() {
+    this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
+      const item = made("li", {}), link = item.appendChild(made("a", { textContent: title, href: this.address(name) }))
+      if (k === this.number) link.ariaCurrent = "step"
+      if (this.progress.of(name).done) item.append(made("span", { className: "done", textContent: " ✓", title: "done" }))
+      link.addEventListener("click", (event) => {
+        if (event.metaKey || event.ctrlKey || event.shiftKey) return
+        event.preventDefault()
+        this.go(k)
+      })
+      return item
+    }))
+  }
+
+  paint() {
+    if (this.asks) return
+    this.asks = requestAnimationFrame(() => {
+      this.asks = 0
+      if (this.mechanism) this.experiment.draw(this.model.dark, plain(this.model.palettes))
+    })
+  }
+}
+
+export function render({ model, view }) { return new Lesson(model, view).root }

@@ -1,0 +1,82 @@
+"""The seven chapters of Learn: predict, do, see; drawn and played in the browser by lesson.js."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import param
+
+from ..background.jobs import Task, Visitor, computing, reading
+from ..browser.bundle import Scripted
+from ..browser.messages import Message
+from ..widgets.plot_style import palettes
+from .model import lesson_data
+from .model.lesson_data import Packings
+
+# The forces over which S, or its shadow, is drawn in each small scene: across, and up.
+PLANES = {"groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
+
+
+class Lesson(Scripted):
+    """One lesson; what a chapter shows is sent when the chapter asks for it."""
+
+    dark = param.Boolean()
+    alone = param.Boolean(doc="whether one chapter is shown in a frame of another page")
+    palettes = param.Dict(doc="colours of packings, see plot_style.palettes")
+    frictions = param.List(doc="every μ of which there is a packing, ascending")
+
+    def __init__(
+        self,
+        packings: Packings,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        visitor: Visitor | None = None,
+        **params: Any,
+    ) -> None:
+        """wake: as for Task."""
+        super().__init__(frictions=packings.frictions, **params)
+        self._packings = packings
+        self._task = partial(Task, wake=wake, visitor=visitor)
+        self._tasks: dict[str, Task] = {}
+        self.palettes = palettes(self.dark)
+        self.param.watch(self._dress, "dark")
+
+    def close(self) -> None:
+        """End what is being computed."""
+        for task in self._tasks.values():
+            task.close()
+
+    def _dress(self, event: Any) -> None:
+        self.palettes = palettes(event.new)
+
+    def _heard(self, message: Message) -> None:
+        """A chapter wants what it shows."""
+        packings, name = self._packings, message["name"]
+        by_friction = {f"{mu:g}": mu for mu in packings.frictions}
+        match message["want"]:
+            case "scene" if name in PLANES:
+                self._send("scene", name, lambda: lesson_data.scene(name, PLANES[name]))
+            case "packing":
+                mu = by_friction.get(name, float("nan"))
+                self._send("packing", name, lambda: packings.packing(mu))
+            case "rail":
+                self._send("rail", "", packings.rail, computing)
+            case "push":
+                self._send("push", "", packings.push, computing)
+            case "curve":
+                self._send("curve", "", lesson_data.curve)
+
+    def _send(self, what: str, name: str, made: Callable[[], Any], pool: Any = reading) -> None:
+        """Make it off the event loop and tell the script, or why it cannot be."""
+        task = self._tasks.get(what + name)
+        if task is None:
+            task = self._tasks[what + name] = self._task(pool)
+            task.param.watch(partial(self._failed, what, name), "message")
+        if not task.running:
+            task.start(lambda job: made(), lambda found: self._tell(what, name, found))
+
+    def _tell(self, what: str, name: str, found: dict[str, Any]) -> None:
+        self.tell({"what": what, "name": name, "given": found})
+
+    def _failed(self, what: str, name: str, event: Any) -> None:
+        if event.new:
+            self.tell({"what": what, "name": name, "error": event.new})

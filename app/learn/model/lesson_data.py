@@ -1,0 +1,165 @@
+"""What the chapters of Learn show: small scenes with their exact ends, and stored packings."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.measures import growing  # noqa: F401
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.study.cells import entries
+from granforce.study.pulls import Puller
+
+from ...packing.player import frames
+from ...results import study_data
+from ...results.library import Cell, Library, Shown, best_cell
+from . import small_scenes
+
+MU = 0.1  # of the packing that is pulled and pushed
+NEAR = 0.5  # how far from the middle a marked contact may be, in half of what is seen
+STRONG = 1.5  # ⟨f_n⟩ that a contact carries at least which is pulled
+
+
+def scene(name: str, plane: tuple[int, int]) -> dict[str, Any]:
+    """A small scene as `small_scenes.drawn`, with exact ends, and its outline on two forces."""
+    drawn = small_scenes.drawn(name)
+    packing = small_scenes.packing_of(name, drawn["mu"])
+    return drawn | small_scenes.measured(packing, plane=plane)
+
+
+class Packings:
+    """Packings of the stores as the lesson shows them; results are kept for all visitors."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        cells = library.cells()
+        first = best_cell(cells)
+        series = "" if first is None else first.series
+        self.cells: dict[float, Cell] = {}
+        for cell in cells:
+            if cell.series == series and cell.mu > 0:
+                self.cells[cell.mu] = cell
+        self.rail = lru_cache(1)(self._rail)
+        self.push = lru_cache(1)(self._push)
+
+    @property
+    def frictions(self) -> list[float]:
+        """Every μ above 0 of which there is a packing, ascending."""
+        return sorted(self.cells)
+
+    def shown(self, mu: float) -> Shown:
+        """The packing at a friction; InputError where there is none."""
+        if mu not in self.cells:
+            raise InputError("this chapter needs a packing that the store does not have")
+        return self.library.shown(self.cells[mu])
+
+    def packing(self, mu: float) -> dict[str, Any]:
+        """Disks, networks and exact intervals at μ, with what is counted; forces in ⟨f_n⟩."""
+        replay, exact = self.shown(mu).replay, self.shown(mu).exact
+        if exact is None:
+            raise InputError("this chapter needs exact intervals that the store does not have")
+        low, high = _bounds(exact)
+        summary = replay.summary
+        return {
+            **frames(replay),
+            "least": low.astype(np.float32),
+            "largest": high.astype(np.float32),
+            "typical": replay.typical,
+            "grabbed": self._grabbed(mu),
+            "spread": summary["eta1"],
+            "disks": summary["n"] - summary["rattlers"],
+            "all_disks": summary["n"],
+        }
+
+    def _grabbed(self, mu: float) -> int:
+        """The contact that is pulled: of the strong ones near the middle that with most room."""
+        shown = self.shown(mu)
+        replay = shown.replay
+        assert shown.exact is not None  # as `packing` has looked
+        low, high = _bounds(shown.exact)
+        fits = (_away(replay) < NEAR) & (replay.normal[0] > STRONG)
+        return int(np.argmax(np.where(fits, high - low, -1.0)))
+
+    def _puller(self) -> Puller:
+        cell = self.cells[MU]
+        return Puller(self.library.packing(cell.params["packing"]), cell.mu)
+
+    def _rail(self) -> dict[str, Any]:
+        """Networks from the least to the largest force of the contact that is pulled."""
+        replay = self.shown(MU).replay
+        contact, scale = self._grabbed(MU), replay.force_scale
+        state = np.stack([replay.normal[0], replay.tangential[0]], axis=1).astype(np.float64)
+        rail = self._puller().rail(int(replay.backbone[contact]), state * scale)
+        return {
+            "values": rail.values / scale,
+            **_networks(rail.states / scale, rail.residual),
+            "opened": rail.opened.astype(np.uint8).ravel(),
+            "sliding": rail.sliding.astype(np.uint8).ravel(),
+        }
+
+    def _push(self) -> dict[str, Any]:
+        """Networks under a push on the contact near the middle that bears most, and the motion."""
+        replay = self.shown(MU).replay
+        found = self._pushed()
+        position = {int(number): k for k, number in enumerate(replay.backbone)}
+        contacts = np.array([position[int(number)] for number in found["backbone"].values])
+        scale, carried = replay.force_scale, found["critical_low"].values
+        row = int(np.argmax(np.where(_away(replay)[contacts] < NEAR, carried, -1.0)))
+        low = carried[row]
+        under = self._puller().loaded(int(replay.backbone[contacts[row]]), low)
+        return {
+            "contact": int(contacts[row]),
+            "values": under.loads / scale,
+            **_networks(under.states / scale, under.residual),
+            "limit": float(found["limit_load"].values[row] / scale),
+            "opened": int(found["opened"].values[row]),
+            "slid": int(found["slid"].values[row]),
+            "displacement": np.nan_to_num(found["displacement"].values[row]).ravel(),
+        }
+
+    def _pushed(self) -> xr.Dataset:
+        """The pushed contacts of the packing that the stores have."""
+        selection = self.cells[MU].selection
+        for store in self.library.stores:
+            for entry in entries(store, kinds.PERTURBATION):
+                same = entry.params["packing"] == selection.packing and entry.params["mu"] == MU
+                found = store[entry.name] if same else None
+                if found is not None:
+                    return found
+        raise InputError("this chapter needs pushed contacts that the store does not have")
+
+
+def curve() -> dict[str, Any]:
+    """By how much forces vary over friction, in the finished study: means over its packings."""
+    by_mu: dict[float, list[float]] = {}
+    for row in study_data.rows("walk"):
+        by_mu.setdefault(row["mu"], []).append(row["eta1"])
+    points = sorted((mu, float(np.mean(found))) for mu, found in by_mu.items() if mu > 0)
+    return {"mu": [mu for mu, _ in points], "spread": [value for _, value in points]}
+
+
+def _bounds(exact: xr.Dataset) -> tuple[Any, Any]:
+    scale = exact["force_scale"].item()
+    return exact["low"].values[:, 0] / scale, exact["high"].values[:, 0] / scale
+
+
+def _away(replay: Any) -> Any:
+    """How far each contact is from the middle of the picture, in half of what is seen (N_c,)."""
+    links, (left, right, bottom, top) = replay.links, replay.window
+    away = np.maximum(
+        np.abs(links.x0 + links.x1 - left - right), np.abs(links.y0 + links.y1 - bottom - top)
+    )
+    nearest = np.full(len(replay.backbone), np.inf)
+    np.minimum.at(nearest, links.contact, away / (right - left))
+    return nearest
+
+
+def _networks(states: Any, residual: Any) -> dict[str, Any]:
+    """Networks (k, N_c, 2) as scripts take them: flat, one after the other."""
+    return {
+        "normal": states[..., 0].astype(np.float32).ravel(),
+        "tangential": states[..., 1].astype(np.float32).ravel(),
+        "residual": residual.astype(np.float64),
+    }

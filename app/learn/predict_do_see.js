@@ -1,0 +1,109 @@
+// The one way in which every chapter works: predict with a marker, do with the hand, see the answer beside it.
+
+import { button, made } from "../browser/dom.js"
+import { QuantityPlot } from "./drawing/quantity_plot.js"
+
+const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks …"
+const STAGES = ["Predict", "Do", "See"]
+
+
+export class PredictDoSee {
+  /**
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: where they go; prediction: made before, or
+   * null; kept({prediction, done}): to be remembered; drawn(): the picture is to be painted.
+   */
+  constructor(chapter, experiment, { plot, voice, row }, prediction, kept, drawn) {
+    Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true })
+    this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
+    this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
+    this.stages = made("span", { className: "stages" })
+    row.prepend(this.button, this.stages)
+    this.sized = new ResizeObserver(() => this.plot.fit())
+    this.sized.observe(plot)
+    this.show()
+  }
+
+  /** A value of the quantity that is asked for, in words. */
+  named(value) { return this.chapter.x.log ? `μ = ${Number(value.toPrecision(2))}` : value.toFixed(2) }
+
+  stop() { this.sized.disconnect() }
+
+  get stage() { return !this.predicted ? 0 : this.experiment.found ? 2 : 1 }
+
+  /** Where the marker waits before it is moved: at the low end of the axis. */
+  get waiting() { return this.chapter.x.low }
+
+  mark(value) {
+    this.prediction = value
+    this.show()
+  }
+
+  /** The prediction stands; the hand may act. */
+  begin() {
+    this.predicted = true
+    this.experiment.locked = false
+    this.kept({ prediction: this.prediction, done: false })
+    const ready = this.experiment.ready?.()
+    if (ready?.then) {
+      this.ready = false
+      ready.then(() => { this.ready = true; this.show() }, (error) => this.fail(error))
+    }
+    this.show()
+    this.plot.dot.focus({ preventScroll: true })
+  }
+
+  fail(error) { this.voice.textContent = error.message }
+
+  /** Everything follows the experiment. */
+  show() {
+    const { experiment, stage, prediction } = this, { picture } = experiment
+    if (stage === 2 && !this.told) this.kept({ prediction, done: (this.told = true) })
+    const words = picture.words ?? `now ${this.named(experiment.value)}`
+    const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
+    const answer = stage === 2 ? { value: experiment.answer, words: this.named(experiment.answer) } : null
+    this.plot.draw({ ...picture, words, marker: guess, answer })
+    this.plot.allow(stage ? (this.ready ? "dot" : null) : "marker")
+    this.button.hidden = stage > 0
+    this.button.disabled = prediction === null
+    this.stages.replaceChildren(...STAGES.map((name, k) => made("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
+    this.speak(stage)
+    this.drawn()
+  }
+
+  /** The one voice: what is to be done, or what was found. */
+  speak(stage) {
+    const { chapter, experiment, voice } = this
+    if (stage < 2) {
+      const words = stage === 0 ? PREDICT : this.ready ? chapter.doing : WAIT
+      if (voice.dataset.said !== words) voice.replaceChildren(made("p", { textContent: words }))
+      voice.dataset.said = words
+    } else if (voice.dataset.said !== `found ${experiment.finds}`) {
+      voice.dataset.said = `found ${experiment.finds}`
+      voice.replaceChildren(...this.answer(chapter.see(experiment.facts), chapter.count?.(experiment.facts)))
+    }
+  }
+
+  /** The answer beside the prediction, with its reason, what is surprising, and the count. */
+  answer([reason, surprise], count) {
+    const { experiment: { answer }, prediction } = this
+    const verdict = made("p", { className: "verdict" })
+    verdict.append(made("b", { textContent: `It is ${this.named(answer)}.` }), ` You predicted ${this.named(prediction)}.`)
+    const words = made("div", { className: "words" })
+    words.append(verdict, made("p", { textContent: reason }), made("p", { textContent: surprise }))
+    if (!count) return [words]
+    return [words, tableOf(count)]
+  }
+}
+
+/** A table, {head, rows}; without a head its last row is a sum. */
+function tableOf({ head, rows }) {
+  const table = made("table", { className: head ? "" : "sum" })
+  const add = (section, cells, tag) => {
+    const row = section.insertRow()
+    row.append(...cells.map((textContent) => made(tag, { textContent })))
+  }
+  if (head) add(table.createTHead(), head, "th")
+  const body = table.createTBody()
+  for (const cells of rows) add(body, cells, "td")
+  return table
+}

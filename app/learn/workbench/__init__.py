@@ -1,0 +1,1 @@
+"""The workbench of small scenes, and its builder."""

@@ -1,0 +1,32 @@
+// The address of the workbench: a scene is a step to go back to, friction is not.
+
+export class Address {
+  /** opened(query): the reader went back, or forward, to another scene. */
+  constructor(opened) {
+    this.returning = false // until the scene gone back to is there
+    this.listener = () => {
+      const { search } = window.location
+      if ([null, "many"].includes(new URLSearchParams(search).get("scene"))) return window.location.reload()
+      this.returning = true
+      opened(search)
+    }
+    window.addEventListener("popstate", this.listener)
+  }
+
+  stop() { window.removeEventListener("popstate", this.listener) }
+
+  /** The address follows what is on screen. */
+  write({ scene: { name, built }, mu }, dark) {
+    if (this.returning) return
+    const there = new URLSearchParams(window.location.search).get("scene"), step = there && there !== name
+    window.history[step ? "pushState" : "replaceState"](null, "", `?${this.query({ scene: name, mu: String(Number(mu.toPrecision(6))), built }, dark)}`)
+  }
+
+  query(given, dark) {
+    const named = Object.entries({ ...given, dark: dark ? "1" : "" }).filter(([, value]) => value !== "" && value !== undefined)
+    return new URLSearchParams(named)
+  }
+
+  /** To a page of its own, in the same theme, with the friction if it was chosen by hand. */
+  leave(scene, mu, dark) { window.location.assign(`?${this.query({ scene, mu: mu === null ? "" : String(Number(mu.toPrecision(6))) }, dark)}`) }
+}

@@ -1,0 +1,79 @@
+// A push on a disk, by hand or by arrow keys, and how large it may become: the limit load.
+
+import { Body } from "../model/polytope.js"
+import { number } from "../model/sentences.js"
+
+const HOW = "Drag a disk, or choose one with N and push with the arrow keys: S shrinks until nothing balances. Press the button again to let go."
+const STEP = 0.02 // of the keyboard, of the largest load
+
+export class PushHand {
+  constructor() { this.stop() }
+
+  /** Nothing is pushed: no disk, and no load but the scene's. */
+  stop() { Object.assign(this, { on: false, disk: null, force: [0, 0], note: "", grip: null }) }
+
+  start() {
+    this.stop()
+    Object.assign(this, { on: true, note: HOW })
+  }
+
+  /** A disk is taken, at a place of the picture; unit: lengths in which a force of 1 is drawn. */
+  take(disk, at, unit) {
+    const before = this.disk === disk ? this.force : [0, 0]
+    this.grip = { disk, unit, from: at.map((v, k) => v - before[k] * unit) }
+  }
+
+  /** It is dragged to a place. */
+  carry(hand, at) {
+    const { disk, unit, from } = this.grip
+    this.push(hand, disk, at.map((v, k) => (v - from[k]) / unit))
+  }
+
+  /** An arrow key: whether it pushed. */
+  key(hand, key) {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
+    if (!step || !this.on) return false
+    const disk = hand.disk ?? this.disk ?? 0, force = this.disk === disk ? this.force : [0, 0]
+    hand.disk = disk
+    this.push(hand, disk, force.map((v, k) => v + STEP * step[k] * hand.body.scaleOf()))
+    return true
+  }
+
+  push(hand, disk, force) {
+    Object.assign(this, { disk, force })
+    hand.load(this.loads(hand.scene, force))
+    this.note = this.words(hand.body) || this.note
+    hand.changed()
+  }
+
+  /** Loads of the scene with a push of this force. */
+  loads(scene, [x, y]) {
+    const loads = Float64Array.from(scene.load)
+    loads[3 * this.disk] += x
+    loads[3 * this.disk + 1] += y
+    return loads
+  }
+
+  /** What is pushed, and how much can be, in words. */
+  words(body) {
+    const size = Math.hypot(...this.force)
+    if (size < 1e-6 || !body.whole) return ""
+    const most = this.limit(body)
+    const end = Number.isFinite(most) ? `at most ${number(most)} can be borne this way (the limit load)` : "no push this way is too large: it only presses the disks against their walls"
+    return `You push disk ${this.disk + 1} with ${number(size)}: ${end}.${body.empty ? " Now nothing balances." : ""}`
+  }
+
+  /** The largest push this way under which S is not empty, by halving; Infinity without one. */
+  limit(body) {
+    const trial = new Body(body.scene), size = Math.hypot(...this.force)
+    const holds = (F) => {
+      trial.load = this.loads(body.scene, this.force.map((v) => (v * F) / size))
+      trial.reload()
+      return !trial.cut(body.mu).empty
+    }
+    let [low, high] = [0, 64 * trial.scaleOf()]
+    if (holds(high)) return Infinity
+    for (let k = 0; k < 22; k++) { const F = (low + high) / 2; if (holds(F)) low = F; else high = F }
+    return low
+  }
+}

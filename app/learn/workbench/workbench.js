@@ -1,0 +1,362 @@
+// The workbench of small scenes: the disks and their S side by side, friction, and what is done with them.
+
+import { goneBanner } from "../../browser/connection_lost.js"
+import { saveBytes } from "../../browser/download.js"
+import { ask } from "../../browser/send.js"
+import { Bars } from "../drawing/bars.js"
+import { palette } from "../drawing/palette.js"
+import { Arrows, tall } from "../drawing/scene_canvas.js"
+import { Space } from "../drawing/space.js"
+import { SceneInHand } from "../model/scene_in_hand.js"
+import { barred, counted, forceName, legend, pictured, sentence, special, stopping } from "../model/sentences.js"
+import { Address } from "./address.js"
+import { Builder } from "./builder.js"
+import { layout } from "./layout.js"
+import { PushHand } from "./push_hand.js"
+import { RandomWalk } from "./random_walk.js"
+import { Axes } from "./shadow_axes.js"
+
+const MOST_MU = 1.5 // on the slider; larger ones can be typed
+const REST_MS = 150 // after which what only the server tells is asked for
+const FEW = 12 // contacts up to which all their intervals are seen at once
+
+class Workbench {
+  constructor(model, view) {
+    Object.assign(this, { model, view, hand: null, filled: false, chosenMu: false, frame: 0, resting: 0, painted: 0, written: {}, parts: {} })
+    const root = this.root = document.createElement("div")
+    root.className = "bench"
+    root.innerHTML = layout(MOST_MU)
+    this.gone = goneBanner(view, "What is in the page still moves.")
+    root.prepend(this.gone)
+    this.builder = new Builder(this.part("own"), (built) => ask(model, view, { built, mu: this.hand.mu }))
+    this.arrows = new Arrows(this.part("packing"), (what, given) => this.heard(what, given))
+    this.space = new Space(this.part("space"), (what, given) => this.heard(what, given))
+    this.bars = new Bars(this.part("bars"))
+    this.axes = new Axes(this.part("plane"), (shadow) => this.cast(shadow))
+    this.push = new PushHand()
+    this.walk = new RandomWalk(this.part("play"), (path) => { this.hand.path = path; this.changed() })
+    this.address = new Address((query) => ask(model, view, { query }))
+    this.controls()
+    this.follow()
+    this.dress()
+    this.show()
+  }
+
+  part(name) { return (this.parts[name] ??= this.root.querySelector(`.${name}`)) }
+
+  /** The model, the window and the keys are listened to, until the page goes. */
+  follow() {
+    const { model, root } = this, key = (event) => this.key(event)
+    const sized = new ResizeObserver(() => { this.arrows.wide = 0; this.soon() })
+    for (const seen of [root, this.part("packing"), this.part("space")]) sized.observe(seen)
+    window.addEventListener("keydown", key)
+    model.on("remove", () => {
+      window.removeEventListener("keydown", key)
+      this.address.stop()
+      sized.disconnect()
+      this.walk.pause()
+    })
+    model.on("scene", () => this.show())
+    model.on("dark", () => { this.dress(); this.soon(); if (this.hand) this.address.write(this.hand, model.dark) })
+    model.on("msg:custom", (news) => this.arrived(news))
+  }
+
+  dress() { this.root.style.colorScheme = this.model.dark ? "dark" : "light" } // for the browser's own controls
+
+  // What is seen
+
+  soon() { this.frame ||= requestAnimationFrame(() => this.paint()) }
+
+  /** What is said and what is painted follow the hand. */
+  changed() {
+    this.say()
+    this.soon()
+  }
+
+  paint() {
+    this.frame = 0
+    const { hand, root, arrows, space, builder } = this, canvas = this.part("packing")
+    if (!hand || !root.isConnected) return
+    const { body } = hand, own = body.scene.name === "own", colours = palette(this.model.dark)
+    const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
+    const cursor = this.builds && root.getRootNode().activeElement === canvas ? builder.cursor : null
+    const axes = new Map(space.axed.map((force, k) => [force, [colours.across, colours.up][k]]))
+    const { disk, contact, side, fall, enough, lit } = hand
+    const look = { ...colours, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
+    if (body.scene !== arrows.body?.scene || arrows.wide !== canvas.clientWidth) {
+      arrows.fit(body, own && arrows.own === canvas.clientWidth)
+      arrows.own = own ? canvas.clientWidth : 0
+      arrows.wide = canvas.clientWidth
+    }
+    arrows.draw({ ...look, contacts: lit })
+    if (space.draw(body, look, hand.path)) this.soon()
+    this.painted++
+    if (!this.walk.frame || this.painted % 2) this.bars.draw(body, lit, hand.bounds) // numbers on a walk: every second frame
+  }
+
+  /** Words into a part of the page, if they are others: what stays the same is not laid out anew. */
+  write(name, text, how = "textContent") {
+    if (this.written[name] !== text) this.part(name)[how] = this.written[name] = text
+  }
+
+  say(note = this.push.note) {
+    const { hand } = this, { body } = hand
+    this.write("count", counted(body), "innerHTML")
+    this.write("legend", legend(body))
+    this.write("special", special(body))
+    this.write("key", barred(body))
+    this.write("what", pictured(body, { filled: this.filled }))
+    this.write("says", note || sentence(body, hand.mu, { filled: this.filled, fall: hand.fall, enough: hand.enough }))
+    this.write("mend", `Set μ = ${hand.enough}`)
+    this.part("mend").hidden = !hand.enough
+    this.part("says").classList.toggle("bad", body.empty && !body.scene.idle)
+    this.part("undo").disabled = !hand.undos.length
+  }
+
+  // A scene comes
+
+  show() {
+    const { model: { scene }, space, builder } = this, before = this.hand?.scene, own = scene.name === "own"
+    this.part("own").hidden = !own
+    this.root.classList.toggle("waiting", !scene.i)
+    if (!scene.i) {
+      this.part("name").value = new URLSearchParams(window.location.search).get("scene") ?? this.part("name").value
+      return this.write("says", "The disks are being pressed together …")
+    }
+    this.walk.pause()
+    this.pushes(false)
+    this.hand = new SceneInHand(scene, () => this.changed())
+    const { body } = this.hand
+    if (own && builder.read(scene.built, scene.begins)) this.arrows.own = 0
+    Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
+    space.shadow = this.axes.show(body, (force) => forceName(scene, force))
+    if (this.filled) space.fill()
+    this.part("name").value = scene.name
+    this.part("ranges").open = body.count <= FEW || tall(scene)
+    this.root.classList.toggle("explained", Boolean(scene.box[0]) || own)
+    this.root.classList.toggle("tall", tall(scene))
+    this.address.returning = false
+    if (before && !(own && before.name === "own")) this.address.write(this.hand, this.model.dark)
+    this.showMu()
+    this.say(before ? "" : this.model.note)
+    this.rest()
+    this.soon()
+  }
+
+  /** Which two forces S casts its shadow on. */
+  cast(shadow) {
+    Object.assign(this.space, { shadow, outline: { points: [], stale: true }, sceneDrawn: null })
+    this.changed()
+    this.measure()
+  }
+
+  // Friction
+
+  showMu() {
+    this.part("range").value = Math.min(this.hand.mu, MOST_MU)
+    this.part("typed").value = String(Number(this.hand.mu.toPrecision(4)))
+  }
+
+  setMu(mu) {
+    this.chosenMu = true
+    this.cut(() => this.hand.cut(mu))
+    this.showMu()
+  }
+
+  /** S is another one: its points are drawn anew, and what only the server tells is asked for once the hand rests. */
+  cut(act) {
+    const { space } = this
+    space.outline.stale = true
+    act()
+    if (this.filled && this.hand.body.whole) space.fill()
+    else space.dots = [] // many dimensions take their time: once friction rests
+    this.rest()
+    this.soon()
+  }
+
+  rest() {
+    clearTimeout(this.resting)
+    this.resting = setTimeout(() => this.rested(), REST_MS)
+  }
+
+  rested() {
+    const { hand, space } = this, { body } = hand, fails = body.empty && !body.scene.idle
+    this.address.write(hand, this.model.dark) // first: where the server is gone, asking it fails
+    if (!body.empty && this.filled && !space.dots.length && body.bounded) { space.fill(); this.soon() }
+    if (fails && !hand.enough) { hand.enough = body.enough(MOST_MU); this.changed() }
+    if (fails) this.find("fall")
+    this.measure()
+  }
+
+  // What only the server tells
+
+  /** Ask for a file, how the disks fall, or what is exact, of what is in hand. */
+  find(what) {
+    const { model, view, hand: { scene: { name: scene, built }, mu, body } } = this
+    ask(model, view, { find: what, scene, built, mu, load: [...body.load], plane: this.space.shadow })
+  }
+
+  /** Above three dimensions, what only linear programs tell. */
+  measure() {
+    const { body } = this.hand
+    if (!body.empty && !body.whole) this.find("measured")
+  }
+
+  arrived(news) {
+    const { hand, space } = this
+    if (news.error) return this.refused(news.error)
+    if (news.file) saveBytes(news.file, `${hand.scene.name}.npz`)
+    if (news.fall && hand.body.empty) {
+      hand.fall = news.fall.length ? news.fall : null
+      this.changed()
+    }
+    if (news.measured && news.scene === hand.scene.name && news.mu === hand.mu && !hand.body.whole) {
+      const { bounds, outline, endless } = news.measured
+      hand.bounds = bounds
+      hand.body.bounded = !endless
+      if (endless) space.dots = []
+      if (news.plane.join() === space.shadow.join()) space.outline = { points: outline ?? [], stale: false }
+      this.changed()
+    }
+  }
+
+  refused(error) {
+    if (!this.hand) return this.write("says", error)
+    this.address.returning = false
+    this.part("name").value = this.hand.scene.name
+    this.say(error)
+  }
+
+  // The hand
+
+  get builds() { return this.hand?.scene.name === "own" && !this.push.on }
+
+  /** What a picture tells of the hand on it. */
+  heard(what, given) {
+    const { hand } = this
+    if (what === "words") return stopping(hand.body, given)
+    if (what === "press") return this.press(given)
+    if (what === "go" || what === "pull") this.walk.pause()
+    if (what === "hover") hand.point(given)
+    else if (what === "select") hand.select(given)
+    else if (what === "point") hand.readBy(given)
+    else if (what === "side") hand.lookAt(given)
+    else if (what === "begin") hand.remember()
+    else if (what === "go") hand.goTo(given)
+    else if (what === "pull") hand.pull(given.contact, given.normal, given.tangential)
+    else if (what === "carry") this.carry(given.at)
+    else if (what === "release" && this.builds) this.builder.release()
+    this.part("undo").disabled = !hand.undos.length
+    this.soon()
+  }
+
+  press({ found, at }) {
+    if (this.builds) return this.builder.press(at)
+    if (!this.push.on || found?.disk === undefined) return false
+    this.walk.pause()
+    this.push.take(found.disk, at, this.arrows.forceUnit)
+    return true
+  }
+
+  carry(at) {
+    if (this.builds) this.builder.carry(at)
+    else this.cut(() => this.push.carry(this.hand, at))
+  }
+
+  /** Test pushes begin, or end. */
+  pushes(on) {
+    const { push, hand } = this, pushed = push.disk !== null
+    if (on) push.start()
+    else push.stop()
+    this.part("push").classList.toggle("on", on)
+    this.part("push").setAttribute("aria-pressed", on)
+    if (pushed && hand) this.cut(() => hand.load(hand.scene.load))
+  }
+
+  key(event) {
+    const { key } = event, { hand } = this, over = (names) => event.composedPath().some((node) => node.matches?.(names))
+    if (event.metaKey || event.ctrlKey || !hand || !this.root.isConnected) return
+    if (over("input, select, textarea, dialog") || (key === " " && over("button, summary, a"))) return
+    if (this.pushKey(key) || (this.builds && over(".packing") && this.builder.key(key, this.arrows.middle)) || this.sceneKey(key.toLowerCase())) {
+      event.preventDefault()
+      this.soon()
+    }
+  }
+
+  pushKey(key) {
+    let pushed = false
+    if (this.push.on && key.startsWith("Arrow")) this.cut(() => { pushed = this.push.key(this.hand, key) })
+    return pushed
+  }
+
+  /** A key that does something to the scene; whether it did. */
+  sceneKey(key) {
+    const { hand } = this
+    if (key === "z") this.undo()
+    else if (key === " ") this.walk.toggle(hand.body)
+    else if (key === "escape") { hand.choose(null); hand.chosen = false }
+    else if (key === "[" || key === "]") hand.nudge(key === "]" ? 1 : -1)
+    else if (key === "n" && this.push.on) hand.disk = ((hand.disk ?? -1) + 1) % hand.scene.r.length
+    else if (key === "n") hand.next()
+    else return false
+    return true
+  }
+
+  undo() {
+    this.walk.pause()
+    this.hand.undo()
+    this.part("undo").disabled = !this.hand.undos.length
+  }
+
+  // Controls
+
+  controls() {
+    const does = (name, act, event = "click") => this.part(name).addEventListener(event, act)
+    this.part("name").innerHTML = this.model.titles.map(([name, title]) => `<option value="${name}">${title}</option>`).join("")
+    does("name", (event) => this.open(event.target), "change")
+    does("range", (event) => this.setMu(Number(event.target.value)), "input")
+    does("typed", (event) => this.type(event.target.value), "change")
+    does("play", () => { this.walk.toggle(this.hand.body); this.soon() })
+    does("fill", () => this.fill())
+    does("undo", () => this.undo())
+    does("push", () => { this.pushes(!this.push.on); this.changed() })
+    does("save", () => this.find("file"))
+    does("mend", () => this.setMu(this.hand.enough))
+    does("bars", (event) => {
+      const row = event.target.closest("[data-contact]")
+      if (row) { this.hand.choose(Number(row.dataset.contact)); this.soon() }
+    }, "pointerover")
+    does("bars", () => { if (!this.hand.chosen) { this.hand.choose(null); this.soon() } }, "pointerleave")
+  }
+
+  fill() {
+    this.filled = !this.filled
+    if (this.filled) this.space.fill()
+    this.part("fill").classList.toggle("on", this.filled)
+    this.changed()
+  }
+
+  type(text) {
+    const mu = Number(text.replace(",", "."))
+    if (text.trim() && Number.isFinite(mu) && mu >= 0) return this.setMu(mu)
+    this.say("μ is a number from 0 on")
+    this.showMu()
+  }
+
+  /** Another scene, from the list. */
+  open({ value: scene, selectedOptions: [option] }) {
+    const { model, view, chosenMu, hand: { mu } } = this
+    if (scene === "many") {
+      clearTimeout(this.resting)
+      return this.address.leave(scene, chosenMu ? mu : null, model.dark)
+    }
+    if (!this.gone.hidden) { // the page opens anew with its address, once there is a server again
+      window.history.pushState(null, "", `?scene=${scene}`)
+      return this.say("This scene opens once the connection is back.")
+    }
+    this.write("says", `Making “${option.textContent}” …`)
+    ask(model, view, chosenMu ? { scene, mu } : { scene })
+  }
+}
+
+export function render({ model, view }) { return new Workbench(model, view).root }

@@ -1,0 +1,111 @@
+"""Learn, played from the first prediction to the last answer, on the store that ships."""
+
+import re
+
+import pytest
+from serving import serve
+
+WORDS = 70  # at most, before the hand acts
+# Name of each chapter: its heading; keys that carry the dot to the answer, how often; the answer.
+CHAPTERS = {
+    "groove": ("How hard does the wall press?", ("ArrowRight", 40), "1.41"),
+    "box": ("How much can the floor carry?", ("ArrowRight", 40), "2.86"),
+    "thirteen": ("How strong can one contact get?", ("ArrowRight", 40), "4.84"),
+    "four-hundred": ("Grab one force", ("ArrowRight", 40), None),
+    "chance": ("How far does chance go?", ("ArrowUp", 65), None),
+    "friction": ("Which friction leaves most open?", ("ArrowRight", 4), "μ = 0.2"),
+    "push": ("When does something move?", ("ArrowRight", 60), None),
+}
+COUNTS = {"groove": "4 − 3", "box": "8 − 6", "thirteen": "46 − 38"}
+
+
+@pytest.fixture(scope="module")
+def lesson(tmp_path_factory):
+    """Address of the app on the store that ships."""
+    with serve(tmp_path_factory.mktemp("lesson")) as (url, _):
+        yield url
+
+
+def dot(page):
+    return page.locator("figure").get_by_role("slider").nth(1)
+
+
+def predict(page, steps=20):
+    """Put the marker by keys, and let the prediction stand."""
+    marker = page.get_by_role("slider", name="your prediction")
+    assert page.get_by_role("button", name="That is my prediction").is_disabled()
+    marker.focus()
+    for _ in range(steps):
+        page.keyboard.press("ArrowRight")
+    page.get_by_role("button", name="That is my prediction").click()
+
+
+def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
+    page = opening("?learn", 1280, 900, at=lesson)
+    for name, (heading, (key, times), answer) in CHAPTERS.items():
+        page.get_by_role("heading", name=heading).wait_for()
+        question = page.locator("article strong")
+        question.wait_for()
+        assert len(page.locator("article > p").first.inner_text().split()) <= WORDS, name
+        found = page.get_by_text(re.compile(r"^It is "))
+        assert found.count() == 0  # nothing is told before
+        predict(page)
+        page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
+        dot(page).focus()
+        for press in range(times):
+            page.keyboard.press(key)
+            if name == "friction":  # each stop is a packing that is sent
+                stop = re.compile("μ = (0.2|1|10)$")
+                press and page.locator("text").filter(has_text=stop).first.wait_for()
+        found.wait_for()
+        told = page.locator(".voice").inner_text()
+        assert answer is None or f"It is {answer}." in told, name
+        assert "You predicted" in told and COUNTS.get(name, "") in told
+        if name != "push":
+            page.get_by_role("button", name="Next").click()
+    assert page.get_by_title("done").count() == 7
+    # What was done is remembered, and the numbers of 400 disks are those of the packing.
+    page.goto(f"{lesson}?learn=four-hundred")
+    page.get_by_role("heading", name="Grab one force").wait_for()
+    assert page.get_by_title("done").count() == 7
+    page.get_by_role("link", name="Build your own").click()
+    page.get_by_role("radio", name="Gravity").wait_for()
+
+
+def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_drawn(
+    opening, lesson
+):
+    page = opening("?learn=groove", 390, 844, at=lesson)
+    page.locator("article strong").wait_for()
+    predict(page, 30)
+    assert page.locator("path.exact").get_attribute("d") == ""
+    circle = dot(page).locator("circle")
+    circle.scroll_into_view_if_needed()
+    box = circle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y, steps=4)
+    assert page.locator("path.seen").get_attribute("d") != ""
+    assert page.locator("path.exact").get_attribute("d") == ""
+    page.mouse.move(x + 300, y, steps=4)
+    page.mouse.up()
+    page.get_by_text("It is 1.41.").wait_for()
+    assert page.locator("path.exact").get_attribute("d") != ""
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_back_goes_through_chapters_and_a_frame_shows_one_alone(opening, lesson):
+    page = opening("?learn=box", 1280, 900, at=lesson)
+    page.get_by_role("button", name="Next").click()
+    page.get_by_role("heading", name="How strong can one contact get?").wait_for()
+    assert page.url.endswith("learn=thirteen")
+    page.go_back()
+    page.get_by_role("heading", name="How much can the floor carry?").wait_for()
+    page.get_by_role("button", name="Back").click()
+    page.get_by_role("heading", name="How hard does the wall press?").wait_for()
+    alone = opening("?learn=box&embed=1", 700, 700, at=lesson)
+    alone.get_by_role("heading", name="How much can the floor carry?").wait_for()
+    alone.locator("article strong").wait_for()
+    assert not alone.get_by_role("button", name="Next").is_visible()
+    assert alone.get_by_role("navigation").filter(visible=True).count() == 0
