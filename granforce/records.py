@@ -8,8 +8,10 @@ f_n n + f_t t, and f_n ≥ 0 presses.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any, NamedTuple, TypeVar
+import functools
+import inspect
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +26,7 @@ LARGEST_WHOLE = 2**53
 # More threads, or processes, than any machine has.
 MOST_WORKERS = 4096
 
+P = ParamSpec("P")
 T = TypeVar("T")
 # What arrays may hold instead of real numbers, by numpy's letters.
 _KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "text", "V": "records"}
@@ -123,6 +126,39 @@ class Relaxation(NamedTuple):
     violation: float  # cone violation in ⟨f_n⟩, by Ensemble.violation
     converged: bool  # the solver's own iteration ended (at rest or in steady motion)
     seconds: float  # wall time
+
+
+# The call that makes what a function takes first.
+_MADE_BY = {
+    "Ensemble": "S = gf.ensemble(packing)",
+    "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
+}
+
+
+def takes(kind: type) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """A decorator: the function raises InputError unless its first argument is of this kind.
+
+    The message names the call that makes one.
+    """
+
+    def checked(function: Callable[P, T]) -> Callable[P, T]:
+        first = next(iter(inspect.signature(function).parameters))
+
+        @functools.wraps(function)
+        def inside(*arguments: P.args, **options: P.kwargs) -> T:
+            given = arguments[0] if arguments else options.get(first, function)
+            if given is not function and not isinstance(given, kind):
+                name, plain = kind.__name__, isinstance(given, (str, int, float))
+                raise InputError(
+                    f"{function.__name__} takes a record of type {name}, not "
+                    f"{brief(given) if plain else type(given).__name__}; make one first: "
+                    f"{_MADE_BY[name]}"
+                )
+            return function(*arguments, **options)
+
+        return inside
+
+    return checked
 
 
 def refuse_hidden(values: T, name: str) -> T:

@@ -1,5 +1,6 @@
 """What a newcomer tries first, with nothing but the README, `help()` and the TAB key."""
 
+import inspect
 import json
 import pydoc
 import subprocess
@@ -61,6 +62,68 @@ def test_bash_completes_options_choices_and_files(capsys, tmp_path):
     assert "packing.npz" in completed("granforce", "intervals", "--packing", "pack")
 
 
+def of_ensembles():
+    """Public functions that take an Ensemble first."""
+    functions = {name: getattr(gf, name) for name in gf.__all__}
+    first = {
+        name: next(iter(inspect.signature(function).parameters.values())).annotation
+        for name, function in functions.items()
+        if inspect.isfunction(function)
+    }
+    return [name for name, kind in first.items() if kind in (gf.Ensemble, "Ensemble")]
+
+
+@pytest.mark.parametrize("name", of_ensembles())
+def test_a_packing_where_an_ensemble_is_meant_is_answered_with_the_call_that_makes_one(name):
+    function = getattr(gf, name)
+    needed = [
+        parameter.name
+        for parameter in inspect.signature(function).parameters.values()
+        if parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+    ]
+    with pytest.raises(gf.InputError, match=r"gf\.ensemble\(packing\)"):
+        function(gf.scene("groove", 0.5), *(None for _ in needed[1:]))
+
+
+def test_other_wrong_first_arguments_name_the_call_too():
+    assert len(of_ensembles()) > 18
+    with pytest.raises(gf.InputError, match=r"'p\.npz'.*gf\.load_packing"):
+        gf.ensemble("p.npz")
+    S = gf.ensemble(gf.scene("groove", 0.5))
+    with pytest.raises(gf.InputError, match=r"give its `\.states`"):
+        gf.measures.eta1(gf.walk(S, 5))
+    with pytest.raises(gf.InputError, match=r"give its `\.flat`"):
+        gf.measures.eta2(gf.sample_uniform(S, 8))
+    with pytest.raises(gf.NotJammedError, match=r"`granforce stress`.*gf\.stress_outline"):
+        gf.ensemble(packed(30, 0.3), prescribed="stress", stress=(5, 0.1, 2))
+
+
+def test_seeds_have_defaults_as_on_the_command_line():
+    defaults = {
+        name: parameters["seed"].default
+        for name in gf.__all__
+        if inspect.isfunction(function := getattr(gf, name))
+        and "seed" in (parameters := inspect.signature(function).parameters)
+    }
+    assert defaults.pop("pack") == 1 and set(defaults.values()) == {0}
+
+
+def test_a_mistyped_store_leaves_nothing(tmp_path):
+    assert len(gf.open_store(tmp_path / "typo.zarr")) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_file_is_said_before_anything_is_imported():
+    code = (
+        "import sys; from granforce.cli import main\n"
+        "code = main(['intervals', '--packing', 'missing.npz'])\n"
+        "print(code, 'numpy' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stdout == "2 False\n"
+    assert run.stderr.count("\n") == 1 and "missing.npz: cannot be read" in run.stderr
+
+
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     """A folder of one's own, and a store in it."""
@@ -101,3 +164,13 @@ def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys
     assert "f_n [mean]" in told and "--unit packing" in told and told.count("\n") == 1
     Path("known.csv").write_text("contact,f_n_low [packing]\n0,0.5\n")
     assert gf.read_known("known.csv").low.tolist() == [[0.5, -np.inf]]
+
+
+def test_relaxations_are_typed_as_functions_are_called():
+    from granforce.cli.options import RELAXATIONS as typed
+    from granforce.study.kinds.states import RELAXATIONS as computed
+
+    assert set(typed.values()) == set(computed)
+    for name, word in typed.items():
+        function = computed[word]["relax"]
+        assert getattr(gf, name.removesuffix("_only")) is function

@@ -6,6 +6,7 @@ import shlex
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
+from granforce.cli.options import RELAXATIONS
 from granforce.records import InputError, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
@@ -195,7 +196,8 @@ def command(selection: Selection) -> str:
     """The command that makes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
-        words += ["--walk-seed", selection.seed, "--relax", selection.relax]
+        typed = next(typed for typed, word in RELAXATIONS.items() if word == selection.relax)
+        words += ["--walk-seed", selection.seed, "--relax", typed]
     elif selection.seed:
         words += ["--sample-seed", selection.seed]
     return shlex.join(str(word) for word in words)

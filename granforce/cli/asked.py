@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
+from granforce.cli.options import RELAXATIONS
 from granforce.packing import importers
 from granforce.records import InputError, Packing, worker_count
 from granforce.study import cells as study
@@ -237,7 +238,7 @@ def walked(arguments: argparse.Namespace, output: str | None = None) -> Found:
         watching=telling_eta,
         states=arguments.states,
         seed=arguments.walk_seed,
-        relax=arguments.relax,
+        relax=RELAXATIONS[arguments.relax],
         chains=arguments.chains,
         **conditions(arguments),
     )

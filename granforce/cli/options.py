@@ -212,6 +212,15 @@ def add_known(group: argparse._ArgumentGroup) -> None:
     )
 
 
+# Relaxations as they are typed, which is as functions are called, and in the keys of results.
+RELAXATIONS = {
+    "nearest": "accelerated",
+    "nearest_piqp": "nearest",
+    "gauss_seidel": "gauss_seidel",
+    "gauss_seidel_only": "gauss_seidel_only",
+}
+
+
 def add_walk_options(command: Parser) -> None:
     group = command.add_argument_group("the random walk")
     group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
@@ -219,8 +228,8 @@ def add_walk_options(command: Parser) -> None:
     group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
     group.add_argument(
         "--relax",
-        choices=["gauss_seidel", "gauss_seidel_only", "nearest", "accelerated"],
-        default="accelerated",
+        choices=list(RELAXATIONS),
+        default="nearest",
         help="the nearest admissible network, by our own solver (default) or by PIQP, or the "
         "paper's contact dynamics with an exact finish or (slower, to 1e-6) without",
     )

@@ -67,6 +67,11 @@ def command() -> NoReturn:
 
 
 def _run(arguments: argparse.Namespace, parser: Parser) -> int:
+    command = parser.chosen(arguments)
+    for _, path in command.paths(arguments):
+        # Before the imports, which take seconds.
+        if isinstance(path, Input) and not os.path.lexists(os.path.expanduser(path)):
+            return refused(f"{path}: cannot be read (No such file or directory); check the path")
     from granforce.records import Cancelled, InputError
     from granforce.system.terminal import one_line
 
@@ -77,7 +82,7 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
 
         interrupts.check()  # an import may have swallowed it
         tell_when_compiling(_say_compiling)
-        _check_paths(arguments, parser.chosen(arguments))
+        _check_paths(arguments, command)
         code: int = getattr(commands, arguments.run)(arguments) or 0
         store = getattr(arguments, "store", None)
         return max(code, 1) if store is not None and store.incomplete else code

@@ -11,7 +11,7 @@ from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
 from granforce.numerics.certified_values import Solver
-from granforce.records import positive
+from granforce.records import positive, takes
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
@@ -39,6 +39,7 @@ class Carrying(NamedTuple):
         return notebook.table("Contacts that carry", lines | self.counts)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def carrying(
     ensemble: Ensemble,

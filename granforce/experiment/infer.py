@@ -23,7 +23,7 @@ from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
-from granforce.records import random_seed, whole, worker_count
+from granforce.records import random_seed, takes, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.types import Cancel, Floats, Integers, Progress
@@ -104,6 +104,7 @@ class Inference(NamedTuple):
         return notebook.table("Inferred forces", lines)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def infer(
     ensemble: Ensemble,

@@ -10,7 +10,7 @@ from granforce.explore.intervals import intervals
 from granforce.explore.uniform import UniformSample, sample_uniform
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
-from granforce.records import InputError, whole
+from granforce.records import InputError, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Progress
@@ -32,6 +32,7 @@ class Informative(NamedTuple):
         return notebook.table("Which measurement next", lines)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def informative(
     ensemble: Ensemble,

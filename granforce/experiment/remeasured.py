@@ -23,7 +23,7 @@ from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many
 from granforce.numerics.lanes import LANES
-from granforce.records import random_seed
+from granforce.records import random_seed, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
 
@@ -51,6 +51,7 @@ class Remeasured(Inference):
         return np.sqrt(np.mean((self.drawn.flat - self.forces) ** 2, axis=0))
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def remeasured(
     ensemble: Ensemble,

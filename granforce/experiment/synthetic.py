@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from granforce.experiment.listing import Listing
 from granforce.experiment.pegs import Photoelastic
 from granforce.forces.build import ensemble
-from granforce.records import Contacts, InputError, Packing, positive, random_seed, whole
+from granforce.records import Contacts, InputError, Packing, positive, random_seed, takes, whole
 from granforce.system.files import written
 from granforce.tolerances import LARGEST_UNIT
 from granforce.types import Floats, Integers
@@ -56,6 +56,7 @@ class SyntheticFrame(NamedTuple):
                 np.savetxt(file, whole, fmt="%.9g", delimiter=",")
 
 
+@takes(Packing)
 def synthetic_frame(
     packing: Packing,
     *,

@@ -20,7 +20,7 @@ from granforce.forces import hull
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, inner_point
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, takes
 from granforce.types import Floats, Integers, Mask
 
 MOST_DIMENSIONS = 3
@@ -79,6 +79,7 @@ class Body(NamedTuple):
         return notebook.table("S, whole", lines | {"has an end everywhere": self.bounded})
 
 
+@takes(Ensemble)
 def body(S: Ensemble) -> Body:
     """The Body of an Ensemble S of at most MOST_DIMENSIONS dimensions.
 
@@ -106,6 +107,7 @@ def body(S: Ensemble) -> Body:
     return Body(origin, S.to_forces(axes.T), corners, _unit(rays), sides)
 
 
+@takes(Packing)
 def fall(packing: Packing, mu: float | None = None) -> Floats | None:
     """The motion (N, 3) of the grains, velocity and r ω, that proves that nothing balances.
 

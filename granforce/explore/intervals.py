@@ -24,7 +24,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
-from granforce.records import InputError, float_array
+from granforce.records import InputError, float_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
@@ -79,6 +79,7 @@ class LimitLoads(NamedTuple):
     counts: dict[str, int]  # programs, again, iterations
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def intervals(
     ensemble: Ensemble,
@@ -211,6 +212,7 @@ def _intervals(
     return Intervals(numbers, low, high, gap, backbone, max_gap, converged, counts)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def limit_loads(
     ensemble: Ensemble, contacts: npt.ArrayLike | None = None, **options: Any
@@ -219,6 +221,7 @@ def limit_loads(
     return limit_load_bounds(ensemble, contacts, **options).load
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def limit_load_bounds(
     ensemble: Ensemble,

@@ -18,7 +18,7 @@ from granforce.forces.contact_problem import cone_costs, forces_of, known_part, 
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.records import Cancelled, InputError, float_array, moderate, positive
+from granforce.records import Cancelled, InputError, float_array, moderate, positive, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask, Progress
 
@@ -49,6 +49,7 @@ class _Support(NamedTuple):
     bound: Floats  # (n,) d·x ≤ bound for all x of the projection
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def outline(
     ensemble: Ensemble,

@@ -22,7 +22,7 @@ from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
-from granforce.records import InputError, UndecidedError, float_array, real_array
+from granforce.records import InputError, UndecidedError, float_array, real_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask
@@ -64,6 +64,7 @@ class Reach(NamedTuple):
     sliding: Integers  # (2, N_c) int, sign of f_t where every network there has |f_t| = μ f_n
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def pull(
     ensemble: Ensemble,
@@ -173,6 +174,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
     )
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def reach(
     ensemble: Ensemble, contact: int, *, workers: int = 1, cancel: Cancel | None = None

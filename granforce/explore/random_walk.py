@@ -23,6 +23,7 @@ from granforce.records import (
     Relaxation,
     brief,
     random_seed,
+    takes,
     worker_count,
 )
 from granforce.records import whole as whole_number
@@ -85,11 +86,12 @@ def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
     return "accepted" if admitted else "rejected"
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def walk(
     ensemble: Ensemble,
-    states: int,
-    seed: int,
+    states: int = 1000,
+    seed: int = 0,
     *,
     chains: int = 1,
     workers: int = 1,

@@ -14,7 +14,7 @@ from granforce import notebook
 from granforce.explore.outline import outline, supports
 from granforce.forces.balance import stress_of, stress_rows
 from granforce.forces.ensemble import Ensemble
-from granforce.records import InputError, float_array, whole
+from granforce.records import InputError, float_array, takes, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
 
@@ -47,6 +47,7 @@ class StressOutline(NamedTuple):
         return notebook.table("Stresses that the contacts can carry", lines)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def stress_outline(
     ensemble: Ensemble,
@@ -89,6 +90,7 @@ def stress_outline(
     )
 
 
+@takes(Ensemble)
 def stress_plane(ensemble: Ensemble, states: Floats) -> Floats:
     """Points (…, 2) of the stresses of networks (…, N_c, 2): ((σ_xx − σ_yy)/2P, σ_xy/P).
 

@@ -21,7 +21,7 @@ from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
-from granforce.records import Cancelled, choice, positive, random_seed, whole, worker_count
+from granforce.records import Cancelled, choice, positive, random_seed, takes, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
@@ -198,6 +198,7 @@ def _chords(made: Walls, ends: list[ChainState]) -> Flown:
     return ends, slacks[:, None], np.zeros((len(ends), 2), dtype=int)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def sample_uniform(
     ensemble: Ensemble,

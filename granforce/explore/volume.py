@@ -27,7 +27,7 @@ from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
-from granforce.records import positive, random_seed, worker_count
+from granforce.records import positive, random_seed, takes, worker_count
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Progress
 
@@ -85,6 +85,7 @@ class Volume(NamedTuple):
         return notebook.table("Volume of S", lines)
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def volume(
     ensemble: Ensemble,

@@ -183,7 +183,12 @@ def _unbalanced_message(full: Ensemble) -> str:
     size = 1 + full.per_contact
     load = np.linalg.norm(rest[: size * len(full.grains)].reshape(-1, size), axis=1)
     worst = np.argsort(load)[::-1][:5]
-    carries = "" if full.prescribed != "stress" else "the contacts cannot carry this stress, or "
+    carries = ""
+    if full.prescribed == "stress":
+        carries = (
+            "the contacts cannot carry this stress (`granforce stress` and gf.stress_outline say "
+            "which they can), or "
+        )
     named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
     return (
         f"no admissible force network exists: {carries}the packing is not jammed, or contacts are "

@@ -17,7 +17,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.hull import hull_of
 from granforce.forces.knowledge import Known
 from granforce.forces.nearest import nearest
-from granforce.records import InputError, NotJammedError, Packing, friction
+from granforce.records import InputError, NotJammedError, Packing, friction, takes
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Floats, Integers, Mask
 
@@ -25,6 +25,7 @@ from granforce.types import Floats, Integers, Mask
 _NAMES = {1: "pressure", 3: "stress"}
 
 
+@takes(Packing)
 def ensemble(
     packing: Packing,
     mu: float | None = None,

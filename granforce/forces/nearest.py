@@ -27,7 +27,7 @@ from granforce.numerics import certificates, cone_projection, contact_program, h
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.interior_point import OPTIMUM, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import InputError, Relaxation, positive, whole
+from granforce.records import InputError, Relaxation, positive, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
@@ -48,6 +48,7 @@ MOST_STEPS = 100
 SHORT, SHORT_IN_A_ROW = 1e-4, 8
 
 
+@takes(Ensemble)
 def nearest(
     ensemble: Ensemble,
     start: Floats,
@@ -69,6 +70,7 @@ def nearest(
     return found
 
 
+@takes(Ensemble)
 def nearest_of_many(
     ensemble: Ensemble,
     starts: Sequence[Floats],

@@ -15,7 +15,7 @@ from scipy import sparse
 from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import highs as programs
-from granforce.records import Relaxation, positive, whole
+from granforce.records import Relaxation, positive, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Floats
@@ -24,6 +24,7 @@ from granforce.types import Floats
 _AWAY = 1e-6
 
 
+@takes(Ensemble)
 def nearest_piqp(
     ensemble: Ensemble, start: Floats, *, tolerance: float = BALANCED, max_iterations: int = 200
 ) -> Relaxation:

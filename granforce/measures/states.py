@@ -3,6 +3,8 @@
 States are arrays (S, N_c, 2) of force networks (f_n, f_t) on the same contacts.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
@@ -11,7 +13,13 @@ from granforce.records import InputError, moderate, refuse_hidden
 from granforce.types import Floats, Integers
 
 
-def _some(states: Floats) -> Floats:
+def _some(states: Any) -> Floats:
+    for name in ("flat", "states"):
+        if not isinstance(states, np.ndarray) and hasattr(states, name):
+            raise InputError(
+                f"states must be an array (S, N_c, 2), not a {type(states).__name__}: give its "
+                f"`.{name}`"
+            )
     states = np.asarray(refuse_hidden(states, "states"))
     if states.ndim != 3 or states.shape[-1] != 2:
         raise InputError(

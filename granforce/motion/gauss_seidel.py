@@ -13,12 +13,13 @@ from granforce.motion import sweeps
 from granforce.motion.box_motion import BOX_MASS
 from granforce.motion.contact_dynamics import StepProblem, add_forces, set_stiffness
 from granforce.numerics.lanes import MANY, ONE, room
-from granforce.records import InputError, Relaxation, choice, positive, random_seed, whole
+from granforce.records import InputError, Relaxation, choice, positive, random_seed, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
 from granforce.types import Cancel, Floats
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def gauss_seidel(
     ensemble: Ensemble,

@@ -25,6 +25,7 @@ from granforce.records import (
     UndecidedError,
     make_contacts,
     make_packing,
+    takes,
 )
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
@@ -63,6 +64,7 @@ class Margin(NamedTuple):
         return self.contact < CLOSED and self.other > TOUCHING
 
 
+@takes(Packing)
 def margin(packing: Packing) -> Margin:
     """The Margin of a packing's contacts, by the gaps of all its pairs.
 

@@ -97,7 +97,7 @@ class Glimpse(NamedTuple):
 def pack(
     n: int,
     mu: float,
-    seed: int,
+    seed: int = 1,
     *,
     radii: str | npt.ArrayLike = "uniform:0.5,1",
     pressure: float = 1.0,

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.records import InputError, Packing, float_array
+from granforce.records import InputError, Packing, float_array, takes
 from granforce.system.files import written
 from granforce.types import Floats
 
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
 
 
+@takes(Packing)
 def save_vtk(
     packing: Packing, grains: str | Path, contacts: str | Path, forces: npt.ArrayLike | None = None
 ) -> None:
@@ -57,6 +58,7 @@ def save_vtk(
     )
 
 
+@takes(Packing)
 def save_lammps(
     packing: Packing,
     particles: str | Path,

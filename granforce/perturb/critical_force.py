@@ -37,6 +37,7 @@ from granforce.records import (
     positive,
     real,
     real_array,
+    takes,
     whole,
     worker_count,
 )
@@ -130,6 +131,7 @@ def critical_force(
     return found
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def critical_forces(
     ensemble: Ensemble,

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
-from granforce.records import InputError, float_array, real_array
+from granforce.records import InputError, float_array, real_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
@@ -33,6 +33,7 @@ class Loaded(NamedTuple):
     violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
 
 
+@takes(Ensemble)
 @cancelling.cancellable
 def loaded_networks(
     ensemble: Ensemble,

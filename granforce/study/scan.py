@@ -99,6 +99,7 @@ def run(
     Raises InputError where the scheduler cannot be reached.
     """
     store = open_store(path)
+    store.make()
     todo = []
     for k, cell in enumerate(cells):
         if load(store, *cell) is None:

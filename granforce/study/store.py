@@ -64,7 +64,7 @@ def default_path() -> Path:
 
 
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
-    """The Store in a folder, made if missing unless readonly.
+    """The Store in a folder, which the first saved entry makes if it is missing.
 
     path: by default $GRANFORCE_CACHE, else the user's cache folder. A folder that cannot be written
     is opened all the same; saving to it raises InputError.
@@ -80,12 +80,12 @@ def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Sto
         _refuse_newer(path)
     if _schema(path) is None:
         _refuse_foreign(path)
-        if not store._names():  # entries without a root are readable, and saving makes it anew
-            if readonly:
-                raise InputError(f"{path} is empty, not a store; check the path")
-            with store._writing():
-                _create_root(path)
+        # Entries without a root are readable, and the first saving makes the root.
+        if readonly and not store._names():
+            raise InputError(f"{path} is empty, not a store; check the path")
     if not readonly:
+        if not path.exists():
+            store.refuse_unwritable()
         with suppress(InputError):  # a folder that cannot be written can still be read
             store.clean()
     return store
@@ -237,9 +237,8 @@ class Store(Mapping[str, xr.Dataset]):
         name = self.name(kind, params, version=version)
         variables = entries.conforming(dataset, dtypes or {})
         attrs = entries.attributes(kind, params, version, dataset.attrs, variables)
+        self.make()
         with self._writing():
-            if _schema(self.path) is None:
-                _create_root(self.path)
             self.refuse_file(name)
             if entries.checked(self.path / name)[0] is None:
                 self._publish(name, variables, attrs)
@@ -269,8 +268,17 @@ class Store(Mapping[str, xr.Dataset]):
         """Raise InputError where nothing can be saved, before anything is computed for it."""
         with self._writing():
             own = os.access in os.supports_effective_ids
-            if self.path.is_dir() and not os.access(self.path, os.W_OK, effective_ids=own):
+            there = next(path for path in (self.path, *self.path.parents) if path.exists())
+            if not there.is_dir():
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+            if not os.access(there, os.W_OK | os.X_OK, effective_ids=own):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def make(self) -> None:
+        """Make the folder if it is missing, for other processes to find; InputError as `save`."""
+        with self._writing():
+            if _schema(self.path) is None:
+                _create_root(self.path)
 
     def refuse_file(self, name: str) -> None:
         """Raise InputError where a file has the place of an entry: it may be somebody's."""

@@ -414,6 +414,7 @@ DAMAGES = {
 
 def test_a_file_where_an_entry_belongs_is_told_at_once_and_left(store):
     name = store.name("walk", PARAMS, version=1)
+    store.path.mkdir()
     (store.path / name).write_text("somebody's")
     for use in (
         lambda: store.load("walk", PARAMS, version=1),
@@ -637,12 +638,14 @@ def test_location(tmp_path, monkeypatch):
         assert tmp_path in default_path().parents and default_path().name == "granforce"
 
 
-def test_missing_store_is_made_unless_readonly(tmp_path):
+def test_a_missing_store_is_made_by_the_first_entry(tmp_path):
+    path = tmp_path / "a" / "b"
     with pytest.raises(InputError, match="no store at"):
-        open_store(tmp_path / "a" / "b", readonly=True)
-    assert not (tmp_path / "a").exists()
-    open_store(tmp_path / "a" / "b")
-    assert len(open_store(tmp_path / "a" / "b", readonly=True)) == 0
+        open_store(path, readonly=True)
+    store = open_store(path)
+    assert len(store) == 0 and not (tmp_path / "a").exists()
+    store.save("walk", PARAMS, walk_dataset(), version=1)
+    assert len(open_store(path, readonly=True)) == 1
 
 
 def test_what_is_not_a_store_is_refused(tmp_path):
@@ -706,6 +709,7 @@ def test_folder_that_cannot_be_written_can_be_read(nobody):
 
 
 def test_temporaries_of_dead_writers_are_cleaned(store):
+    store.path.mkdir()
     ended = subprocess.Popen(["true"])
     ended.wait()
     zombie = subprocess.Popen(["true"])  # ended, but not waited for

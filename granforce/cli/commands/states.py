@@ -16,6 +16,7 @@ from granforce.cli.asked import (
     walked,
     write_csv,
 )
+from granforce.cli.options import RELAXATIONS
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -139,7 +140,7 @@ def scan(arguments: argparse.Namespace) -> int:
             arguments.states,
             arguments.walk_seed,
             mu=arguments.ensemble_mu,
-            relax=arguments.relax,
+            relax=RELAXATIONS[arguments.relax],
             chains=arguments.chains,
             keep=arguments.keep,
         )

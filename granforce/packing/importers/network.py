@@ -10,7 +10,7 @@ from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
-from granforce.records import InputError, NotJammedError, Packing, UndecidedError
+from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 from granforce.types import Floats, Integers
 
@@ -104,6 +104,7 @@ def find(packing: Packing, **info: Any) -> Packing:
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
+@takes(Packing)
 def report(packing: Packing, ens: Ensemble | None = None) -> dict[str, Any]:
     """What a packing is, as a dict of plain numbers (None where a quantity is not defined).
 

@@ -17,6 +17,7 @@ from granforce.records import (
     float_array,
     make_contacts,
     make_packing,
+    takes,
 )
 from granforce.system.files import written
 from granforce.types import Floats
@@ -51,6 +52,7 @@ def load_packing(
         raise InputError(f"{name}: {error}") from None
 
 
+@takes(Packing)
 def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
     """Write a packing as NPZ, to be read by `load_packing` exactly.
 
