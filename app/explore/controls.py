@@ -69,7 +69,7 @@ class Controls:
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = Select(label="States from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
-        self.series = Select(label="Precomputed results", **LIST | {"width": 420})
+        self.series = Select(label="Precomputed results", **LIST | {"width": 480})
         self.go = pmui.Button(label="Compute", color="primary", visible=False, margin=0, sx=PLAIN)
         self.command = CopyButton(label="Copy CLI command", **FIELD)
         self.opens = Disclosure(line=MADE, margin=0)

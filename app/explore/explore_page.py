@@ -23,6 +23,7 @@ from .controls import Controls
 from .page_address import Address
 from .results_line import Results
 from .status_line import StatusLine
+from .tabs.export import figure
 from .tabs.tabs import Tabs, pale_when_old
 from .volume import Volume
 
@@ -49,16 +50,17 @@ GRID = {
         "alignContent": "start",
     },
     "& .controls": {"padding": "8px 24px 6px"},
-    "& .side, & .space, & .panels": {"padding": "4px 24px"},
+    "& .side, & .space, & .panels, & .results": {"padding": "4px 24px"},
     "@media (max-width: 599.95px)": {
-        "& .controls, & .side, & .space, & .panels": {"padding": "6px 12px"},
+        "& .controls, & .side, & .space, & .panels, & .results": {"padding": "6px 12px"},
     },
-    "& .status": {"position": "sticky", "bottom": 0, "zIndex": 5},
+    "& .status.urgent": {"position": "sticky", "bottom": 0, "zIndex": 5},
     "@media (min-width: 900px)": {
         "& .main-content": {
             "gridTemplate": (
-                '"header header" auto "controls controls" auto "side panels" minmax(420px, 1fr)'
-                ' "status status" auto / min(52vw, max(420px, 100dvh - 244px)) minmax(0, 1fr)'
+                '"header header" auto "controls controls" auto "side panels" minmax(240px, 1fr)'
+                ' "side results" auto "status status" auto'
+                " / min(52vw, max(420px, 100dvh - 244px)) minmax(0, 1fr)"
             ),
             "height": "100dvh",
             "columnGap": "28px",
@@ -71,23 +73,23 @@ GRID = {
             "height": "auto", "padding": "0 0 0 24px",
         },
         "& .panels": {
-            "gridArea": "panels", "display": "flex", "flexDirection": "column",
-            "minHeight": 0, "height": "auto", "overflow": "hidden", "padding": "0 24px 0 0",
+            "gridArea": "panels", "height": "auto", "overflow": "hidden auto",
+            "padding": "0 24px 0 0",
         },
-        "& .panels > .tabs": {"flex": "1 1 0", "minHeight": 0, "overflow": "hidden auto"},
+        "& .results": {"gridArea": "results", "padding": "4px 24px 8px 0"},
         "& .status": {"gridArea": "status"},
     },
     "@media (min-width: 1800px)": {
         "& .main-content": {
             "gridTemplate": (
                 '"header header header" auto "controls controls controls" auto'
-                ' "side space panels" minmax(420px, 1fr) "status status status" auto'
+                ' "side space panels" minmax(240px, 1fr) "side space results" auto'
+                ' "status status status" auto'
                 " / min(40vw, 100dvh - 244px) minmax(0, 1fr) minmax(0, 1.1fr)"
             ),
         },
         "& .space": {
-            "gridArea": "space", "overflow": "hidden auto", "padding": 0, "minHeight": 0,
-            "height": "auto",
+            "gridArea": "space", "height": "auto", "overflow": "hidden auto", "padding": 0,
         },
     },
 }  # fmt: skip
@@ -131,8 +133,11 @@ class _Around:
         self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
         self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
         self.panels = pn.Column(css_classes=["panels"], **WIDE)
+        self.results = pn.Column(css_classes=["results"], **WIDE)
         self.status = StatusLine(state, css_classes=["status"], **WIDE)
-        self.columns = [self.controls, side, self.space, self.panels, self.status]
+        self.columns = [
+            self.controls, side, self.space, self.panels, self.results, self.status
+        ]  # fmt: skip
 
     def parts(self) -> Iterator[None]:
         """Everything that follows the packing, piece by piece."""
@@ -140,15 +145,14 @@ class _Around:
         controls = Controls(state)
         self.controls[:] = [controls.line, controls.made]
         yield
-        results = Results(state, Volume(state), css_classes=["results"], **WIDE)
-        within = pn.Column(tabs.tabs, css_classes=["tabs"], **WIDE)
-        pale_when_old([*tabs.pages.items(), ("summary", results), ("plane", self.space)])
-        self.panels[:] = [within, results]
+        pale_when_old([*tabs.pages.items(), ("results", self.results), ("plane", self.space)])
+        self.panels[:] = [tabs.tabs]
+        self.results[:] = [Results(state, Volume(state), **WIDE)]
         state.looks.param.watch(lambda event: state.work.piecewise(tabs.beside(self.space)), "wide")
         yield
         yield from tabs.filling(state.looks.tab)
         yield from tabs.beside(self.space)
-        self.side.extend([Address(state), Hints()])
+        self.panels.extend([figure.panel(state), Address(state), Hints()])
         explanation.follow(state, self.header)
         state.read_ahead()
 

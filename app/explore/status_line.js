@@ -17,6 +17,7 @@ export function render({ model, view }) {
     failed.hidden = !model.failed
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
     facts.hidden = model.running
+    view.el.classList.toggle("urgent", model.running || Boolean(model.failed)) // seen wherever the page is scrolled to
     facts.replaceChildren(...model.facts.map((fact) => made("span", { innerHTML: fact })))
   }
 

@@ -35,10 +35,11 @@ class StatusLine(Progress):
         self.failed = self._state.work.message
 
     def _heard(self, message: Message) -> None:
-        if "read" in message:
-            self._state.work.message = ""
-        else:
-            super()._heard(message)
+        match message:
+            case {"read": True}:
+                self._state.work.message = ""
+            case {"stop": True} | {"cancel": True}:
+                super()._heard(message)
 
 
 def facts(state: AppState) -> Iterator[str]:

@@ -60,7 +60,7 @@ const BUTTONS = `
     ${button("step", "one network on (→)")}
     <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
     <b class="state"></b>
-    <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="0"
+    <label title="speed, networks per second"><input class="speed" type="range" min="0" max="6" step="0.25" value="0"
       aria-label="speed"><span class="rate"></span></label>
   </div>
   <div class="read"><span class="said"></span></div>

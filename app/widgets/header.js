@@ -54,12 +54,13 @@ export function render({ model }) {
 /** The dialog of "?": what is seen, and the keys. */
 function helpOf(model, root) {
   const dialog = root.appendChild(document.createElement("dialog"))
-  const words = dialog.appendChild(document.createElement("div")), keys = document.createElement("dl")
-  dialog.append(made("h2", { textContent: "Keys" }), keys, button("Close", () => dialog.close(), { className: "soft" }))
+  const keys = document.createElement("dl"), words = document.createElement("div")
+  dialog.append(made("h2", { textContent: "Keys" }), keys, words, button("Close", () => dialog.close(), { className: "soft" }))
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close() })
   dialog.addEventListener("keydown", (event) => event.stopPropagation()) // keys mean nothing else meanwhile
   const show = () => {
     words.innerHTML = model.help
+    dialog.firstChild.hidden = !model.keys.length
     keys.replaceChildren(...model.keys.flatMap(([key, does]) => [made("dt", { textContent: key }), made("dd", { textContent: does })]))
   }
   model.on(["help", "keys"], show)

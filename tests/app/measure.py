@@ -171,7 +171,7 @@ def stalls(stage):
         other.wait_for_timeout(1500)
         other.context.close()
     print(f"longest stall while pages open: {_longest(log)}")
-    for tab in ("Friction", "Force space", "Push", "Your packing", "Export", "How far?"):
+    for tab in ("Friction", "Force space", "Push", "Your packing", "Export", "Intervals"):
         page.get_by_role("tab", name=tab).click()
         page.wait_for_timeout(3000)
     print(f"longest stall while tabs are opened: {_longest(log)}")

@@ -12,7 +12,7 @@ from pathlib import Path
 from small_store import ROOT
 
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
-# Of 400 disks, as a page opened that says no more: an address without a view begins with a scene.
+# Of 400 disks, as older links have it; an address without a view says the same.
 MANY = "?scene=many"
 PATIENCE = 180_000  # ms, on a busy machine
 # What makes a browser one that was here before: neither the tour nor a guess is asked of it, and
@@ -73,25 +73,23 @@ def wait_until_served(url, server, log):
 
 def how_it_is_made(page):
     """Open what only those need who compute something of their own; the page."""
-    return _opened(page, "How this packing is made")
-
-
-def looks(page):
-    """Open what lines show and how; the page."""
-    return _opened(page, "Colours and widths of lines")
-
-
-def more(page):
-    """Open what compares and checks networks, and plays with them; the page."""
-    if page.locator(".extras:not([open])").count():
-        page.locator(".extras summary").click()
+    heading = page.get_by_role("button", name="How it is made")
+    if heading.get_attribute("aria-expanded") != "true":
+        heading.click()
     return page
 
 
-def _opened(page, name):
-    heading = page.get_by_role("button", name=name)
-    if heading.get_attribute("aria-expanded") != "true":
-        heading.click()
+def scales(page):
+    """Open where colours are full, and how wide lines are; the page."""
+    if page.locator(".legend details:not([open])").count():
+        page.locator(".legend summary").click()
+    return page
+
+
+def more(page):
+    """Open what compares and checks networks; the page."""
+    if page.locator(".extras:not([open])").count():
+        page.locator(".extras summary").click()
     return page
 
 

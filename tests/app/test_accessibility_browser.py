@@ -1,13 +1,13 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import at_rest, how_it_is_made, looks
+from serving import at_rest, how_it_is_made, scales
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 GRAVE = ("serious", "critical")
 TABS = {
-    "intervals": "How far?",
+    "intervals": "Intervals",
     "statistics": "Friction",
     "plane": "Force space",
     "perturb": "Push",
@@ -34,8 +34,7 @@ def visit(visit):
     def whole(query="", width=1280, height=1000):
         page = visit(query, width, height)
         page.wait_for_function("() => !document.querySelector('.pn-loading')")
-        if width > 900:  # else the sidebar is closed
-            page.get_by_text("Copy link").wait_for(state="attached")
+        page.get_by_text("bounds").first.wait_for()
         return page
 
     return whole
@@ -55,18 +54,20 @@ def test_no_tab_has_a_serious_finding(visit, dark):
 
 def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     page = visit()
-    looks(page).get_by_role("combobox", name="Colour").click()
+    scales(page).get_by_role("combobox", name="Colour").click()
     how_it_is_made(page).get_by_label("Disks N").first.fill("9000")
     page.get_by_label("Disks N").first.press("Enter")
-    page.get_by_text("Pale: still of").wait_for()
+    page.get_by_role("button", name="Cancel").filter(visible=True).first.wait_for()
     assert findings(page) == []
     page.get_by_role("button", name="Cancel").filter(visible=True).first.click()
-    page.get_by_text("Pale: still of").wait_for(state="hidden")
+    page.get_by_text("random walk").first.wait_for()
 
 
-def test_the_tour_and_a_narrow_page_have_no_serious_finding(visit):
-    page = visit("?tour=2", 390)
-    page.get_by_role("dialog").wait_for()
+def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):
+    page = visit("", 390)
+    assert findings(page) == []
+    page.get_by_role("button", name="Help and keys").click()
+    page.get_by_role("dialog").get_by_text("play, pause at the nearest network").wait_for()
     assert findings(page) == []
 
 

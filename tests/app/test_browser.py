@@ -12,11 +12,11 @@ from serving import (
     at_rest,
     column,
     how_it_is_made,
-    looks,
     more,
     no_more,
     painted,
     picture,
+    scales,
     scene,
     searched,
     until,
@@ -190,19 +190,19 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     )
     assert c >= 0 and width == pytest.approx(5 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
-    page.get_by_text("+0.2 × mean force").wait_for()
-    page.get_by_text("1.74 × mean").wait_for()
+    page.get_by_text("+0.2 ⟨fₙ⟩").wait_for()
+    page.get_by_text("1.74 ⟨fₙ⟩").wait_for()
     ask(page, 1)
     searched(page, "mu=1&")
     assert "full=0.2" in page.url and "stretch=5" in page.url
-    looks(page)
-    page.get_by_label("Width, times").fill("-3")
-    page.get_by_label("Width, times").press("Enter")
-    page.get_by_text("a number from 0.1 to 10, got '-3'").first.wait_for()
-    page.get_by_label("Full colour, in mean forces").fill("")
-    page.get_by_label("Full colour, in mean forces").press("Enter")
+    wide, full = (scales(page).get_by_label(name) for name in ("widths times", "colours full at"))
+    wide.fill("-3")
+    wide.press("Enter")
+    assert wide.input_value() == "5"
+    full.fill("")
+    full.press("Enter")
     no_more(page, "full=")
-    page.get_by_text("+0.5 × mean force").wait_for()
+    page.get_by_text("+0.5 ⟨fₙ⟩").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):
@@ -521,7 +521,7 @@ def test_scripts_are_fetched_once_and_run_as_they_are(visit):
         """() => [...Bokeh.documents[0].all_models]
         .filter((model) => model.esm).map((model) => [model.class_name, model.bundle])"""
     )
-    assert {"Player", "FrictionSlider", "Tour"} <= {name for name, _ in own}
+    assert {"Player", "FrictionSlider", "Header"} <= {name for name, _ in own}
     assert all(bundle for _, bundle in own)
 
 

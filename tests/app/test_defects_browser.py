@@ -9,9 +9,9 @@ from serving import (
     column,
     free_port,
     how_it_is_made,
-    looks,
     no_more,
     painted,
+    scales,
     scene,
     searched,
     serve,
@@ -33,7 +33,7 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     searched(page, "tab=statistics")
     page.go_back()
     no_more(page, "tab=")
-    page.locator("[role=tab][aria-selected=true]", has_text="How far?").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="Intervals").wait_for()
     page.go_back()
     shows(page, 0.1)
     searched(page, "mu=0.1&")
@@ -74,7 +74,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
         painting = scene(page, "scene.painted")
         page.locator("button.play").click()  # what is in the page still plays
         until(page, f"scene.painted > {painting} + 3")
-        page.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
+        page.locator(".scale button").first.click()  # μ = 0, of which nobody hears yet
     with serve(tmp_path, port=port, **store):
         page.get_by_text("Connection lost").wait_for(state="detached")
         painted(page)
@@ -87,7 +87,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
 # 3: What is refused, and fields
 
 
-def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
+def test_what_is_refused_is_told_at_the_lower_edge(visit):
     page = visit(width=390, height=844)
     ask(page, "10e9")
     told = page.get_by_role("alert").filter(has_text="too large for the balance of forces")
@@ -101,7 +101,7 @@ def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
 
 
 def test_a_mark_of_the_slider_is_chosen_by_a_click(page):
-    page.locator(".scale span").get_by_text("1", exact=True).click()
+    page.locator(".scale button").get_by_text("1", exact=True).click()
     shows(page, 1)
 
 
@@ -179,11 +179,11 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
 def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
-    page = looks(visit("?tab=statistics" if focused == "toggle" else ""))
+    page = scales(visit("?tab=statistics" if focused == "toggle" else ""))
     clicked = {
-        "tab": page.get_by_role("tab", name="How far?"),
+        "tab": page.get_by_role("tab", name="Intervals"),
         "toggle": page.get_by_role("button", name="logarithmic", exact=True),
-        "switch": page.get_by_label("Strong and undetermined contacts"),
+        "switch": page.get_by_label("mark strong and undetermined contacts"),
     }[focused]
     clicked.click()
     page.keyboard.press("ArrowRight")
@@ -196,9 +196,9 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
 
 
 def test_who_goes_by_tab_means_the_widget(visit):
-    page = looks(visit())
-    switch = page.get_by_label("Strong and undetermined contacts")
-    page.get_by_role("combobox", name="Width").focus()
+    page = scales(visit())
+    switch = page.get_by_label("mark strong and undetermined contacts")
+    page.get_by_label("widths times").focus()
     page.keyboard.press("Tab")
     assert switch.evaluate("e => e.getRootNode().activeElement === e")
     page.keyboard.press(" ")
@@ -220,10 +220,8 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     shows(page, 0.4)
     assert len(page.evaluate("window.mostBars")) <= 1
     page.locator(".task").first.wait_for(state="hidden")
-    finding = page.locator(".first").first
-    page.wait_for_function(
-        "e => getComputedStyle(e.getRootNode().host).opacity === '1'", arg=finding.element_handle()
-    )
+    results = page.locator(".results").first
+    page.wait_for_function("e => getComputedStyle(e).opacity === '1'", arg=results.element_handle())
     assert at_rest(plot)["y"] == before["y"]
 
 

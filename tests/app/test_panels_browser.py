@@ -164,7 +164,7 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
     page.locator(".state").get_by_text("as packed").wait_for()
     slider.evaluate("e => { e.value = e.step; e.dispatchEvent(new Event('input')) }")
     until(page, "scene.hand.player.pushed.held !== null")
-    page.get_by_role("tab", name="How far?").click()
+    page.get_by_role("tab", name="Intervals").click()
     until(page, "scene.hand.player.replay.held === null")
     assert scene(page, "scene.hand.player.pushed.load") == 0
 
@@ -219,12 +219,12 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     assert points * [1, -1] == pytest.approx(packing.cell.corners[:4], abs=1e-2)
 
 
-# The server tells of another title just before a component begins to listen.
+# The server tells of another label just before a component begins to listen.
 CHANGED_EARLY = """() => {
     const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
     const {watch} = prototype
     prototype.watch = function (view, name, ...others) {
-        if (this.class_name === "Alert" && name === "title") this.data.title = "told early"
+        if (this.class_name === "Button" && name === "label") this.data.label = "told early"
         watch.call(this, view, name, ...others)
     }
 }"""
@@ -233,7 +233,7 @@ CHANGED_EARLY = """() => {
 def test_a_change_that_comes_before_a_component_listens_is_seen(visit):
     page = visit("")
     page.evaluate(CHANGED_EARLY)
-    page.get_by_role("tab", name="Your packing").click()
+    page.get_by_role("tab", name="Force space").click()
     page.get_by_text("told early").first.wait_for(state="attached")
 
 

@@ -28,7 +28,8 @@ TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
 LOOK = {
     "& .MuiTabs-root": {"minHeight": "36px"},
     "& .MuiTab-root": {
-        "minWidth": 0, "minHeight": "36px", "padding": "6px 2px", "marginRight": "20px",
+        "minWidth": 0, "minHeight": "36px", "padding": "6px 2px",
+        "marginRight": "clamp(8px, 1.2vw, 20px)",
         "fontSize": "15px", "letterSpacing": 0, "color": "var(--quiet)", **PLAIN,
     },
     "& .MuiTab-root.Mui-selected": {"color": "var(--ink)", "fontWeight": 600},
@@ -36,6 +37,10 @@ LOOK = {
 }  # fmt: skip
 # The same without force space, which has a place of its own on a wide screen.
 WITHOUT_SPACE = LOOK | {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}}
+WIDE = {"sizing_mode": "stretch_width", "margin": 0}
+SPACE = f"<h2>{TABS['plane'][0]}</h2>"
+HEADING = "h2 { margin: 0; padding: 6px 2px; border-bottom: 1px solid var(--line); "
+HEADING += "font-size: 15px; font-weight: 600; line-height: 23px; }"
 GROWING = ("intervals", "plane")  # what shows a walk while it is computed
 
 
@@ -88,7 +93,7 @@ class Tabs:
             yield  # two plots of one name must not be in one message
             view = self._space = TABS["plane"][1](self.state)
             yield
-            place[:] = [view.panel()]
+            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE), view.panel()]
         else:
             self._leave(place)
             self._begun.discard("plane")

@@ -19,7 +19,7 @@ from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
 from ....widgets.progress import Progress
-from . import figure, files, standalone
+from . import files, standalone
 
 
 class Snapshot:
@@ -154,7 +154,6 @@ class View:
             self.buttons,
             Progress(self.making),
             self.told,
-            figure.panel(self.state),
             note(HELP),
             sizing_mode="stretch_width",
         )
