@@ -32,7 +32,6 @@ class Player(Scripted, Seen):
     """
 
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
-    goal = param.Number(default=0.0, doc="what the first force is to pass, in ⟨f_n⟩; 0: not known")
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
     gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")

@@ -7,8 +7,8 @@ import xarray as xr
 
 from granforce.types import Floats
 
-from ..results import planes, progress_feed
-from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly
+from ..results import progress_feed
+from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.planes import Plane
 from ..results.replays import Replay
 from ..state.app_state import AppState
@@ -119,7 +119,6 @@ class PackingView:
         exact = exact_intervals(state.possible, replay)
         changes = {
             "exact": exact,
-            "goal": goal(replay, exact),
             "gone": gone(state.knowledge, replay),
             "measured": measured(state, replay),
             "most": full_extent(replay, exact, looks.full),
@@ -172,8 +171,7 @@ def projection(plane: Plane | None) -> dict[str, Any]:
     names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
     columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
     origin = [float(value) for value in plane.origin]
-    told = {"origin": origin, "pair": plane.pair, "goal": plane.goal, "seen": planes.seen(plane)}
-    return columns | told
+    return columns | {"origin": origin, "pair": plane.pair}
 
 
 def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
@@ -184,12 +182,6 @@ def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
         name: (dataset[name].values[:, 0] / replay.force_scale).astype(np.float32)
         for name in ("low", "high")
     }
-
-
-def goal(replay: Replay, exact: Bounds) -> float:
-    """What the force of the line to be dragged first shall pass, in ⟨f_n⟩; 0 unless known."""
-    contact = replay.invited
-    return 0.0 if contact is None or not exact else nearly(exact["high"][contact])
 
 
 def gone(knowledge: Knowledge, replay: Replay) -> Any:

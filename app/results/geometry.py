@@ -1,6 +1,5 @@
 """Disks and contacts as they are drawn, with their periodic images: plain arrays."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -52,11 +51,6 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     corners = np.stack([middle - half, middle + half], axis=1)
     x_low, x_high, y_low, y_high = corners.ravel().tolist()
     return x_low, x_high, y_low, y_high
-
-
-def nearly(most: float) -> float:
-    """What a visitor is asked to have a force pass: a little less than its largest value."""
-    return math.floor(9.8 * float(most)) / 10
 
 
 def inviting(links: Links, normal: Floats, window: tuple[float, ...]) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -21,7 +20,6 @@ from granforce.types import Floats
 
 from ..background.jobs import Job
 from .compute import found_or_made
-from .geometry import nearly
 from .library import Cell, Library
 from .replays import Replay
 from .selection import Selection
@@ -39,7 +37,6 @@ class Plane(NamedTuple):
     share: Floats  # (2,) of the variance of the states, NaN for components
     path: Any  # (F, 2) float32: the original network, then the states shown
     kind: str = ""  # STRESS where the axes are those of stresses
-    goal: float = 0.0  # of a pair: what a visitor is asked to bring the force across to; 0: nothing
 
     @property
     def pair(self) -> list[int]:
@@ -122,11 +119,6 @@ def _plane(
     path = np.tensordot(_frames(replay) - centre, axes, ((1, 2), (1, 2)))
     origin = np.tensordot(axes, centre, ((1, 2), (0, 1)))
     return Plane(chosen, axes, origin, share, path.astype(np.float32))
-
-
-def seen(plane: Plane) -> float:
-    """Beyond which value across no state lies, in tenths."""
-    return math.ceil(10 * float(plane.path[:, 0].max())) / 10
 
 
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
@@ -282,8 +274,6 @@ def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
 def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
     """The outline as kept; its axes are those it was made with, and the path follows them."""
     plane = _as_kept(replay, plane, found)
-    if plane.pair:
-        plane = plane._replace(goal=nearly(found["outer"].values[:, 0].max()))
     return Outlined(
         plane,
         inner=found["inner"].values - plane.origin,

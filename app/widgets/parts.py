@@ -145,6 +145,17 @@ CLAIMS = """
 """
 
 
+SWATCH = (
+    '<span aria-hidden="true" style="display:inline-block;width:9px;height:9px;border-radius:{};'
+    'background:{};margin:0 3px 0 6px"></span>'
+)
+
+
+def mark(colour: str, words: str, corner: str = "1px") -> str:
+    """What a mark of this colour in a plot means, as HTML; corner: its radius."""
+    return SWATCH.format(corner, colour) + words
+
+
 def note(text: str = "", **options: Any) -> pn.pane.HTML:
     """Small print, as HTML."""
     return pn.pane.HTML(

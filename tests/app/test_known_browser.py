@@ -73,7 +73,7 @@ def test_a_contradiction_in_a_link_is_one_line(visit):
 
 def test_the_plane_of_stresses(visit):
     page = visit("?tab=plane")
-    page.get_by_role("combobox", name="Plotted").select_option("stress")
+    page.get_by_role("combobox", name="Plane").select_option("stress")
     page.get_by_text("The pressure alone is held").wait_for()
     assert len(column(page, "outer", "x")) > 3
     picture(page, "known/stresses")

@@ -105,19 +105,23 @@ def test_force_space_has_axes_of_the_states_found_so_far(state):
     wait_for(state)
     state.ask(asked(0.36, 400), at_once=True)
     browser.run(lambda: state.growing)
-    assert state.plane is None and not len(tab.path.data["x"]) and not len(tab.outer.data["x"])
+    assert (
+        state.plane is None
+        and not len(tab.drawing.path.data["x"])
+        and not len(tab.drawing.outer.data["x"])
+    )
     browser.run(lambda: state.plane is not None)
     first, states = state.plane, state.work.live.states().astype(float)
-    assert len(states) >= 4 and len(tab.path.data["x"]) == 401
-    x, y = (tab.path.data[name] for name in "xy")
+    assert len(states) >= 4 and len(tab.drawing.path.data["x"]) == 401
+    x, y = (tab.drawing.path.data[name] for name in "xy")
     assert np.isfinite([x[0], y[0]]).all() and np.isnan(x[1:]).all()  # the player fills them in
     np.testing.assert_allclose(np.linalg.norm(first.axes, axis=(1, 2)), 1)
-    assert not len(tab.outer.data["x"])
+    assert not len(tab.drawing.outer.data["x"])
     browser.run(lambda: state.plane is not first)
     assert not state.growing or state.work.fourfold > 1
     browser.run()
-    assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
-    assert len(state.replay.normal) == len(tab.path.data["x"])
+    assert np.isfinite(tab.drawing.path.data["x"]).all() and len(tab.drawing.outer.data["x"])
+    assert len(state.replay.normal) == len(tab.drawing.path.data["x"])
     same = (planes.principal(state.replay).axes * state.plane.axes).sum(axis=(1, 2))
     np.testing.assert_allclose(np.abs(same), 1, atol=1e-6)
 
@@ -130,7 +134,7 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state):
     state.ask(asked(0.37, 20_000), at_once=True)
     browser.run(lambda: state.growing)
     kept = state.plane
-    assert kept.components and len(tab.path.data["x"]) == len(
+    assert kept.components and len(tab.drawing.path.data["x"]) == len(
         progress_feed.numbers(state.seen.summary)
     )
     browser.run(lambda: state.work.fourfold > 1)
@@ -139,7 +143,7 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state):
     browser.run()
     browser.stream.tick()
     wait_for(state)
-    assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
+    assert np.isfinite(tab.drawing.path.data["x"]).all() and len(tab.drawing.outer.data["x"])
 
 
 def test_a_page_that_comes_later_joins_and_both_end_with_the_same(visited):

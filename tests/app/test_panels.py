@@ -91,13 +91,13 @@ def test_the_path_is_where_the_states_lie_in_the_plane(state):
 def test_the_outline_holds_the_path_and_is_kept(state):
     state.looks.axes = "principal"
     view = plane_view.View(state)
-    assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
+    assert not view.drawing.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.looks.tab = view.name
     assert view.placing.running
     wait_for(state)
-    assert len(view.path.data["x"]) == KEPT + 1
-    corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
-    path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
+    assert len(view.drawing.path.data["x"]) == KEPT + 1
+    corners = np.stack([view.drawing.outer.data["x"], view.drawing.outer.data["y"]], axis=1)
+    path = np.stack([view.drawing.path.data["x"], view.drawing.path.data["y"]], axis=1)
     merged = np.concatenate([corners, path])
     assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
     assert "linear programs" in view.told.object
@@ -110,14 +110,17 @@ def test_one_contact_is_seen_in_its_cone(state):
     view.planes.value = "contact"
     state.looks.tab = view.name
     wait_for(state)
-    normal, tangential = np.array(view.outer.data["x"]), np.array(view.outer.data["y"])
+    normal, tangential = (
+        np.array(view.drawing.outer.data["x"]),
+        np.array(view.drawing.outer.data["y"]),
+    )
     assert np.all(np.abs(tangential) <= state.replay.summary["mu"] * normal + 1e-3)
-    assert str(state.replay.backbone[4]) in view.figure.xaxis.axis_label
-    assert len(view.cone.data["x"]) == 3
+    assert str(state.replay.backbone[4]) in view.drawing.figure.xaxis.axis_label
+    assert len(view.drawing.cone.data["x"]) == 3
     before = normal
     state.looks.contact = 7
     wait_for(state)
-    assert not np.array_equal(before, view.outer.data["x"])
+    assert not np.array_equal(before, view.drawing.outer.data["x"])
 
 
 def test_a_point_has_no_outline(state):
@@ -126,7 +129,7 @@ def test_a_point_has_no_outline(state):
     state.looks.tab = "plane"
     view = plane_view.View(state)
     wait_for(state)
-    assert "one point" in view.told.object and not len(view.outer.data["x"])
+    assert "one point" in view.told.object and not len(view.drawing.outer.data["x"])
 
 
 def test_planes_of_unknown_contacts_are_refused(state):
@@ -743,55 +746,48 @@ def test_halfway_is_the_outline_at_half_its_size():
     np.testing.assert_allclose(half, planes.halfway(corners[::-1])[::-1])
 
 
-def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
-    state.looks.tab, state.looks.fresh = "plane", True
-    view = plane_view.View(state)
+def test_axes_of_force_space_have_the_colours_of_their_lines_and_half_is_drawn(state):
+    state.looks.tab = "plane"
+    drawing = plane_view.View(state).drawing
     wait_for(state)
-    around = view.figure.x_range.renderers
-    assert len(view.outer.data["x"]) > 3 and view.standing.outlines[0][0] in around  # it counts
-    assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.standing.outlines)
-    assert not view.standing.name_of_s.visible and not view.finding.visible
-    assert 0 <= view.standing.goal.location - max(view.path.data["x"]) < 0.1
-    assert "your guess" in view.standing.guess_words.text and not view.standing.guess.visible
-    view.standing._guess(SimpleNamespace(x=2.5))
-    assert view.standing.guess.location == 2.5 and "2.5" in view.standing.guess_words.text
-    assert view.standing.goal_words.text == f"none found beyond {view.standing.goal.location:g}"
-    assert not len(view.standing.half.data["x"])
-    assert not any(renderer.visible for renderer in view.standing.packed)
-    across, up = view.figure.xaxis[0], view.figure.yaxis[0]  # in the colours of their lines
+    across, up = drawing.figure.xaxis[0], drawing.figure.yaxis[0]
     assert "green" in across.axis_label and "violet" in up.axis_label
     assert (across.axis_label_text_color, up.axis_label_text_color) == lines(dark=False)
-    state.looks.fresh = False
-    assert all(renderer.visible for renderer in view.standing.packed)
-    assert all(r.glyph.line_alpha == line for r, _, line in view.standing.outlines)
-    assert view.standing.name_of_s.visible and view.standing.goal.visible and view.finding.visible
-    assert view.standing.goal_words.text.startswith("goal: ")
-    assert len(view.standing.half.data["x"]) == len(view.outer.data["x"]) - 1
+    assert len(drawing.half.data["x"]) == len(drawing.outer.data["x"]) > 3
+
+
+def test_a_click_on_a_dot_of_force_space_shows_its_network(state):
+    state.looks.tab = "plane"
+    view = plane_view.View(state)
+    wait_for(state)
+    assert "Every network, and the one on screen" in view.lead.object
+    view.drawing.path.selected.indices = [3]
+    assert state.looks.frame == 3
 
 
 def test_walk_and_uniform_states_are_shown_together(state):
     state.looks.tab = "plane"
     view = plane_view.View(state)
     wait_for(state)
-    assert not view.also.value and not len(view.beside.data["x"])
+    assert not view.others.switch.value and not len(view.drawing.beside.data["x"])
     assert "halfway" in view.finding.object and "uniform" not in view.finding.object
-    view.also.value = True
+    view.others.switch.value = True
     wait_for(state)
     wait_for(state)  # the catalogue is read anew
-    count = len(view.beside.data["x"])
-    assert view.other_kind == "uniform" and count >= STATES
+    count = len(view.drawing.beside.data["x"])
+    assert view.others.kind == "uniform" and count >= STATES
     assert f"of the {count} uniform ones" in view.finding.object
     # in the store from now on: shown at once, in any plane, and the walk beside them
     view.planes.value = "contact"
     wait_for(state)
-    assert len(view.beside.data["x"]) == count and view.figure.legend[0].visible
+    assert len(view.drawing.beside.data["x"]) == count
     other = planes.beside(state.catalogue, state.cell)
     state.show(other)
     wait_for(state)
-    assert state.cell.kind == "uniform" and view.other_kind == "walk"
-    assert view.also.value and len(view.beside.data["x"]) == KEPT
-    view.also.value = False
-    assert not len(view.beside.data["x"]) and not view.figure.legend[0].visible
+    assert state.cell.kind == "uniform" and view.others.kind == "walk"
+    assert view.others.switch.value and len(view.drawing.beside.data["x"]) == KEPT
+    view.others.switch.value = False
+    assert not len(view.drawing.beside.data["x"])
 
 
 def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):

@@ -109,7 +109,7 @@ def test_a_window_may_change_its_size_while_a_slow_browser_still_builds_the_page
 def test_one_contact_in_its_cone(visit):
     page = visit("?tab=projection&axes=principal&contact=3")
     filled(page, "outer")
-    page.get_by_role("combobox", name="Plotted").select_option("contact")
+    page.get_by_role("combobox", name="Plane").select_option("contact")
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x')?.every((x) => x > -1e-6)")
     filled(page, "outer")
     normal, tangential = (np.array(column(page, "outer", name)) for name in "xy")

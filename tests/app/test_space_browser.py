@@ -119,7 +119,7 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     searched(page, "~")
 
 
-@pytest.mark.parametrize(("button", "axis"), [("Sweep the green", "x"), ("Sweep the violet", "y")])
+@pytest.mark.parametrize(("button", "axis"), [("Sweep green", "x"), ("Sweep violet", "y")])
 def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
     """Along one axis only; all forces are as they were after it, and after one that is stopped."""
     page = visit("?tab=plane&frame=2")

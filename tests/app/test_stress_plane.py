@@ -26,16 +26,16 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
     view.planes.value = "stress"
     state.looks.tab = view.name
     wait_for(state, lambda: "shear" in view.told.object)
-    corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
-    path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
+    corners = np.stack([view.drawing.outer.data["x"], view.drawing.outer.data["y"]], axis=1)
+    path = np.stack([view.drawing.path.data["x"], view.drawing.path.data["y"]], axis=1)
     merged = np.concatenate([corners, path])
     assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
     (entry,) = state.library.cache.find("stress")
     friction = state.library.cache[entry.name]["friction"].item()
     assert f"{friction:.3f}" in view.told.object
-    assert "σ" in view.figure.xaxis.axis_label and view.figure.match_aspect
+    assert "σ" in view.drawing.figure.xaxis.axis_label and view.drawing.figure.match_aspect
     state.looks.contact = 4  # the same plane
-    assert not view.task.running and len(view.outer.data["x"])
+    assert not view.task.running and len(view.drawing.outer.data["x"])
 
 
 def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):

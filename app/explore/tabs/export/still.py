@@ -50,5 +50,5 @@ def figures(
     space._show(replay, chosen)
     if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):
         space._outlined(replay, outlined)
-    space.figure.sizing_mode = "scale_width"
-    return bars.drawing.figure, bars.growth.figure, space.figure
+    space.drawing.figure.sizing_mode = "scale_width"
+    return bars.drawing.figure, bars.growth.figure, space.drawing.figure

@@ -8,6 +8,8 @@ from ....results import planes
 from ....results.planes import Outlined, Plane
 from ....results.replays import Replay
 from ....widgets.hints import term
+from ....widgets.parts import mark
+from ....widgets.plot_style import DOT, ORIGINAL, PALE, STATES
 
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
 MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
@@ -15,6 +17,7 @@ MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to 
 CROWDED = (
     ": to get far out, many forces have to change together, which hardly ever happens by chance"
 )
+HEADING = "<b>Every network, and the one on screen.</b> "
 HELP = (
     "A line that is clicked in the packing becomes the green one. Shown is the shadow "
     f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: the "
@@ -25,6 +28,21 @@ COMPUTED = (
     "it is known to {found.gap:.1g} of the mean force. Halfway is the outline shrunk "
     "to half its lengths about its middle."
 )
+
+
+def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
+    """What the marks of the plot are, as HTML."""
+    marks = [
+        mark(STATES, "a dot: a whole force network", "50%"),
+        mark(DOT, "the one in the packing: drag it", "50%"),
+        mark(ORIGINAL, term("original", "as packed")),
+    ]
+    if outlined:
+        marks.insert(0, mark(PALE, f"all that is possible ({term('exact', 'exact')})"))
+    h = replay.summary["dimension"]
+    shadow = f" {term('s', 'S')} has {term('h', f'{h} dimensions')}; this is its shadow on two"
+    shadow += " of the forces." if plane.components else "."
+    return HEADING + ". ".join(marks) + "." + (shadow if h > 2 else "")
 
 
 def finding(found: Outlined, replay: Replay, others: Floats, called: str) -> str:
@@ -54,6 +72,19 @@ def computed(found: Outlined, replay: Replay) -> str:
         f"{_variance(found.plane)}."
     )
     return HELP + which + share + COMPUTED.format(found=found)
+
+
+def stresses(found: Outlined) -> str:
+    """What the outline of all stresses says, as HTML."""
+    reach = np.hypot(*found.inner.T).max(initial=0.0)
+    path = np.hypot(*found.plane.path.T)
+    return (
+        f"Shaded: every {term('stress', 'stress')} that these contacts can carry at this pressure, "
+        f"exactly ({found.programs} linear programs, {found.seconds:.1f} s). The farther from "
+        f"(0, 0), the more shear: at most <b>{reach:.3f}</b> of the pressure, certainly not above "
+        f"{reach + found.gap:.3f}; the network as packed carries {path[0]:.3f}, the "
+        f"{len(path) - 1} networks shown up to {path[1:].max():.3f}. The pressure alone is held."
+    )
 
 
 def _drawn(replay: Replay) -> str:

@@ -10,7 +10,16 @@ from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....state.view_settings import DRAWN, SCALES, SORTS
 from ....widgets.hints import term
-from ....widgets.parts import OUTLINED, TabView, by_words, folded_away, note, plotted, question
+from ....widgets.parts import (
+    OUTLINED,
+    TabView,
+    by_words,
+    folded_away,
+    mark,
+    note,
+    plotted,
+    question,
+)
 from ....widgets.plot_style import DARK, ORIGINAL, PALE, now
 from .bars_figure import BarsFigure
 from .contact_table import Contacts
@@ -22,10 +31,6 @@ SMALL = {"width": 146, "margin": (4, 4, 2, 6)}
 GROWS = "How many networks does it take?"
 HEADING = "<b>How far can each force go while no disk moves?</b> "
 FIXED = "Nowhere: balance leaves every force one value."
-SWATCH = (
-    '<span aria-hidden="true" style="display:inline-block;width:9px;height:9px;border-radius:{};'
-    'background:{};margin:0 3px 0 6px"></span>'
-)
 
 
 class View(TabView):
@@ -113,22 +118,18 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     parts = []
     if exact:
         words = f"pale: every admissible network ({term('exact', 'exact')})"
-        parts.append(_mark(PALE, words + (f" with {held} held; faintest: without" if held else "")))
+        parts.append(mark(PALE, words + (f" with {held} held; faintest: without" if held else "")))
     elif state.work.arriving is not None:
-        parts.append(_mark(PALE, "pale: exact bounds, as they are found"))
+        parts.append(mark(PALE, "pale: exact bounds, as they are found"))
     count = replay.summary["states"]
     random = "random networks so far" if state.growing else f"{count} random ones"
-    parts.append(_mark(DARK, f"dark: {random}"))
-    parts.append(_mark(now(state.looks.dark), "dot: now", "50%"))
-    parts.append(_mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
+    parts.append(mark(DARK, f"dark: {random}"))
+    parts.append(mark(now(state.looks.dark), "dot: now", "50%"))
+    parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
     text = HEADING + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing go on beyond the axis: {beyond}. "
     return text + "Drag a dot, or a line in the packing."
-
-
-def _mark(colour: str, words: str, corner: str = "1px") -> str:
-    return SWATCH.format(corner, colour) + words
 
 
 def _across(every: int, drawn: int, words: str) -> str:

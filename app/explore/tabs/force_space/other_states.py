@@ -1,0 +1,76 @@
+"""Uniform states beside the walk on screen, or the walk beside uniform ones."""
+
+from collections.abc import Callable
+from typing import Any
+
+import panel_material_ui as pmui
+
+from ....browser.panel_patches import together
+from ....results import compute, planes
+from ....results.library import Shown
+from ....results.replays import Replay
+from ....state.app_state import AppState
+from ....widgets.progress import Progress
+
+# What is offered beside states of a kind, and what the others are called.
+ALSO = {"walk": "also uniformly sampled networks", "uniform": "also the walk"}
+MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
+ENOUGH = 300  # states beside those shown, where they have to be computed
+
+
+class OtherStates:
+    """A switch that has the other kind of states found or computed: `replay`."""
+
+    def __init__(self, state: AppState, changed: Callable[[], object]) -> None:
+        """changed(): there are others, or none any more."""
+        self.state, self._changed = state, changed
+        self.replay: Replay | None = None
+        self.switch = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
+        self.task = state.work.task()
+        self.progress = Progress(self.task)
+        self.switch.param.watch(lambda event: together(self.fetch), "value")
+
+    @property
+    def kind(self) -> str:
+        """Where the other states come from."""
+        cell = self.state.cell
+        return "walk" if cell is not None and cell.kind == "uniform" else "uniform"
+
+    def look(self) -> None:
+        """Those of a store are shown; else the switch has them computed."""
+        cell, self.replay = self.state.cell, None
+        if self.state.growing or cell is None:
+            return self.fetch()
+        self.task.cancel()
+        self.switch.label = ALSO[cell.kind]
+        found = planes.beside(self.state.catalogue, cell) is not None
+        if self.switch.value != found:
+            self.switch.value = found
+        elif found:
+            self.fetch()
+
+    def fetch(self, *events: Any) -> None:
+        """Find or compute the other states, or take them away."""
+        state, replay, cell = self.state, self.state.replay, self.state.cell
+        self.task.cancel()
+        self.replay = None
+        if not self.switch.value or cell is None or state.growing:
+            self._changed()
+            return
+        found = planes.beside(state.catalogue, cell)
+        own = cell.selection
+        wanted = own._replace(kind=self.kind, states=min(own.states, ENOUGH))
+        work = (
+            compute.states(state.library, wanted)
+            if found is None
+            else lambda job: state.library.shown(found)
+        )
+
+        def done(shown: Shown) -> None:
+            if state.replay is replay:
+                self.replay = shown.replay
+                self._changed()
+                if found is None:
+                    state.refresh()  # it is listed from now on
+
+        self.task.start(work, done)

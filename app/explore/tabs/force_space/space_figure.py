@@ -1,0 +1,124 @@
+"""The plot of force space: networks as dots, the one on screen, and the outline of S."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, CustomJS, DataRange1d, TapTool
+
+from ....results import planes
+from ....results.planes import Outlined, Plane
+from ....results.replays import Replay
+from ....widgets.parts import MOVES, figure
+from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, hover, lines, text
+
+Columns = dict[str, Any]  # of a ColumnDataSource
+
+# The page's theme gives all axes one colour.
+KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
+
+
+class SpaceFigure:
+    """A plane of force space; the player moves the state on screen along the path."""
+
+    def __init__(self, tab: str, aspect: float, show: Callable[[int], object]) -> None:
+        """tab: of the view; aspect: width over height; show(row): a dot was clicked."""
+        none: Columns = {"x": [], "y": []}
+        self.path = ColumnDataSource(none | {"state": []}, name="path")
+        self.here = ColumnDataSource(none, name="here", tags=["follows", "path", tab])
+        self.original, self.beside = ColumnDataSource(none), ColumnDataSource(none)
+        self.inner, self.outer = (ColumnDataSource(none, name=n) for n in ("inner", "outer"))
+        self.half, self.cone = ColumnDataSource(none), ColumnDataSource(none)
+        around = {"range_padding": 0.06, "only_visible": True}
+        self.figure = fig = figure(
+            "force_space", None, "", "", x_range=DataRange1d(**around),
+            y_range=DataRange1d(**around), aspect_ratio=aspect, sizing_mode="scale_width",
+            match_aspect=True, visible=False,
+        )  # fmt: skip
+        fig.name = "path_figure"
+        edges = [
+            fig.patch(
+                "x", "y", source=source, fill_color=PALE, fill_alpha=fill, line_color=DARK,
+                line_alpha=line, line_width=wide,
+            )
+            for source, fill, line, wide in (
+                (self.outer, 0.35, 1.0, 1.6), (self.inner, 0.0, 0.4, 1.0),
+            )
+        ]  # fmt: skip
+        fig.patch(
+            "x", "y", source=self.half, fill_alpha=0, line_color=DARK, line_dash="dotted",
+            line_width=1.4,
+        )  # fmt: skip
+        fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
+        fig.scatter(
+            "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7
+        )
+        states = fig.scatter(
+            "x", "y", source=self.path, size=5, color=STATES, alpha=0.9, nonselection_alpha=0.9
+        )
+        fig.scatter(
+            "x", "y", source=self.original, marker="diamond", size=14, color=ORIGINAL,
+            line_color="#333333",
+        )  # fmt: skip
+        here = fig.scatter(
+            "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5
+        )
+        here.tags = MOVES
+        # The state on screen moves too often to be looked at for the range.
+        fig.x_range.renderers = fig.y_range.renderers = [*edges, states]
+        rows = ("network", "@state"), ("at", "@x{0.000}, @y{0.000}")
+        fig.add_tools(hover([states], *rows), TapTool(renderers=[states]))
+        for axis in (*fig.xaxis, *fig.yaxis):
+            axis.js_on_change("axis_label_text_color", CustomJS(code=KEEP))
+
+        def tapped(name: str, old: object, new: list[int]) -> None:
+            if new:
+                self.path.selected.indices = []
+                show(int(new[0]))
+
+        self.path.selected.on_change("indices", tapped)
+
+    def clear(self) -> None:
+        """Nothing of another plane stays; without dots there is no plot."""
+        self.figure.visible = False
+        self.path.data = {"x": [], "y": [], "state": []}
+        for source in (self.original, self.beside, self.here, self.cone):
+            source.data = {"x": [], "y": []}
+        self.forget_outline()
+
+    def forget_outline(self) -> None:
+        """The outline is to come."""
+        for source in (self.inner, self.outer, self.half):
+            source.data = {"x": [], "y": []}
+
+    def show(self, plane: Plane, path: Columns, frame: int) -> None:
+        """Networks in a plane, that of row `frame` on screen; no outline."""
+        x, y = plane.path.T
+        self.path.data = path
+        self.original.data = {"x": x[:1], "y": y[:1]}
+        self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
+        self.forget_outline()
+        # Distances mean something among principal axes: both then have the same scale.
+        self.figure.update(match_aspect=not plane.components, visible=True)
+
+    def outline(self, found: Outlined) -> None:
+        """The outline, and halfway to it from its middle, of which stresses say nothing."""
+        parts = [(self.inner, found.inner), (self.outer, found.outer)]
+        if found.plane.kind != planes.STRESS:
+            parts.append((self.half, planes.halfway(found.outer)))
+        for source, corners in parts:
+            closed = np.concatenate([corners, corners[:1]])
+            source.data = {"x": closed[:, 0], "y": closed[:, 1]}
+
+    def draw_cone(self, plane: Plane, mu: float, reach: float) -> None:
+        """Coulomb's cone where both axes are forces of one contact, up to f_n = reach."""
+        one = len({contact for contact, _ in plane.components}) == 1
+        cone = {"x": [reach, 0, reach], "y": [mu * reach, 0, -mu * reach]}
+        self.cone.data = cone if one else {"x": [], "y": []}
+
+    def title(self, replay: Replay, plane: Plane, dark: bool) -> None:
+        """Titles of the axes, in the colours of the lines whose forces they are."""
+        colours = lines(dark) if plane.pair else (text(dark),) * 2
+        axes = self.figure.xaxis[0], self.figure.yaxis[0]
+        for axis, words, colour in zip(axes, planes.labels(replay, plane), colours, strict=True):
+            axis.update(axis_label=words, tags=[colour], axis_label_text_color=colour)
