@@ -1,6 +1,4 @@
-"""Ten findings in a sentence each, filled with numbers of the study; none is written where one is
-missing.
-"""
+"""Ten findings, one sentence each, filled in from the study; left out if a number is missing."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -26,7 +24,7 @@ class Highlight(NamedTuple):
 
 
 class _Numbers:
-    """What sentences quote; KeyError for what the study lacks."""
+    """The numbers that sentences quote; KeyError for those that the study lacks."""
 
     def __init__(self, table: Table, claims: Rows, findings: Rows) -> None:
         self.table = table
@@ -64,9 +62,9 @@ class _Numbers:
 def _free_forces(of: _Numbers) -> Highlight:
     most = of.frictions[-1]
     return Highlight(
-        f"Force balance leaves {of.whole('exact', 'dimension', USUAL)} of the forces of a "
-        f"{of.table.plan['n']}-disk packing free at μ = {USUAL:g}, and "
-        f"{of.whole('exact', 'dimension', most)} at μ = {most:g}.",
+        f"Force balance leaves a {of.table.plan['n']}-disk packing with "
+        f"{of.whole('exact', 'dimension', USUAL)} free dimensions on average at μ = {USUAL:g}, "
+        f"and {of.whole('exact', 'dimension', most)} at μ = {most:g}.",
         "figure1_exact",
         "ensemble",
     )
@@ -75,8 +73,8 @@ def _free_forces(of: _Numbers) -> Highlight:
 def _maximum(of: _Numbers) -> Highlight:
     least, most = 0.001, of.frictions[-1]
     return Highlight(
-        "Indeterminacy is largest at intermediate friction: exact 0.15 η3 is "
-        f"{of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, against "
+        "Indeterminacy is largest at intermediate friction: the exact 0.15 η3 is "
+        f"{of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, compared with "
         f"{of.mean('exact', 'eta3', least, 0.15)} at μ = {least:g} and "
         f"{of.mean('exact', 'eta3', most, 0.15)} at μ = {most:g}.",
         "figure1_exact",
@@ -86,10 +84,10 @@ def _maximum(of: _Numbers) -> Highlight:
 
 def _seen(of: _Numbers) -> Highlight:
     return Highlight(
-        "A random walk of 1000 states sees part of what is possible: its intervals are "
-        f"{of.judged(WALK_OVER_EXACT)}"
-        " times as long as the exact ones at intermediate μ, and those of uniform states "
-        f"{of.judged('η3 of uniform states over exact η3, intermediate μ')} times.",
+        "A random walk of 1000 states sees only part of what is possible: at intermediate μ its "
+        f"intervals are {of.judged(WALK_OVER_EXACT)} times as long as the exact ones, and those of "
+        "uniform states are "
+        f"{of.judged('η3 of uniform states over exact η3, intermediate μ')} times as long.",
         "samplers",
         "exact-intervals",
     )
@@ -98,8 +96,8 @@ def _seen(of: _Numbers) -> Highlight:
 def _strong(of: _Numbers) -> Highlight:
     statement = "corr(f_n, ΔF_n) is significant at intermediate μ"
     return Highlight(
-        "Strong contacts are the least determined ones: at intermediate μ the correlation of f_n "
-        f"with its exact interval is {of.judged(statement, 'exact')}.",
+        "Strong contacts are the least determined: at intermediate μ the correlation between f_n "
+        f"and the length of its exact interval is {of.judged(statement, 'exact')}.",
         "figure6_exact",
         "measures",
     )
@@ -107,10 +105,10 @@ def _strong(of: _Numbers) -> Highlight:
 
 def _wider(of: _Numbers) -> Highlight:
     return Highlight(
-        "The walk of the paper is not uniform in S: at intermediate μ its states spread "
+        "The paper's walk is not uniform in S: its states spread "
         f"{of.judged('η1 of the walk over η1 of S, intermediate μ')} times as far as uniform "
-        "states do, at small μ "
-        f"{of.judged('η1 of the walk over η1 of S, small μ')} times.",
+        "states at intermediate μ, and "
+        f"{of.judged('η1 of the walk over η1 of S, small μ')} times as far at small μ.",
         "distances",
         "uniform-sampling",
     )
@@ -120,8 +118,8 @@ def _alike(of: _Numbers) -> Highlight:
     statement = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3"
     return Highlight(
         "The three measures agree up to constant factors: η1/η3 is "
-        f"{of.judged(statement, 'nearest')} in walks of nearest networks, and "
-        f"{of.judged(statement, 'gauss_seidel')} in walks by the paper's sweeps.",
+        f"{of.judged(statement, 'nearest')} in walks that project onto S, and "
+        f"{of.judged(statement, 'gauss_seidel')} in walks that use the paper's sweeps.",
         "figure1",
         "measures",
     )
@@ -129,8 +127,8 @@ def _alike(of: _Numbers) -> Highlight:
 
 def _critical(of: _Numbers) -> Highlight:
     return Highlight(
-        "A contact gives way below its limit load where friction matters: F_crit over the limit "
-        f"load is {of.judged('⟨F_crit⟩ over ⟨limit load⟩, small μ')} at small, "
+        "Where friction matters, a contact gives way below its limit load: F_crit divided by the "
+        f"limit load is {of.judged('⟨F_crit⟩ over ⟨limit load⟩, small μ')} at small, "
         f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, intermediate μ')} at intermediate and "
         f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, large μ')} at large μ.",
         "figure2_limit",
@@ -140,8 +138,8 @@ def _critical(of: _Numbers) -> Highlight:
 
 def _stability(of: _Numbers) -> Highlight:
     return Highlight(
-        "Over all μ, the critical force follows exact η3 only in part: their rank correlation is "
-        f"{of.judged('F_crit rises with η', 'exact')}; with η2 of nearest walks it is "
+        "The critical force follows the exact η3 only in part: over all μ, their rank correlation "
+        f"is {of.judged('F_crit rises with η', 'exact')}; with η2 of nearest walks it is "
         f"{of.judged('F_crit rises with η', 'nearest')}.",
         "figure2",
         "local-perturbation",
@@ -150,8 +148,8 @@ def _stability(of: _Numbers) -> Highlight:
 
 def _shear(of: _Numbers) -> Highlight:
     return Highlight(
-        "A packing at rest under isotropic pressure could carry shear: the largest shear stress "
-        "over pressure is "
+        "A packing compressed isotropically can carry shear: the largest possible ratio of "
+        "shear stress to pressure is "
         f"{of.judged('largest shear stress over pressure, intermediate μ')} at intermediate μ.",
         "stresses",
         "stresses",
@@ -160,7 +158,7 @@ def _shear(of: _Numbers) -> Highlight:
 
 def _volume(of: _Numbers) -> Highlight:
     return Highlight(
-        "The volume of S shrinks as friction falls: ln V per grain is "
+        "The volume of S shrinks as friction decreases: ln V per grain is "
         f"{of.judged('ln V per grain, forces in ⟨f_n⟩, large μ')} at large, "
         f"{of.judged('ln V per grain, forces in ⟨f_n⟩, intermediate μ')} at intermediate and "
         f"{of.judged('ln V per grain, forces in ⟨f_n⟩, small μ')} at small μ.",
@@ -176,7 +174,7 @@ SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
 
 
 def highlights(table: Table, claims: Rows, findings: Rows) -> list[Highlight]:
-    """The findings that the study has all numbers of."""
+    """The findings for which the study has all numbers."""
     numbers, found = _Numbers(table, claims, findings), []
     for sentence in SENTENCES:
         try:
