@@ -357,13 +357,3 @@ TERMS = {
 def title(key: str) -> str:
     """A term as it is named: "friction coefficient μ"."""
     return f"{TERMS[key].word} {TERMS[key].symbol}".strip()
-
-
-def markdown() -> str:
-    """The terms that have a symbol, as a Markdown table."""
-    lines = ["| symbol | is called | means |", "|---|---|---|"]
-    for word, sentence, symbol in TERMS.values():
-        if symbol:
-            escaped = symbol.replace("|", "\\|")
-            lines.append(f"| {escaped} | {word} | {sentence.replace('|', chr(92) + '|')} |")
-    return "\n".join(lines)

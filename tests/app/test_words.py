@@ -3,12 +3,10 @@
 import re
 from html import unescape
 
-from small_store import ROOT
-
 from app.results.selection import KINDS, SOLVERS
 from app.state.view_settings import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.widgets import hints
-from granforce import glossary, notebook
+from granforce import notebook
 from granforce.glossary import TERMS
 
 
@@ -20,10 +18,6 @@ def test_every_symbol_and_option_has_its_sentence():
             assert words in known, words
     for word, sentence, _ in TERMS.values():
         assert re.fullmatch(r"[^.].*\.", sentence) and len(sentence) < 320, word
-
-
-def test_the_readme_lists_the_symbols_of_the_glossary():
-    assert glossary.markdown() in (ROOT / "README.md").read_text()
 
 
 def test_tables_in_notebooks_explain_their_names():
