@@ -47,12 +47,15 @@ from granforce.explore.uniform import UniformSample as UniformSample
 from granforce.explore.uniform import sample_uniform as sample_uniform
 from granforce.explore.volume import Volume as Volume
 from granforce.explore.volume import volume as volume
+from granforce.figures.picture import plot as plot
 from granforce.forces.build import ensemble as ensemble
 from granforce.forces.ensemble import Ensemble as Ensemble
 from granforce.forces.knowledge import Known as Known
 from granforce.forces.nearest import nearest as nearest
 from granforce.forces.nearest import nearest_of_many as nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp as nearest_piqp
+from granforce.labelled import to_dataframe as to_dataframe
+from granforce.labelled import to_dataset as to_dataset
 from granforce.motion.gauss_seidel import gauss_seidel as gauss_seidel
 from granforce.motion.rest import Rest as Rest
 from granforce.motion.rest import rest as rest

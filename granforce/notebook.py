@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from granforce.cell import Cell
 from granforce.glossary import TERMS
 from granforce.types import Floats, Integers
+
+T = TypeVar("T")
 
 SIDE = 420  # of the picture, pixels
 LINE = 16  # height of a line of words below it, pixels
@@ -24,6 +26,33 @@ WIDE = 4.0
 WIDTHS = 12  # classes of width; contacts of one width and colour are one path
 # Mobilisation f_t/(μ f_n) from −1 to 1 in classes of equal size: blue, grey, orange.
 COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
+
+
+def brief(record: type[T]) -> type[T]:
+    """A decorator: the repr of a record (named tuple or dataclass) fits into a line or two."""
+    record.__repr__ = _short  # type: ignore[method-assign]
+    return record
+
+
+def _short(record: Any) -> str:
+    """A record in a line: arrays by their shape, records and tables by their type."""
+    fields = getattr(record, "_fields", None) or [
+        name for name in record.__dataclass_fields__ if not name.startswith("_")
+    ]
+    said = []
+    for name in fields:
+        value = getattr(record, name)
+        if isinstance(value, np.ndarray):
+            said.append(f"{name}{list(value.shape)}")
+        elif value is None or isinstance(value, (bool, str)):
+            said.append(
+                f"{name}={str(value)[:40]!r}" if isinstance(value, str) else f"{name}={value}"
+            )
+        elif isinstance(value, (int, float, np.number)):
+            said.append(f"{name}={value:.6g}")
+        else:
+            said.append(f"{name}: {type(value).__name__}")
+    return f"{type(record).__name__}({', '.join(said)})"
 
 
 def table(title: str, lines: Mapping[str, Any]) -> str:

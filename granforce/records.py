@@ -51,6 +51,7 @@ class Cancelled(Exception):
     """The work was cancelled on request; nothing was kept of the unit under way."""
 
 
+@notebook.brief
 class Contacts(NamedTuple):
     """Geometry of N_c contacts."""
 
@@ -71,6 +72,7 @@ class Contacts(NamedTuple):
         return Contacts._make(np.concatenate(both) for both in zip(self, others, strict=True))
 
 
+@notebook.brief
 class Packing(NamedTuple):
     """N disks, their contacts, and one force network on them."""
 
@@ -89,6 +91,12 @@ class Packing(NamedTuple):
     def cell(self) -> Cell:
         """The periodic cell."""
         return Cell(self.box, self.tilt)
+
+    @property
+    def contact_points(self) -> Floats:
+        """Points of contact (N_c, 2), at their image in the cell, length."""
+        c = self.contacts
+        return self.cell.wrapped(self.x[c.i] + c.arm_i[:, None] * c.normal)
 
     @property
     def volume(self) -> float:
@@ -117,6 +125,7 @@ class Packing(NamedTuple):
         )
 
 
+@notebook.brief
 class Relaxation(NamedTuple):
     """What a relaxation solver reached."""
 

@@ -174,3 +174,51 @@ def test_relaxations_are_typed_as_functions_are_called():
     for name, word in typed.items():
         function = computed[word]["relax"]
         assert getattr(gf, name.removesuffix("_only")) is function
+
+
+def test_results_are_labelled_in_xarray_and_pandas():
+    packing = packed(30, 0.3)
+    S = gf.ensemble(packing)
+    walk, exact = gf.walk(S, 6), gf.intervals(S)
+    states = gf.to_dataset(walk, S)["states"]
+    assert states.dims == ("state", "contact", "component") and states.units == "force"
+    contact = S.index[4]
+    one = states.sel(contact=contact, component="f_t")
+    assert np.array_equal(one, walk.states[:, 4, 1])
+    assert (int(one.i), int(one.j)) == (packing.contacts.i[contact], packing.contacts.j[contact])
+    assert [float(one.x), float(one.y)] == packing.contact_points[contact].tolist()
+    table = gf.to_dataframe(exact, S).set_index("contact")
+    assert table.loc[contact, "high_f_n"] == exact.high[4, 0]
+    assert table.columns[:4].tolist() == ["i", "j", "x", "y"]
+    rows = gf.to_dataframe(walk, S)
+    assert len(rows) == 6 * len(S.index) and rows["f_n"].iloc[-1] == walk.states[-1, -1, 0]
+    assert len(gf.to_dataframe(packing)) == len(packing.contacts.i)
+    for result in (gf.sample_uniform(S, 8), gf.nearest(S, S.original), gf.reach(S, contact)):
+        assert len(gf.to_dataframe(result, S)) % len(S.index) == 0
+    with pytest.raises(gf.InputError, match=r"gf\.to_dataset\(result, S\)"):
+        gf.to_dataset(walk)
+    with pytest.raises(gf.InputError, match="of another ensemble"):
+        gf.to_dataset(walk, gf.ensemble(gf.scene("groove", 0.5)))
+
+
+def test_a_result_is_printed_in_few_lines():
+    S = gf.ensemble(packed(30, 0.3))
+    sample = gf.sample_uniform(S, 8)
+    results = [S.packing, S, sample, sample.mixing, gf.walk(S, 3), gf.intervals(S)]
+    for result in (*results, S.contacts, gf.margin(S.packing), gf.reach(S, S.index[0])):
+        assert repr(result).startswith(f"{type(result).__name__}(") and len(repr(result)) < 400
+    assert "states[3, " in repr(results[4])
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf"])
+@pytest.mark.parametrize("colour", ["mobilisation", "force", "spread"])
+def test_a_packing_is_drawn_with_states_and_walls(suffix, colour, tmp_path):
+    packing = gf.scene("groove", 0.5)
+    states = gf.walk(gf.ensemble(packing), 5).states
+    figure = gf.plot(packing, states, colour, backend="matplotlib")
+    lines = [element for element in figure if type(element).__name__ == "Segments"]
+    assert [len(one) for one in lines] == [2, 2]  # two walls, two contacts
+    gf.figures.save(figure, tmp_path / f"picture.{suffix}")
+    assert (tmp_path / f"picture.{suffix}").stat().st_size > 5000
+    with pytest.raises(gf.InputError, match=r"contacts=S\.index"):
+        gf.plot(packing, states[:, :1])

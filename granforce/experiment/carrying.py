@@ -24,6 +24,7 @@ _BEYOND = 1.1
 _AT_ONCE = 64
 
 
+@notebook.brief
 class Carrying(NamedTuple):
     """The least f_n of k contacts over all networks that agree with a measurement."""
 

@@ -43,6 +43,7 @@ _DROPPED = 20
 Kind = TypeVar("Kind", bound="Inference")
 
 
+@notebook.brief
 class Draws(NamedTuple):
     """States of S drawn with the weight exp(−χ²/2), by chain, and whether they can be trusted."""
 
@@ -60,6 +61,7 @@ class Draws(NamedTuple):
     chain = uniform.UniformSample.chain  # type: ignore[misc]
 
 
+@notebook.brief
 class Inference(NamedTuple):
     """The network that a measurement speaks for, and how sure it is."""
 

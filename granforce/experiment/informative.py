@@ -16,6 +16,7 @@ from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Progress
 
 
+@notebook.brief
 class Informative(NamedTuple):
     """Contacts whose normal force would be worth measuring, the best first."""
 

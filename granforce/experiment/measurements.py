@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce import notebook
 from granforce.packing.importers.text import LARGEST, Source, read_csv
 from granforce.records import InputError
 from granforce.types import Floats, Integers
@@ -12,6 +13,7 @@ from granforce.types import Floats, Integers
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 
 
+@notebook.brief
 class Measurement(NamedTuple):
     """Forces measured on k contacts; NaN where a component was not."""
 

@@ -46,6 +46,7 @@ _ITERATIONS = 500
 _LISTED = 10
 
 
+@notebook.brief
 class Photoelastic(NamedTuple):
     """A packing with measured forces; contacts: those listed, candidates, those of walls."""
 

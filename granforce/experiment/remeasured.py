@@ -18,6 +18,7 @@ import time
 import numpy as np
 import numpy.typing as npt
 
+from granforce import notebook
 from granforce.experiment.infer import Inference, asked, judged, told
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
@@ -31,6 +32,7 @@ from granforce.types import Cancel, Floats, Progress
 UNMEASURED = 2.0
 
 
+@notebook.brief
 class Remeasured(Inference):
     """An Inference whose draws tell how far the likeliest network is from the truth.
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from granforce import notebook
 from granforce.experiment.listing import Listing
 from granforce.experiment.pegs import Photoelastic
 from granforce.forces.build import ensemble
@@ -15,6 +16,7 @@ from granforce.tolerances import LARGEST_UNIT
 from granforce.types import Floats, Integers
 
 
+@notebook.brief
 class SyntheticFrame(NamedTuple):
     """A frame as files would hold it, and the truth; `gf.read_pegs` takes it in place of files."""
 

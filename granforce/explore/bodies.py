@@ -38,6 +38,7 @@ _SINGULAR = 1e-13
 OPENS, SLIDES_BACK, SLIDES = 0, -1, 1  # f_n = 0, f_t = −μ f_n, f_t = μ f_n
 
 
+@notebook.brief
 class Side(NamedTuple):
     """A side of S: an end (h = 1), an edge of the polygon (2) or a face of the body (3)."""
 
@@ -46,6 +47,7 @@ class Side(NamedTuple):
     normal: Floats  # (h,) unit vector out of S
 
 
+@notebook.brief
 class Body(NamedTuple):
     """S as a point, a segment, a polygon or a body, in h orthonormal coordinates u."""
 

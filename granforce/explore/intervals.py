@@ -33,6 +33,7 @@ Key = tuple[int, int, int]  # contact, component and side of a bound
 Bounds = dict[Key, tuple[float, float]]  # value attained, and the value that bounds it
 
 
+@notebook.brief
 class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
@@ -68,6 +69,7 @@ class Bound(NamedTuple):
     value: float  # force
 
 
+@notebook.brief
 class LimitLoads(NamedTuple):
     """Largest force pairs that S can carry on k contacts."""
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import fft, stats
 from scipy.special import ndtri
 
+from granforce import notebook
 from granforce.system import cancelling
 from granforce.types import Floats, Mask
 
@@ -22,6 +23,7 @@ _TAILS = 0.05, 0.95
 _AT_ONCE = 128
 
 
+@notebook.brief
 class Mixing(NamedTuple):
     """Diagnostics of each component; NaN where it cannot vary or there are too few draws."""
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from granforce import notebook
 from granforce.forces.contact_problem import cone_costs, forces_of, known_part, make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
@@ -31,6 +32,7 @@ _CLOSEST = 1e-5
 _FLOOR = 1e-7
 
 
+@notebook.brief
 class Outline(NamedTuple):
     """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons run left about."""
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from granforce import notebook
 from granforce.explore.intervals import determined, needs_no_program, solved, told
 from granforce.forces.contact_problem import (
     forces_of,
@@ -40,6 +41,7 @@ _ALONE = 5000
 _AT_WALL = 1e-6
 
 
+@notebook.brief
 class Pull(NamedTuple):
     """Networks with given f_n on one contact."""
 
@@ -52,6 +54,7 @@ class Pull(NamedTuple):
     sliding: Integers  # (k, N_c) int, sign of f_t where |f_t| = μ f_n > 0, 0 elsewhere
 
 
+@notebook.brief
 class Reach(NamedTuple):
     """How far f_n of one contact can be pulled, and what holds it there."""
 

@@ -41,6 +41,7 @@ Seed = int | np.random.SeedSequence
 Relax = Callable[..., Relaxation]  # as `nearest`
 
 
+@notebook.brief
 class Walk(NamedTuple):
     """Accepted states of one or more chains, and what it took to reach them."""
 
@@ -67,6 +68,7 @@ class Walk(NamedTuple):
         return notebook.table("Random walk in S", lines)
 
 
+@notebook.brief
 class Found(NamedTuple):
     """One accepted state of a walk under way, as `watch` of `walk` gets it."""
 

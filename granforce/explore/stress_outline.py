@@ -22,6 +22,7 @@ from granforce.types import Cancel, Floats, Progress
 TOLERANCE = 1e-4
 
 
+@notebook.brief
 class StressOutline(NamedTuple):
     """The stresses of all networks in S, as points ((σ_xx − σ_yy)/2P, σ_xy/P)."""
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from scipy.sparse.linalg import norm
 
+from granforce import notebook
 from granforce.explore import billiard
 from granforce.explore.billiard import Rows
 from granforce.explore.mixing import Mixing, mixing
@@ -63,6 +64,7 @@ class ChainState(NamedTuple):
 Flown = tuple[list[ChainState], Floats, Integers]
 
 
+@notebook.brief
 class UniformSample(NamedTuple):
     """Uniform states of S by chain, and whether they can be trusted."""
 

@@ -54,6 +54,7 @@ _COUNTS = "turns", "refused"
 AGREE = 4.0
 
 
+@notebook.brief
 class Volume(NamedTuple):
     """The volume of S in its affine hull, forces f_n and f_t of every contact in ⟨f_n⟩."""
 

@@ -4,7 +4,7 @@ import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
-from granforce.figures.networks import contact_points, outline
+from granforce.figures.networks import outline
 from granforce.records import Packing
 from granforce.types import Floats
 
@@ -34,7 +34,7 @@ def displacement(
         *outline(packing, backend),
     ]
     if contact is not None:
-        at = contact_points(packing, np.array([contact]))
+        at = packing.contact_points[[contact]]
         drawn.append(style.dots(at, "perturbed contact", style.COLOURS[1], backend, size=8))
     whole = np.isfinite(packing.box).all()
     low, high = packing.cell.extent if whole else (x.min(axis=0), x.max(axis=0))

@@ -129,7 +129,7 @@ def places(
     frames = []
     for mu in sorted(groups):
         packing, contacts, normal, extent = groups[mu]
-        at = contact_points(packing, contacts)
+        at = packing.contact_points[contacts]
         marks = (("strongest", normal, style.COLOURS[1]), ("least determined", extent, "#0072B2"))
         for word, values, colour in marks:
             count = max(1, round(part * len(at)))
@@ -160,7 +160,7 @@ def overlaid(
     frames = []
     for mu in sorted(groups):
         packing, contacts, normal, extent = groups[mu]
-        at, normal, extent = contact_points(packing, contacts), *map(np.asarray, (normal, extent))
+        at, normal, extent = packing.contact_points[contacts], *map(np.asarray, (normal, extent))
         strong, loose = normal > 2 * normal.mean(), extent > extent.mean()
         drawn = [
             style.dots(at, "contacts", style.GREY, backend, size=4),
@@ -178,13 +178,6 @@ def overlaid(
             )
         )
     return style.page(frames, backend, columns=2)
-
-
-def contact_points(packing: Packing, contacts: Integers) -> Floats:
-    """Points of contact (n, 2), folded into the cell."""
-    c = packing.contacts
-    at = packing.x[c.i[contacts]] + c.arm_i[contacts, None] * c.normal[contacts]
-    return packing.cell.wrapped(at)
 
 
 def outline(packing: Packing, backend: str) -> list[hv.Curve]:

@@ -247,11 +247,12 @@ def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
 
 
 def save(figure: Any, path: str | Path, caption: str = "") -> None:
-    """Write a figure to path: a page that needs no network (.html), or a picture (.png, .svg).
+    """Write a figure to a path.
 
+    The suffix decides: a page that needs no network (.html), or a picture (.png, .svg, .pdf).
     Pages are for figures made with the backend "bokeh", pictures with "matplotlib": no browser.
     caption: what the figure shows, kept in the file: the title of a page, the Description of a PNG,
-    <desc> in an SVG.
+    <desc> in an SVG, the Subject of a PDF.
     """
     path = Path(path)
     if path.suffix == ".html":
@@ -260,10 +261,10 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
         title = caption or path.stem
         hv.save(figure, text, fmt="html", backend="bokeh", resources="inline", title=title)
         content = text.getvalue().encode()
-    elif path.suffix in (".png", ".svg"):
+    elif path.suffix in (".png", ".svg", ".pdf"):
         content = _picture(figure, path.suffix.removeprefix("."), caption)
     else:
-        raise InputError(f"figures are saved as .html, .png or .svg, not {path.suffix!r}")
+        raise InputError(f"figures are saved as .html, .png, .svg or .pdf, not {path.suffix!r}")
     with written(path) as file:
         file.write(content)
 
@@ -283,17 +284,18 @@ def _picture(figure: Any, form: str, caption: str) -> bytes:
     drawn = rendered(figure)
     from matplotlib import rc_context  # seconds to load, of use here only
 
-    metadata: dict[str, str | None] = {"Title": "granforce", "Description": caption}
-    if form == "svg":
-        metadata["Date"] = None  # the same figure, the same file
+    described = "Subject" if form == "pdf" else "Description"
+    metadata: dict[str, str | None] = {"Title": "granforce", described: caption}
+    if form != "png":  # the same figure, the same file
+        metadata["Date" if form == "svg" else "CreationDate"] = None
     file = io.BytesIO()
     # Names in SVG come from a fixed salt, not from chance.
     with rc_context({"svg.hashsalt": "granforce"}):
         drawn.savefig(file, format=form, dpi=150, bbox_inches="tight", metadata=metadata)
     content = file.getvalue()
     if form == "svg" and caption:
-        described = f"</title>\n <desc>{escape(caption)}</desc>".encode()
-        content = content.replace(b"</title>", described, 1)
+        told = f"</title>\n <desc>{escape(caption)}</desc>".encode()
+        content = content.replace(b"</title>", told, 1)
     return content
 
 

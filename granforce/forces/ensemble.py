@@ -47,6 +47,7 @@ class Hull(NamedTuple):
     resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no held wall is farther from any point of S
 
 
+@notebook.brief
 @dataclass(frozen=True, eq=False)
 class Ensemble:
     """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `build`."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from granforce import notebook
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import InputError, NotJammedError, are_whole
@@ -20,6 +21,7 @@ _NAMES = "f_n", "f_t"
 _WEIGHTY = 1e-6
 
 
+@notebook.brief
 class Known(NamedTuple):
     """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high."""
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from granforce import notebook
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
@@ -29,6 +30,7 @@ NOISE, DRAWS = (1e-4, 1e-2), 3
 MOST_STEPS = 500
 
 
+@notebook.brief
 class Rest(NamedTuple):
     """The certificate of rest of a packing; see `rest`."""
 

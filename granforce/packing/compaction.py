@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from granforce import notebook
 from granforce.motion import contact_dynamics as dynamics
 from granforce.motion.rest import Rest, rest
 from granforce.numerics.lanes import compiled
@@ -72,6 +73,7 @@ DISK_BYTES = 2000
 WATCH_EVERY = 5
 
 
+@notebook.brief
 class Glimpse(NamedTuple):
     """A packing while it is compressed, as `watch` of `pack` gets it; all arrays are its own."""
 

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from granforce import notebook
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
@@ -60,6 +61,7 @@ LEAST_PRECISION = INTERVAL_GAP
 COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
 
 
+@notebook.brief
 class CriticalForce(NamedTuple):
     """Largest force pair on one contact under which grains come to rest, and the motion above."""
 
@@ -77,6 +79,7 @@ class CriticalForce(NamedTuple):
     seconds: float  # of following flows, shared among those side by side
 
 
+@notebook.brief
 class Response(NamedTuple):
     """First motion above the critical force, scaled so that rms |u| of the backbone is 1."""
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from granforce import notebook
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
 from granforce.records import InputError, float_array, real_array, takes
@@ -23,6 +24,7 @@ from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
 
 
+@notebook.brief
 class Loaded(NamedTuple):
     """Networks under loads that push the grains of one contact apart."""
 

@@ -7,7 +7,7 @@ from packings import packed, skewed
 
 from granforce.figures import style
 from granforce.figures.displacement import LONGEST_ARROW, displacement
-from granforce.figures.networks import contact_points, overlaid, places
+from granforce.figures.networks import overlaid, places
 
 
 @pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
@@ -39,7 +39,7 @@ def test_tilted_cells_are_outlined_and_grains_lie_inside():
     (curve,) = figure.traverse(lambda element: element, [hv.Curve])
     outline = np.column_stack([curve.dimension_values(0), curve.dimension_values(1)])
     assert outline == pytest.approx(packing.cell.corners)
-    at = contact_points(packing, np.arange(len(packing.contacts.i)))
+    at = packing.contact_points
     for points in (at, packing.cell.wrapped(packing.x)):
         parts = packing.cell.parts(points)
         assert parts.min() > -1e-12 and parts.max() < 1 + 1e-12

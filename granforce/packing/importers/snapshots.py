@@ -3,10 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from granforce import notebook
 from granforce.records import InputError, Packing
 from granforce.types import Floats
 
 
+@notebook.brief
 class Snapshot(NamedTuple):
     """A packing, and the names of its grains in the files; −1, −2, … for walls."""
 
@@ -14,6 +16,7 @@ class Snapshot(NamedTuple):
     ids: Floats  # (N,)
 
 
+@notebook.brief
 class Snapshots(NamedTuple):
     """The snapshots in the files of a simulation that are whole."""
 

@@ -1,0 +1,156 @@
+"""A packing with one of its force networks, or what many of them have in common."""
+
+from typing import Any
+
+import holoviews as hv
+import numpy as np
+import numpy.typing as npt
+
+from granforce.figures import style
+from granforce.figures.networks import outline
+from granforce.records import InputError, Packing, brief, float_array, takes
+from granforce.types import Floats
+
+COLOURS = ("mobilisation", "force", "spread")
+WIDEST = 4.0  # f_n / ⟨f_n⟩ from which lines grow no wider
+MOST_DISKS = 4000  # beyond, disks are left out
+_MAPS = {"mobilisation": "coolwarm", "force": "viridis_r", "spread": "magma_r"}
+_WORDS = {
+    "mobilisation": "f_t / (μ f_n)",
+    "force": "f_n / ⟨f_n⟩",
+    "spread": "spread of f_n / ⟨f_n⟩",
+}
+_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 65)) for f in (np.cos, np.sin)], axis=1)
+
+
+@takes(Packing)
+def plot(
+    packing: Packing,
+    states: npt.ArrayLike | None = None,
+    colour: str | npt.ArrayLike = "mobilisation",
+    *,
+    contacts: npt.ArrayLike | None = None,
+    backend: str = "bokeh",
+) -> hv.Overlay:
+    """A packing to scale, with contacts as lines: width f_n, and a colour with its scale.
+
+    states: a network (k, 2) or networks (S, k, 2) of which the mean is drawn, force; by default the
+    packing's own. contacts (k,): their numbers in the packing, needed where they are fewer than its
+    own (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard
+    deviation of f_n over states), or numbers (k,). Walls are drawn at the places that they touch.
+    backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the one, and .pdf, .png, .svg
+    with the other.
+
+    Raises InputError for states that are not of these contacts, and for an unknown colour.
+    """
+    style.ready(backend)
+    count = len(packing.contacts.i)
+    numbers = np.arange(count) if contacts is None else np.asarray(contacts)
+    drawn = packing.forces[numbers] if states is None else np.asarray(states, dtype=float)
+    several = drawn if drawn.ndim == 3 else drawn[None]
+    if several.shape[1:] != (len(numbers), 2):
+        raise InputError(
+            f"states have shape {drawn.shape}, for {len(numbers)} contacts of the packing; give "
+            "contacts=S.index with the networks of an ensemble S"
+        )
+    mean = several.mean(axis=0)
+    unit = mean[:, 0].mean() or 1.0
+    values, label, look = _coloured(packing, several, mean, colour, unit)
+    elements = [*_disks(packing, backend), *outline(packing, backend)]
+    elements += _walls(packing, numbers, backend)
+    elements.append(_lines(packing, numbers, mean[:, 0] / unit, values, label, look, backend))
+    low, high = _window(packing)
+    limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
+    sides = style.equal_scales(high - low, backend)
+    title = f"{(~_held(packing)).sum()} disks, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
+    return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
+
+
+def _coloured(
+    packing: Packing, several: Floats, mean: Floats, colour: str | npt.ArrayLike, unit: float
+) -> tuple[Floats, str, dict[str, Any]]:
+    """Numbers (k,) to be coloured, their name, and the scale."""
+    if not isinstance(colour, str):
+        values = float_array(colour, (len(mean),), "colour")
+        return values, "colour", {"cmap": "viridis_r"}
+    if colour not in COLOURS:
+        raise InputError(f"colour must be {', '.join(COLOURS)} or numbers, got {brief(colour)}")
+    look: dict[str, Any] = {"cmap": _MAPS[colour]}
+    if colour == "mobilisation":
+        friction = packing.mu * mean[:, 0]
+        values = np.divide(mean[:, 1], friction, np.zeros(len(mean)), where=friction > 0)
+        return values, _WORDS[colour], look | {"clim": (-1, 1)}
+    values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
+    return values / unit, _WORDS[colour], look
+
+
+def _lines(
+    packing: Packing,
+    numbers: npt.NDArray[Any],
+    force: Floats,
+    values: Floats,
+    label: str,
+    look: dict[str, Any],
+    backend: str,
+) -> hv.Segments:
+    """Contacts that press, from centre to centre, or to the wall; every image in the cell."""
+    c, cell = packing.contacts.picked(numbers), packing.cell
+    pressing = np.flatnonzero(force > 0)
+    begin = cell.wrapped(packing.x[c.i[pressing]])
+    reach = np.where(_held(packing)[c.j], c.arm_i, c.length)[pressing]
+    end = begin + reach[:, None] * c.normal[pressing]
+    across = cell.across(begin), cell.across(end)
+    rows = []
+    width = np.minimum(force[pressing], WIDEST) * (2.5 if backend == "bokeh" else 1.5)
+    for moved, seen in cell.images(np.minimum(*across), np.maximum(*across)):
+        given = (begin[seen] + moved, end[seen] + moved, values[pressing][seen], width[seen])
+        rows.append(np.column_stack(given))
+    table = np.concatenate(rows) if rows else np.empty((0, 6))
+    segments = hv.Segments(
+        table, ["x0", "y0", "x1", "y1"], [hv.Dimension("value", label=label), "w"]
+    )
+    wide = {"line_width" if backend == "bokeh" else "linewidth": "w"}
+    return segments.opts(
+        backend=backend, color="value", colorbar=True, clabel=label, **wide, **look
+    )
+
+
+def _held(packing: Packing) -> npt.NDArray[np.bool_]:
+    """(N,) bool: walls and other grains whose balance is left open."""
+    return np.asarray(np.isnan(packing.load).any(axis=1))
+
+
+def _disks(packing: Packing, backend: str) -> list[Any]:
+    disks = np.flatnonzero(~_held(packing))
+    if len(disks) > MOST_DISKS:
+        return []
+    x, r, cell = packing.cell.wrapped(packing.x[disks]), packing.r[disks], packing.cell
+    at, shapes = cell.across(x), []
+    for moved, seen in cell.images(at - r[:, None], at + r[:, None]):
+        shapes += [x[k] + moved + r[k] * _CIRCLE for k in seen]
+    name = "fill_color" if backend == "bokeh" else "facecolor"
+    edge = "line_color" if backend == "bokeh" else "edgecolor"
+    return [hv.Polygons(shapes).opts(backend=backend, **{name: "#eeeeee", edge: "#aaaaaa"})]
+
+
+def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[Any]:
+    """Short lines along what holds grains from outside, at the points of contact."""
+    c, held = packing.contacts.picked(numbers), _held(packing)
+    touched = np.flatnonzero(held[c.j])
+    if not len(touched):
+        return []
+    at, normal = packing.contact_points[numbers[touched]], c.normal[touched]
+    along = np.column_stack([-normal[:, 1], normal[:, 0]]) * packing.r[c.i[touched], None] * 0.7
+    walls = hv.Segments(np.column_stack([at - along, at + along]), label="wall")
+    return [walls.opts(backend=backend, color="#000000")]
+
+
+def _window(packing: Packing) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what is drawn: the cell, or the disks where open."""
+    disks = ~_held(packing)
+    x, r = packing.x[disks], packing.r[disks, None]
+    margin = 0.1 * packing.r[disks].mean()
+    corner, opposite = packing.cell.extent
+    closed = np.isfinite(packing.box)
+    low = np.where(closed, corner, (x - r).min(axis=0) - margin)
+    return low, np.where(closed, opposite, (x + r).max(axis=0) + margin)
