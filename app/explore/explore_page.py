@@ -10,6 +10,7 @@ from bokeh.document import Document
 
 from ..background import gc_pauses
 from ..browser.panel_patches import send_what_waits
+from ..packing.player import Player
 from ..packing.replay.stream import Stream
 from ..packing.view import PackingView
 from ..results.library import Library
@@ -67,14 +68,14 @@ GRID = {
             "alignContent": "stretch",
         },
         "& .header-row": {"gridArea": "header"},
-        "& .controls": {"gridArea": "controls"},
+        "& .controls": {"gridArea": "controls", "minHeight": "68px", "boxSizing": "border-box"},
         "& .side": {
             "gridArea": "side", "containerType": "size", "overflow": "hidden auto",
             "height": "auto", "padding": "0 0 0 24px",
         },
         "& .panels": {
             "gridArea": "panels", "height": "auto", "overflow": "hidden auto",
-            "padding": "0 24px 0 0",
+            "padding": "0 14px 0 0", "marginLeft": "-10px",
         },
         "& .results": {"gridArea": "results", "padding": "4px 24px 8px 0"},
         "& .status": {"gridArea": "status"},
@@ -111,8 +112,7 @@ def explore_page(document: Document, query: str) -> Any:
         whole = framed(None, [side], dark=looks.dark)
     else:
         around = _Around(state, side)
-        hears["tab"] = around.tabs.choose
-        pn.state.onload(partial(work.piecewise, around.parts()))
+        pn.state.onload(partial(work.piecewise, around.parts(packing.player)))
         whole = framed(around.header, around.columns, dark=looks.dark, styles=GRID)
     visit.poll_while_running(work, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
@@ -129,7 +129,6 @@ class _Around:
             door="explore", dark=state.looks.dark, keys=KEYS, css_classes=["header-row"], **WIDE
         )
         self.header.link(state.looks, dark="dark")
-        self.tabs = Tabs(state)
         self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
         self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
         self.panels = pn.Column(css_classes=["panels"], **WIDE)
@@ -139,12 +138,13 @@ class _Around:
             self.controls, side, self.space, self.panels, self.results, self.status
         ]  # fmt: skip
 
-    def parts(self) -> Iterator[None]:
+    def parts(self, player: Player) -> Iterator[None]:
         """Everything that follows the packing, piece by piece."""
-        state, tabs = self.state, self.tabs
-        controls = Controls(state)
+        state, controls = self.state, Controls(self.state)
         self.controls[:] = [controls.line, controls.made]
         yield
+        tabs = Tabs(state)
+        player.hears["tab"] = tabs.choose
         pale_when_old([*tabs.pages.items(), ("results", self.results), ("plane", self.space)])
         self.panels[:] = [tabs.tabs]
         self.results[:] = [Results(state, Volume(state), **WIDE)]

@@ -200,6 +200,16 @@ def linked(widget: Any, looks: Looks, name: str) -> Any:
     return widget
 
 
+# Lines that open what is below them, without the shadows of cards.
+FOLDS = {
+    "&, & .MuiPaper-root": {"background": "transparent", "boxShadow": "none"},
+    "&::before, & .MuiPaper-root::before": {"display": "none"},
+    "& .MuiAccordionSummary-root": {"minHeight": "32px !important", "padding": 0},
+    "& .MuiAccordionSummary-content": {"margin": "4px 0 !important"},
+    "& .MuiAccordionDetails-root": {"padding": "0 0 8px"},
+}
+
+
 def folded_away(*titled: Any) -> Any:
     """Panels (title, panel, …) that are closed until they are opened."""
     pairs = list(zip(titled[::2], titled[1::2], strict=True))
@@ -207,8 +217,8 @@ def folded_away(*titled: Any) -> Any:
         *pairs,
         active=[],
         title_variant="subtitle2",
-        sx={"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}},
-        margin=(8, 10),
+        sx=FOLDS,
+        margin=(2, 10),
         sizing_mode="stretch_width",
     )
 

@@ -26,7 +26,7 @@ TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
     "export": ("Export", export.View),
 }
 LOOK = {
-    "& .MuiTabs-root": {"minHeight": "36px"},
+    "& .MuiTabs-root": {"minHeight": "36px", "margin": "0 10px"},
     "& .MuiTab-root": {
         "minWidth": 0, "minHeight": "36px", "padding": "6px 2px",
         "marginRight": "clamp(8px, 1.2vw, 20px)",
@@ -86,6 +86,7 @@ class Tabs:
             return
         place.visible = wide  # at once: nobody else need begin with it
         if wide:
+            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE)]
             if self.looks.tab == "plane":
                 self.tabs.active = self.names.index("intervals")
             self._begun.add("plane")
@@ -93,7 +94,7 @@ class Tabs:
             yield  # two plots of one name must not be in one message
             view = self._space = TABS["plane"][1](self.state)
             yield
-            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE), view.panel()]
+            place.append(view.panel())
         else:
             self._leave(place)
             self._begun.discard("plane")
