@@ -28,6 +28,7 @@ FROM_BROWSER = {
     "Player": (
         {"tab": int},  # 1, 2, …
         {"wide": bool},
+        {"keep": True},  # all networks of the walk are to be stored
         {"hand": {"anew": True}},  # the page is drawn anew, and shows no pull yet
         {"hand": {"grab": int}},
         {"hand": {"hold": [int, float]}},  # a contact, and its f_n in ⟨f_n⟩

@@ -102,6 +102,7 @@ class Controls:
             sizing_mode="stretch_width",
         )
         self.opens.link(self.made, open="visible")
+        state.looks.keep_open(self.opens, "made")
 
     def _number(self, label: str, start: int, end: float, step: int = 1) -> NumberField:
         def refuse(line: str) -> None:

@@ -31,7 +31,13 @@ class Player {
     this.model = model
     this.scene = new Scene((contact) => { model.contact = contact })
     this.actions = actions(this)
-    this.buttons = new Buttons(this.scene, this.actions, (name, value) => { model[name] = value })
+    this.buttons = new Buttons(this.scene, this.actions, {
+      look: (name, value) => { model[name] = value },
+      open: (name, on) => {
+        const others = model.opened.filter((other) => other !== name)
+        if (model.opened.includes(name) !== on) model.opened = on ? [...others, name] : others
+      },
+    })
     this.plots = new Plots(page, () => this.again(), {
       dots: {
         take: (k, _, value) => this.hand.takeInBars(this.plots.find("bars").get_column("at")[k], value),
@@ -103,7 +109,7 @@ class Player {
     scene.palette = plain(plain(model.palettes).scene)
     this.plots.colours = plain(plain(model.palettes).plots)
     this.select()
-    this.buttons.tellTrack(this.replay)
+    this.tellTrack()
     this.buttons.say("")
     this.tellAsked()
     scene.show(this.replay.walk)
@@ -133,7 +139,7 @@ class Player {
     if (!replay?.walk.numbers) return
     extend(replay.walk, states)
     if (!replay.swinging) replay.follow(null, replay.position)
-    this.buttons.tellTrack(replay)
+    this.tellTrack()
     this.look.measure()
     if (!this.playing) this.paintPlots()
   }
@@ -145,6 +151,8 @@ class Player {
     replay.bounds = bounds
     if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
   }
+
+  tellTrack() { this.buttons.tellTrack(this.replay, this.model.keepable && !this.grows) }
 
   /** Whether more states are to come. */
   get grows() { return this.replay?.walk.room > 0 }
@@ -238,6 +246,7 @@ class Player {
   play(on) {
     const { replay, model } = this
     this.playing = on && replay !== null
+    if (model.paused === this.playing) model.paused = !this.playing
     this.plots.move(this.playing)
     this.buttons.tellPlaying(this.playing)
     if (!replay) return
@@ -256,11 +265,11 @@ class Player {
     requestAnimationFrame((now) => this.tick(now))
   }
 
-  /** The page opens playing, unless a link shows one moment, or nothing is to move. */
+  /** The page opens playing, unless its link says that it rests, or nothing is to move. */
   playFirst() {
     const { model } = this
-    if (STILL.matches || model.frame || model.between || this.pulled || model.contact !== null || this.pushes) return
-    requestAnimationFrame(() => this.play(true))
+    if (STILL.matches || model.paused || model.between || this.pulled || this.pushes) model.paused = true
+    else requestAnimationFrame(() => this.play(true))
   }
 
   /** What rests is a network that has a name: the nearest one, but between two that are compared. */
@@ -289,7 +298,7 @@ class Player {
     if (!this.playing || !this.scene.root.isConnected) return
     const { replay } = this, took = Math.max(0, now - this.before)
     const behind = this.follows ? (replay.last - replay.position) / CATCH_UP : 0
-    const speed = Math.max(this.buttons.speed, behind)
+    const speed = Math.max(this.buttons.bar.speed, behind)
     const steps = (took / 1000) * (replay.swinging ? Math.max(speed / CROSSING, 1 / LONGEST_S) : speed)
     this.before = now
     if (this.resting !== null) {
@@ -356,9 +365,12 @@ class Player {
       legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
       asked: () => this.tellAsked(),
+      opened: () => buttons.tellOpen(model.opened),
+      paused: loaded(() => { if (model.paused === this.playing && this.resting === null) this.play(!model.paused && !STILL.matches) }),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),
+      keepable: loaded(() => this.tellTrack()),
       displacement: () => this.pushed.tellMotion(),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
@@ -379,7 +391,7 @@ class Player {
   retrack(replay) {
     const { frame } = replay
     replay.follow(this.model.between)
-    this.buttons.tellTrack(replay)
+    this.tellTrack()
     this.show(replay.swinging ? 0 : frame)
   }
 }
@@ -412,6 +424,6 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  for (const name of ["opened", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
   return player.buttons.root
 }

@@ -44,6 +44,7 @@ class Player(Scripted, Seen):
     live = param.Boolean(doc="whether something is being computed that can be seen")
     asked = param.String(doc="what was asked for and is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
+    keepable = param.Boolean(doc="whether more networks of the walk could be stored")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")

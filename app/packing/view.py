@@ -19,7 +19,7 @@ from .player import Player, frames
 
 # Both ways.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "overlay")
+SHARED += ("stretch", "overlay", "paused", "opened")
 SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
@@ -128,6 +128,7 @@ class PackingView:
             self._shown = replay
             room = len(progress_feed.numbers(replay.summary)) if state.growing else 0
             changes["walk"] = frames(replay, room)
+        changes["keepable"] = state.keepable
         self.player.param.update(changes)
 
     def _accompany(self, *events: Any) -> None:

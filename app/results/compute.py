@@ -68,6 +68,20 @@ def states(library: Library, selection: Selection) -> Work:
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
 
 
+def all_states(library: Library, cell: Cell) -> Work:
+    """Work that computes all states of a cell of which only some were kept; a Shown."""
+    kind, params = SOURCES[cell.kind], cell.selection.parameters()
+
+    def work(job: Job) -> Shown:
+        found_or_made(library, job, f"all {cell.selection.states} networks", kind, params)
+        whole = library.find(cell.kind, params)
+        if whole is None:
+            raise InputError("these states were removed from the cache; ask for them again")
+        return library.shown(whole)
+
+    return Work(work, wants=((cell.kind, params),))
+
+
 @contextmanager
 def _told_of_friction(selection: Selection) -> Iterator[None]:
     """Where no forces balance, say so of a friction smaller than that of the packing."""

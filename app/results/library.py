@@ -53,6 +53,11 @@ class Cell(NamedTuple):
         return self.selection.mu
 
     @property
+    def kept(self) -> int:
+        """How many of its states are stored."""
+        return int(self.params.get("keep") or self.selection.states)
+
+    @property
     def kind(self) -> str:
         """Kind of the entry: walk or uniform."""
         return self.selection.kind
@@ -113,16 +118,22 @@ class Library:
         return self.cache
 
     def cells(self) -> list[Cell]:
-        """All states of the current algorithms, by series and μ; also kept as `catalogue`."""
-        found: dict[str, Cell] = {}
+        """All states of the current algorithms, by series and μ; also kept as `catalogue`.
+
+        Of the same states those of which most are stored.
+        """
+        found: dict[tuple[str, ...], Cell] = {}
         for store in self.stores:
             for name in store:
                 key = store.path, name
                 if key not in self._known:
                     self._known[key] = self._cell(store, name)
                 cell = self._known[key]
-                if cell is not None and key not in self._damaged:
-                    found.setdefault(name, cell)
+                if cell is None or key in self._damaged:
+                    continue
+                same = cell.series, repr(cell.selection)
+                if same not in found or found[same].kept < cell.kept:
+                    found[same] = cell
         self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
         return self.catalogue
 

@@ -64,10 +64,14 @@ class Selection(NamedTuple):
         )
         return self._replace(mu=mu, packing=made)
 
+    @property
+    def kept(self) -> int:
+        """How many of the states are stored."""
+        return min(self.states, int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400))))
+
     def parameters(self) -> Parameters:
         """Parameters of the walk or sample, as its kind names it."""
-        most = int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400)))
-        common = {"mu": self.mu, "keep": None if self.states <= most else most}
+        common = {"mu": self.mu, "keep": None if self.states == self.kept else self.kept}
         if self.kind == "uniform":
             return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
         return kinds.WALK.parameters(

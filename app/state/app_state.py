@@ -12,6 +12,7 @@ from granforce.records import InputError
 
 from ..background.jobs import Job, Visitor, as_one
 from ..background.limits import LIMITS
+from ..results import compute
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from ..results.progress_feed import Arriving, Following, numbers
 from ..results.replays import Replay
@@ -19,7 +20,7 @@ from ..results.selection import Selection, brief, command, link, read_link
 from . import known, perturbations
 from .comparison import Beside
 from .known import Knowledge
-from .links import OF_A_REPLAY, UNSEEN, VIEW, Numbers, View, fitting, read_view, spelled
+from .links import OF_A_REPLAY, UNSEEN, VIEW, Numbered, Numbers, View, fitting, read_view, spelled
 from .page_tasks import Work
 from .pulls import Hand
 from .view_settings import Looks
@@ -27,7 +28,7 @@ from .view_settings import Looks
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 # What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see: nobody
 # goes back to the frame before, to the view of a moment ago, or to the other theme.
-PASSING = ("frame", "zoom", "dark")
+PASSING = ("frame", "paused", "opened", "zoom", "dark")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -306,6 +307,32 @@ class AppState(param.Parameterized):
         self.refresh(shown)
         if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
             self.compute_exact()
+
+    @property
+    def keepable(self) -> bool:
+        """Whether more networks of the walk on screen could be stored than are."""
+        return self.cell is not None and self.cell.kept < self.cell.selection.kept
+
+    def keep_all(self) -> None:
+        """Compute the networks of the walk on screen that were not stored; the view stays."""
+        cell = self.cell
+        if not self.keepable or self.missing or self.work.computation.running:
+            return
+        self.work.message = ""
+
+        def done(shown: Shown) -> None:
+            self._list(self.library.cells())
+            if self.cell == cell:
+                self._show(shown, self._by_numbers())
+
+        self.work.computation.start(compute.all_states(self.library, cell), done)
+
+    def _by_numbers(self) -> View:
+        """The view on screen, to be seen of other states of the same walk."""
+        assert self.numbers is not None  # a Replay is on screen
+        view = {name: value for name, value in self.view.items() if value is not None}
+        here = self.numbers.of(view)
+        return self.view | {name: Numbered(here[name]) for name in OF_A_REPLAY if name in here}
 
     def _bring_back(self, event: Any) -> None:
         """What was on screen before something else was asked for, which is wanted no more."""

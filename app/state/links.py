@@ -39,6 +39,8 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "tab": _tab,
     "contact": int,
     "pair": _pair,
+    "paused": _flag,
+    "opened": lambda text: text.split("."),
     "frame": int,
     "reference": int,
     "between": _pair,
@@ -62,6 +64,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "dark": _flag,
 }
 SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": pulls.spelled, "known": known.spelled}
+SPELLED["opened"] = ".".join
 SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
 # What belongs to the states on screen, as it is where others come.
 UNSEEN: View = {"contact": None, "pair": None, "frame": 0, "reference": 0, "between": None}
@@ -77,9 +80,9 @@ class Numbered(NamedTuple):
     value: Any
 
 
-# What a link calls the parameters of UNSEEN, where contacts have their numbers in the packing and
-# networks their numbers in the walk. Under the parameters' own names, as in older links, they are
-# positions in the arrays of a Replay.
+# What a link calls parameters. Those of UNSEEN have contacts by their numbers in the packing and
+# networks by their numbers in the walk; under the parameters' own names, as in older links, they
+# are positions in the arrays of a Replay.
 KEYS = {
     "contact": "select",
     "pair": "span",
@@ -88,6 +91,7 @@ KEYS = {
     "frame": "network",
     "reference": "pinned",
     "between": "swing",
+    "opened": "open",
 }
 # value, contact, network → the value with each contact and each network translated.
 TRANSLATED: dict[str, Callable[[Any, Number, Number], Any]] = {
@@ -164,13 +168,15 @@ def read_view(given: Mapping[str, str], parameters: Any) -> View:
     """
     view: View = {}
     for name, cast in VIEW.items():
-        numbers = key(name) in given and name in KEYS
+        numbers = key(name) in given and name in TRANSLATED
         try:
-            value = cast(given[key(name) if numbers else name])
+            value = cast(given[key(name) if key(name) in given else name])
             parameters[name]._validate(value)
         except (KeyError, ValueError):
             continue
         view[name] = Numbered(value) if numbers else value
+    if "frame" in given and "frame" in view:
+        view.setdefault("paused", True)  # as older links to one network meant it
     return view
 
 

@@ -73,6 +73,8 @@ class Seen(param.Parameterized):
     wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
     views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
+    paused = param.Boolean(doc="whether the player rests")
+    opened = param.List(default=[], item_type=str, doc="names of the panels that are open")
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
@@ -117,6 +119,21 @@ class Looks(Seen):
     axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
+
+    def keep_open(self, panel: Any, name: str) -> None:
+        """Keep the parameter `open` of a panel and `opened` alike."""
+
+        def follow(*events: Any) -> None:
+            panel.open = name in self.opened
+
+        def tell(event: Any) -> None:
+            others = [other for other in self.opened if other != name]
+            if event.new != (name in self.opened):
+                self.opened = [*others, name] if event.new else others
+
+        self.param.watch(follow, "opened")
+        panel.param.watch(tell, "open")
+        follow()
 
     def shows(self, name: str) -> bool:
         """Whether what has this tab is on screen."""

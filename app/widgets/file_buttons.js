@@ -69,7 +69,7 @@ export function render({ model, view }) {
       context.fillStyle = caption.ink
       context.font = "15px Helvetica, Arial, sans-serif"
       context.textAlign = "right"
-      context.fillText(`network ${it.replay.place}`, WHERE[0], SIDE + WHERE[1])
+      context.fillText(it.replay.title, WHERE[0], SIDE + WHERE[1])
       if (button) button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
       const swung = it.replay.swinging && it.direction > 0 && it.turned
       if (it.replay.swinging && it.direction < 0) it.turned = true

@@ -189,7 +189,7 @@ def page(lasting):
         shows(page, 0.1)
     if page.locator("button.between.on").count():
         page.locator("button.between").click()
-    page.locator("button.restart").click()
+    page.keyboard.press("Home")
     more(page).locator("button.pin").click()
     scene(page, "scene.reset()")
     page.mouse.move(5, 5)

@@ -168,6 +168,13 @@ def ask(page, mu):
     typed.press("Enter")
 
 
+def zoomed(page, by):
+    """Turn the wheel, with the key that has it zoom."""
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, by)
+    page.keyboard.up("Control")
+
+
 def searched(page, *parts):
     """Wait until the address has all these parts after its "?"."""
     page.wait_for_function("parts => parts.every((s) => location.search.includes(s))", arg=parts)

@@ -320,6 +320,28 @@ def test_older_links_name_contacts_and_networks_by_their_places(visited):
     assert state.hand.pulls == [(4, 0.5)]
 
 
+def test_all_networks_of_a_walk_can_be_kept_and_the_view_stays(state):
+    """A store holds some of them; the others are computed, and take no second place in η(μ)."""
+    before, number, cells = state.replay.normal[5], state.replay.number, len(state.cells())
+    state.looks.param.update(frame=5, contact=9, reference=2)
+    assert state.keepable and len(number) == KEPT + 1
+    state.keep_all()
+    wait_for(state)
+    looks, replay = state.looks, state.replay
+    assert list(replay.number) == list(range(STATES + 1)) and not state.keepable
+    assert (looks.frame, looks.contact, looks.reference) == (number[5], 9, number[2])
+    np.testing.assert_allclose(replay.normal[looks.frame], before, atol=1e-6)
+    assert len(state.cells()) == cells and state.work.message == ""
+
+
+def test_a_link_reopens_a_view_that_rests_with_its_panels(state, visited):
+    state.looks.param.update(paused=True, opened=["made", "check"], frame=4, sort="extent")
+    again = visited(state.link())
+    assert again.view == state.view and again.looks.paused
+    assert visited("mu=0.1&n=30&states=30&relax=nearest&frame=4").looks.paused  # as it was meant
+    assert not visited("mu=0.1&n=30&states=30&relax=nearest").looks.paused
+
+
 def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
     query = "mu=0.1&n=30&states=30&relax=nearest"
     numbers = visited(query).replay.number

@@ -12,6 +12,60 @@ def test_every_script_is_a_module_by_itself(run):
     assert len(run("".join(names), "(all) => Object.keys(all)")) > len(names) / 2
 
 
+def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
+    """Of 60 networks three are stored: what passes in a second counts the others, too."""
+    walk = WALK | {"states": 60, "number": [0, 1, 21, 41]}
+    words, kept, reached, refused = run(
+        "packing/replay/replay packing/player_bar",
+        """({ Replay, PlayerBar }, { walk }) => {
+            const said = [], replay = new Replay(walk, null)
+            const scrub = (to) => { replay.go(to); bar.show(replay) }
+            const bar = new PlayerBar({ scrub }, (line) => said.push(line))
+            const text = () => bar.root.textContent, type = (number) => {
+                bar.number.value = number
+                bar.number.dispatchEvent(new Event("change"))
+                return [bar.number.value, replay.frame, said.pop() ?? ""]
+            }
+            bar.showTrack(replay, true)
+            const words = text(), kept = !bar.keep.hidden
+            const reached = [type("41"), type("12"), type("0")]
+            const refused = [type("61"), type("four")]
+            bar.showTrack(replay, false)
+            return [words, [kept, !bar.keep.hidden], reached, refused]
+        }""",
+        walk=walk,
+    )
+    assert "every 20th of 60 is stored" in words and "20 networks/s" in words
+    assert kept == [True, False]
+    assert reached[0] == ["41", 3, ""] and reached[2] == ["0", 0, ""]
+    assert reached[1] == ["21", 2, "Network 12 is not stored; 21 is the nearest that is."]
+    assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
+
+
+@pytest.mark.parametrize("keys", [{}, {"ctrlKey": True}, {"metaKey": True}])
+def test_the_wheel_zooms_with_a_key_or_after_a_click_only(run, keys):
+    zoomed = run(
+        "packing/hand/pointing",
+        """({ listen }, keys) => {
+            const root = document.body.appendChild(document.createElement("div")), done = []
+            root.tabIndex = 0
+            listen({ root, zoom: (by) => done.push(by), place: () => [0, 0] })
+            const wheel = () => {
+                const event = new WheelEvent("wheel", { deltaY: -100, cancelable: true, ...keys })
+                root.dispatchEvent(event)
+                return event.defaultPrevented
+            }
+            const before = wheel()
+            root.focus()
+            const after = wheel()
+            root.remove()
+            return [before, after, done.length]
+        }""",
+        **keys,
+    )
+    assert zoomed == [bool(keys), True, 1 + bool(keys)]
+
+
 @pytest.mark.parametrize("cancelled", [False, True])
 def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
     """It was sent before and is painted a frame later, when the old packing is back."""

@@ -19,6 +19,7 @@ from serving import (
     searched,
     serve,
     until,
+    zoomed,
 )
 from small_store import DISKS, KEPT
 
@@ -269,7 +270,7 @@ def test_everything_can_be_taken_along(visit, tmp_path):
 def test_the_picture_is_that_of_the_screen_whole_and_to_scale(visit, tmp_path, look):
     page = visit(f"?tab=export&frame=5{look}")
     page.locator(".scene").hover()
-    page.mouse.wheel(0, -400)  # what is in view makes no difference
+    zoomed(page, -400)  # what is in view makes no difference
     button = page.get_by_role("button", name="SVG", exact=True)
     whole = ElementTree.fromstring(download(page, button.click, tmp_path).read_text())
     told = " ".join(whole.itertext())

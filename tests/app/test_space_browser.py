@@ -15,6 +15,7 @@ from serving import (
     searched,
     shows,
     until,
+    zoomed,
 )
 from test_live_browser import normal, pulled
 
@@ -202,7 +203,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     assert np.all(np.diff(normals[1][shown]) >= -1e-6)
     # the view is one, and the player moves only the network that is not pinned
     page.mouse.move(boxes[0]["x"] + 50, boxes[0]["y"] + 50)
-    page.mouse.wheel(0, -200)
+    zoomed(page, -200)
     until(page, "scene.view.half < 0.49 * (scene.geometry.window[1] - scene.geometry.window[0])")
     assert scene(page, "scene.view === scene.hand.player.split.twin.view")
     page.locator("button.step").click()
@@ -249,7 +250,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
         # what fills one picture fills the other, and so does a part of it
         box = at.locator(".twin").bounding_box()
         at.mouse.move(box["x"] + 60, box["y"] + 60)
-        at.mouse.wheel(0, -300)
+        zoomed(at, -300)
         part = "{0}.view.half / ({0}.geometry.window[1] - {0}.geometry.window[0])"
         until(at, f"{part.format('scene')} < 0.45")
         assert scene(at, part.format(twin)) == pytest.approx(scene(at, part.format("scene")))

@@ -41,8 +41,8 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     alone.goto(path.as_uri())
     painted(alone)
     assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
-    assert alone.locator("b.state").inner_text() != "as packed"  # the state that was on screen
-    alone.locator("button.restart").click()
+    assert alone.locator(".state").inner_text() == "of 30"  # the state that was on screen
+    alone.keyboard.press("Home")
     before = column(alone, "bars", "now"), column(alone, "here", "x")
     alone.locator("button.step").click()
     after = column(alone, "bars", "now"), column(alone, "here", "x")

@@ -13,6 +13,7 @@ const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
 const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
+const ZOOM_HINT = "Ctrl + wheel zooms; after a click here the wheel alone does."
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
@@ -336,6 +337,12 @@ export class Scene {
   }
 
   // Pointer
+
+  /** Say for a while how the wheel zooms. */
+  hintAtZoom() {
+    const hint = this.root.appendChild(made("div", { className: "hint", textContent: ZOOM_HINT, role: "status" }))
+    hint.addEventListener("animationend", () => hint.remove())
+  }
 
   /** Segment under a point of the layout, or −1; reach: px from a chain that still mean it. */
   linkAt(px, py, reach = GRAB) {

@@ -56,7 +56,7 @@ export class Split {
     const { captions, player, other } = this, { live, replay: { walk } } = player
     const frame = this.pinned, of = ({ mu }) => `μ = ${Number(mu.toPrecision(4))}`
     if (other) {
-      captions[0].textContent = `${of(other.walk)}: ${other.place}`
+      captions[0].textContent = `${of(other.walk)}: ${other.title}`
       captions[1].textContent = live.moves ? "being compressed" : of(walk)
     } else {
       captions[0].textContent = frame ? `pinned: network ${walk.number[frame]}` : "pinned: as packed"

@@ -8,10 +8,13 @@ export function listen(scene) {
   root.addEventListener("touchstart", (event) => {
     if (event.touches.length === 1 && scene.takenAt(event.touches[0], true) !== null) event.preventDefault()
   }, { passive: false })
+  // Without a key or a click the wheel scrolls the page, which would stop over the packing else.
   root.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.metaKey && !root.matches(":focus-within")) return
     event.preventDefault()
     scene.zoom(Math.exp(event.deltaY * 0.0015), ...scene.place(event))
   }, { passive: false })
+  root.addEventListener("pointerenter", ({ pointerType }) => { if (pointerType === "mouse") scene.hintAtZoom() }, { once: true })
   root.addEventListener("dblclick", () => scene.reset())
   root.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return

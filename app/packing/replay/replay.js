@@ -50,6 +50,18 @@ export class Replay {
     return last < 1 ? [track[0], track[0], 0] : [track[k], track[k + 1], position - k]
   }
 
+  /** Of the walk's networks every so many are here. */
+  get stride() {
+    const { walk } = this, count = walk.room ? walk.room - 1 : walk.number.length - 1
+    return Math.max(1, Math.round(walk.states / Math.max(1, count)))
+  }
+
+  /** The position on the track of all networks of the one with this number, or of the nearest. */
+  positionOf(number) {
+    const away = Array.from(this.walk.number, (other) => Math.abs(other - number))
+    return away.indexOf(Math.min(...away))
+  }
+
   go(to) {
     this.position = Math.max(0, Math.min(this.last, to))
     if (!this.swinging) this.passed(this.frame)
@@ -116,12 +128,15 @@ export class Replay {
     return this.walk.residual[portion > 0.5 ? b : a]
   }
 
-  /** Where the position is, in words. */
+  /** Where the position is, in words that follow the number of the network. */
   get place() {
-    if (this.held) return this.held.place ?? "pulled"
     const { walk, frame } = this, [a, b, portion] = this.spot
     const name = (k) => (k ? `network ${walk.number[k]}` : "that as packed")
+    if (this.held) return `of ${walk.states}, ${this.held.place ?? "pulled"}`
     if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
-    return frame ? `${walk.number[frame]} of ${walk.states}` : "as packed"
+    return frame ? `of ${walk.states}` : `of ${walk.states}, as packed`
   }
+
+  /** The number of the network, and where it is. */
+  get title() { return this.swinging ? this.place : `network ${this.walk.number[this.frame]} ${this.place}` }
 }

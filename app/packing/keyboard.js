@@ -1,0 +1,65 @@
+// The keys of the player, which mean it wherever the focus is, unless the element there needs them itself.
+
+const HELD = { "[": "less", "]": "more", z: "undo", Z: "undo", Escape: "free", h: "hold", H: "hold" }
+const KEYS = {
+  ArrowRight: "step", ArrowLeft: "back", Home: "restart", End: "end", n: "next", N: "previous",
+}
+
+export class Keyboard {
+  /** Call actions by their names while the element `root` is on the page. */
+  constructor(root, actions) {
+    this.root = root
+    this.actions = actions
+    // Before the widget that has the focus: what was clicked keeps it, but Space and arrows then mean
+    // the player again. Who goes by Tab means the widget.
+    this.tabbed = false
+    this.onKey = (event) => this.press(event)
+    this.onPointer = () => { this.tabbed = false }
+    window.addEventListener("keydown", this.onKey, true)
+    window.addEventListener("pointerdown", this.onPointer, true)
+  }
+
+  remove() {
+    window.removeEventListener("keydown", this.onKey, true)
+    window.removeEventListener("pointerdown", this.onPointer, true)
+  }
+
+  press(event) {
+    if (!this.root.isConnected) return this.remove()
+    if (event.key === "Tab") this.tabbed = true
+    const at = event.composedPath()[0]
+    if (typing(at) || event.ctrlKey || event.metaKey || event.altKey) return
+    const own = { space: usesSpace(at, this.tabbed), arrows: usesArrows(at, this.tabbed) }
+    const name = KEYS[event.key]
+    if (event.key === " " && !own.space) this.actions.play()
+    else if (name && !own.arrows) this.actions[name]()
+    else if (HELD[event.key]) return this.actions[HELD[event.key]]()
+    else if (/^[1-9]$/.test(event.key)) this.actions.tab(Number(event.key))
+    else return
+    event.preventDefault()
+    event.stopPropagation()
+  }
+}
+
+// Which keys the element with the focus needs for itself
+
+function typing(at) {
+  return at.isContentEditable || /^(TEXTAREA|SELECT)$/.test(at.tagName) ||
+    (at.tagName === "INPUT" && !["range", "checkbox", "radio", "button"].includes(at.type))
+}
+
+const chosen = (at) => at.ariaSelected === "true" || at.ariaPressed === "true"
+const inMenu = (at) => ["option", "menuitem", "listbox", "menu"].includes(at.role)
+
+/** A tab or one of several that is chosen already has no use for it. */
+function usesSpace(at, tabbed) {
+  if (inMenu(at)) return true
+  const pressed = at.tagName === "BUTTON" || at.tagName === "A" || at.type === "checkbox" ||
+    ["combobox", "tab", "button", "switch"].includes(at.role)
+  return pressed && tabbed && !chosen(at)
+}
+
+function usesArrows(at, tabbed) {
+  if (inMenu(at) || at.type === "range") return true
+  return tabbed && ["tab", "combobox", "radio"].includes(at.role)
+}

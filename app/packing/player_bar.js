@@ -1,0 +1,106 @@
+// The bar of the player: steps, play, the slider and the number of the network, and how many there are.
+
+import { button, made } from "../browser/dom.js"
+
+const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
+const OUTSIDE = (last) => `Networks have the numbers 1 to ${last}; 0 is the network as packed.`
+const NEAREST = (asked, found) => `Network ${asked} is not stored; ${found} is the nearest that is.`
+
+const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
+
+function iconButton(name, title, act) {
+  const it = button("", act, { className: name, title })
+  it.innerHTML = icon(name)
+  it.setAttribute("aria-label", title)
+  return it
+}
+
+export class PlayerBar {
+  /**
+   * actions: back(), play(), step(), scrub(position), and keep(): have all networks stored.
+   * say(words): show a line.
+   */
+  constructor(actions, say) {
+    this.actions = actions
+    this.say = say
+    this.scrub = made("input", { className: "scrub", type: "range", min: 0, value: 0, step: 1, ariaLabel: "network" })
+    this.number = made("input", { className: "number", inputMode: "numeric", autocomplete: "off", ariaLabel: "number of the network" })
+    this.place = made("span", { className: "state" })
+    this.speedInput = made("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
+    this.rate = made("span", { className: "rate" })
+    this.stored = made("span", { className: "stored" })
+    this.keep = button("Keep all", () => actions.keep(), { className: "keep", title: "compute and store every network" })
+    this.playButton = iconButton("play", "space", () => actions.play())
+    const along = made("label", { className: "at" }), speed = made("label", { title: "how many networks pass in a second" })
+    const more = made("span", { className: "more" })
+    along.append("network ", this.number)
+    speed.append(this.speedInput, this.rate)
+    more.append(speed, this.stored, this.keep)
+    this.root = made("div", { className: "bar" })
+    this.root.append(
+      iconButton("back", "one network back (←)", () => actions.back()), this.playButton,
+      iconButton("step", "one network on (→)", () => actions.step()), this.scrub, along, this.place, more,
+    )
+    this.scrub.addEventListener("input", () => actions.scrub(Number(this.scrub.value)))
+    this.number.addEventListener("change", () => this.go())
+    this.number.addEventListener("keydown", (event) => { if (event.key === "Enter") this.number.blur() })
+    this.speedInput.addEventListener("input", () => this.showRate())
+    this.showPlaying(false)
+  }
+
+  /** Rows of the track per second. */
+  get speed() { return 2 ** Number(this.speedInput.value) }
+
+  /** Go to the network whose number was typed, or to the nearest that is stored. */
+  go() {
+    const asked = Number(this.number.value), { replay } = this
+    if (!replay) return
+    const { walk } = replay
+    if (this.number.value.trim() === "" || !Number.isInteger(asked) || asked < 0 || asked > walk.states) {
+      this.number.value = walk.number[replay.frame]
+      return this.say(OUTSIDE(walk.states))
+    }
+    const position = replay.positionOf(asked), found = walk.number[position]
+    this.actions.scrub(position)
+    this.number.value = found
+    if (found !== asked) this.say(NEAREST(asked, found))
+  }
+
+  showPlaying(playing) {
+    const word = playing ? "pause" : "play"
+    this.playButton.innerHTML = `${icon(word)} ${playing ? "Pause" : "Play"}`
+    this.playButton.setAttribute("aria-label", word)
+  }
+
+  /** How many networks pass in a second: of those that are not stored, too. */
+  showRate() {
+    const rate = this.speed * (this.replay?.stride ?? 1)
+    const shown = rate < 10 ? Number(rate.toFixed(1)) : Math.round(rate)
+    this.rate.textContent = this.replay?.swinging ? "" : `${shown} network${shown === 1 ? "" : "s"}/s`
+  }
+
+  /** Another track: its length, and whether the networks that are left out can be had. */
+  showTrack(replay, keepable) {
+    this.replay = replay
+    const { last, swinging, stride, walk } = replay
+    this.scrub.max = last
+    this.scrub.step = swinging ? 0.01 : 1
+    this.root.classList.toggle("swings", swinging)
+    this.stored.textContent = stride > 1 ? `every ${ordinal(stride)} of ${walk.states} is stored` : ""
+    this.keep.hidden = !(stride > 1 && keepable)
+    this.showRate()
+  }
+
+  /** Where the replay is. */
+  show(replay) {
+    this.scrub.value = replay.position
+    this.place.textContent = replay.place
+    if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
+  }
+}
+
+/** 2 → "2nd". */
+function ordinal(count) {
+  const ending = Math.floor(count / 10) % 10 === 1 ? "th" : ["th", "st", "nd", "rd"][count % 10] ?? "th"
+  return `${count}${ending}`
+}
