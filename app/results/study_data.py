@@ -34,14 +34,14 @@ ABOUT = {
 _reading = threading.Lock()
 
 
-def study() -> tables.Table | None:
-    """The reduced study (granforce.paper.tables.Table), or None where it was not brought along."""
+def study() -> tables.StudyTable | None:
+    """The reduced study, or None where it was not brought along."""
     with _reading:
         return _study()
 
 
 @cache
-def _study() -> tables.Table | None:
+def _study() -> tables.StudyTable | None:
     try:
         return tables.load(DATA / "study.zarr")
     except InputError:

@@ -168,7 +168,7 @@ def _all_rows(made: Any, part: float) -> Any:
     rows = room_for_rows(made.count, part)
     if rows.whole:
         for first in range(0, len(made.moving), LANES):
-            make_rows(made.rows, rows.kept, range(first, min(first + LANES, len(made.moving))))
+            make_rows(made.rows, rows.cache, range(first, min(first + LANES, len(made.moving))))
     return rows
 
 

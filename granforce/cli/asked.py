@@ -118,7 +118,7 @@ def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[P
         return kinds.get_packing(store, parameters, progress=progress, watch=watch, **options)
 
 
-class Found(NamedTuple):
+class StoredResult(NamedTuple):
     """What a command reports: a result that is kept."""
 
     entry: str  # its name in the store
@@ -134,7 +134,7 @@ def found(
     watching: Any = None,
     options: Any = None,
     **named: Any,
-) -> Found:
+) -> StoredResult:
     """The result of a kind, computed or found; outputs: files that will be written.
 
     named: its parameters beside the packing and the friction of the cones. watching(bar): what the
@@ -151,7 +151,7 @@ def found(
         told |= {} if watching is None else {"watch": watching(progress)}
         dataset, cached = study.get(store, kind, parameters, **told)
     ends = {"seconds": dataset["seconds"].item(), "cached": cached}
-    return Found(study.entry_name(store, kind, parameters), parameters, dataset, ends)
+    return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, ends)
 
 
 def telling_eta(bar: Any) -> Callable[[Any], None]:
@@ -231,7 +231,7 @@ def extents(dataset: xr.Dataset) -> dict[str, float]:
     }
 
 
-def walked(arguments: argparse.Namespace, output: str | None = None) -> Found:
+def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
     """The walk that the options ask for; output: a file that will be written."""
     return found(
         *(arguments, kinds.WALK, output),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TypeAlias
 
-from granforce.cli.parsing import Input, Kept, Output, Parser
+from granforce.cli.parsing import Input, Output, Parser, StorePath
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 # Commands whose names are taken in Python, or by a room: their functions end in an underscore.
@@ -124,7 +124,7 @@ def add_wall_contacts(command: Parser) -> None:
 def add_store(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--cache",
-        type=Kept,
+        type=StorePath,
         metavar="FOLDER",
         help="store of results (default: $GRANFORCE_CACHE, else the user's cache folder)",
     )

@@ -12,7 +12,7 @@ from typing import NoReturn
 from granforce import __version__
 from granforce.cli import words
 from granforce.cli.options import EXAMPLE
-from granforce.cli.parsing import Input, Kept, Output, Parser, Workplace, refused
+from granforce.cli.parsing import Input, Output, Parser, StorePath, Workplace, refused
 from granforce.system import interrupts, streams
 
 # Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
@@ -100,12 +100,12 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
     from granforce.system.files import check_apart
 
     named = list(command.paths(arguments))
-    if "cache" in command.options and not any(isinstance(path, Kept) for _, path in named):
-        named.append(("the store", Kept(default_path())))
+    if "cache" in command.options and not any(isinstance(path, StorePath) for _, path in named):
+        named.append(("the store", StorePath(default_path())))
     check_apart(
         replaced=[(typed, path) for typed, path in named if isinstance(path, Output)],
         folders=[(typed, path) for typed, path in named if isinstance(path, Workplace)],
-        stores=[(typed, path) for typed, path in named if isinstance(path, Kept)],
+        stores=[(typed, path) for typed, path in named if isinstance(path, StorePath)],
         read=[(typed, path) for typed, path in named if isinstance(path, Input)],
     )
 

@@ -25,7 +25,7 @@ class Workplace(str):
     """A folder in which a command writes files of its own, beside others."""
 
 
-class Kept(str):
+class StorePath(str):
     """A store of results, which a command reads and adds to."""
 
 
@@ -37,7 +37,7 @@ class Edited(str):
         return [Output(name) for name in self.split(",") if name]
 
 
-ROLES = (Input, Output, Workplace, Kept, Edited)
+ROLES = (Input, Output, Workplace, StorePath, Edited)
 
 
 class Unused(NamedTuple):

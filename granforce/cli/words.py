@@ -25,7 +25,7 @@ from granforce.cli.options import (
     import_format,
     subcommand,
 )
-from granforce.cli.parsing import Edited, Input, Kept, Output, Workplace
+from granforce.cli.parsing import Edited, Input, Output, StorePath, Workplace
 
 
 def add_pack(commands: Commands) -> None:
@@ -209,7 +209,7 @@ def add_scan(commands: Commands) -> None:
     command.add_argument("--seeds", type=int, default=1, help="packings per μ: seeds 1 … SEEDS")
     add_packing(command, several=True)
     add_walk_options(command)
-    command.add_argument("--out", type=Kept, metavar="STORE", help="store for the results")
+    command.add_argument("--out", type=StorePath, metavar="STORE", help="store for the results")
     add_store(command)
     command.add_argument("--keep", type=int, help="store only so many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")

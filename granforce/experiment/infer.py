@@ -220,7 +220,7 @@ def _draws(
 def step(
     made: Walls,
     ends: Sequence[uniform.ChainState],
-    rows: billiard.Rows | None = None,
+    rows: billiard.RowStore | None = None,
     *,
     count: int,
 ) -> uniform.Flown:

@@ -38,7 +38,7 @@ _NEARLY_ALL, _FEW = 0.9, 20
 _NEAR = 0.75
 
 
-class Outline(NamedTuple):
+class WallOutline(NamedTuple):
     """Walls about a frame."""
 
     shape: str  # box: x0, x1, y0, y1; annulus: centre x, y, inner and outer radius; circle: x, y, R
@@ -84,11 +84,11 @@ class WallContacts(NamedTuple):
     forces: Floats  # (w, 2) f_n, f_t as measured; NaN where they were not
     factor: Floats  # (w,) of the variance
     names: tuple[str, ...]  # of the walls
-    outline: Outline | None
+    outline: WallOutline | None
 
 
-def read_outline(text: str) -> str | Outline:
-    """'open', 'box', 'annulus', 'circle' or 'auto' (found from the grains), or an Outline.
+def read_outline(text: str) -> str | WallOutline:
+    """'open', 'box', 'annulus', 'circle' or 'auto' (found from the grains), or an WallOutline.
 
     With its numbers, such as box:0,100,0,80 or annulus:500,500,200,450. auto: the shape that fits
     best. Raises InputError.
@@ -101,7 +101,7 @@ def read_outline(text: str) -> str | Outline:
     return _outline(shape, numbers) if numbers else shape
 
 
-def _outline(shape: str, numbers: str) -> Outline:
+def _outline(shape: str, numbers: str) -> WallOutline:
     try:
         values = tuple(float(part) for part in numbers.split(","))
     except ValueError:
@@ -114,7 +114,7 @@ def _outline(shape: str, numbers: str) -> Outline:
         raise InputError("walls annulus: x,y,inner,outer: the inner radius must be the smaller")
     if shape == "circle" and not values[2] > 0:
         raise InputError("walls circle: x,y,R: the radius must be above 0")
-    return Outline(shape, values)
+    return WallOutline(shape, values)
 
 
 def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
@@ -131,7 +131,7 @@ def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def flagged(
-    listing: Listing, flag: str | None, walls: str | Outline | None
+    listing: Listing, flag: str | None, walls: str | WallOutline | None
 ) -> tuple[Floats, str | None]:
     """(N,) what tells grains at walls: not 0, below 0 at an inner wall; and a note, if it is due.
 
@@ -151,7 +151,7 @@ def flagged(
         return given, None
     found: Floats = (
         _nearest_side(listing, walls)
-        if isinstance(walls, Outline)
+        if isinstance(walls, WallOutline)
         else (boundary(listing.x, listing.r).astype(np.float64))
     )
     if flag == "ignore" or not given.any():
@@ -164,7 +164,7 @@ def flagged(
     )
 
 
-def _nearest_side(listing: Listing, outline: Outline) -> Floats:
+def _nearest_side(listing: Listing, outline: WallOutline) -> Floats:
     gap = outline.gaps(listing.x, listing.r)[0]
     at = gap.min(axis=1) <= _AT_SIDE * listing.r.mean()
     inner = outline.names[0] == "inner"
@@ -172,7 +172,12 @@ def _nearest_side(listing: Listing, outline: Outline) -> Floats:
 
 
 def wall_contacts(
-    listing: Listing, x: Floats, r: Floats, at_wall: Mask, walls: str | Outline | None, reach: float
+    listing: Listing,
+    x: Floats,
+    r: Floats,
+    at_wall: Mask,
+    walls: str | WallOutline | None,
+    reach: float,
 ) -> WallContacts | None:
     """The WallContacts of a frame, or None where its walls stay open.
 
@@ -202,7 +207,9 @@ def wall_contacts(
             names=names,
             outline=None,
         )
-    outline = walls if isinstance(walls, Outline) else fitted(walls, x, r, at_wall, listing.flag)
+    outline = (
+        walls if isinstance(walls, WallOutline) else fitted(walls, x, r, at_wall, listing.flag)
+    )
     gap, ways = outline.gaps(x, r)
     touching = at_wall[:, None] & (gap <= reach * r.mean())
     touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
@@ -230,8 +237,8 @@ def _occurrence(grain: Integers) -> Integers:
     return which
 
 
-def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
-    """The Outline of a shape that the grains at walls touch; "auto": of the one that fits best."""
+def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> WallOutline:
+    """Walls of a shape that the grains at walls touch; "auto": of the one that fits best."""
     if shape == "auto":
         return _best_fitted(x, r, at_wall, flag)
     if at_wall.sum() < 4:
@@ -246,7 +253,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Out
             low, high = x[:, axis] - r, x[:, axis] + r
             numbers.append(np.median(low[low < low.min() + _AT_SIDE * r.mean()]))
             numbers.append(np.median(high[high > high.max() - _AT_SIDE * r.mean()]))
-        return Outline("box", tuple(map(float, numbers)))
+        return WallOutline("box", tuple(map(float, numbers)))
     inner = flag < 0
     if shape == "annulus" and inner.sum() < 3:
         raise InputError(
@@ -267,7 +274,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Out
     return _outline(shape, ",".join(repr(float(value)) for value in cut))
 
 
-def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
+def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> WallOutline:
     inner = np.any(flag[at_wall] < 0)
     some = [fitted(one, x, r, at_wall, flag) for one in ("box", "annulus" if inner else "circle")]
     off = [_misfit(outline, x, r, at_wall) for outline in some]
@@ -280,13 +287,13 @@ def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
     return some[best]
 
 
-def _misfit(outline: Outline, x: Floats, r: Floats, at_wall: Mask) -> float:
+def _misfit(outline: WallOutline, x: Floats, r: Floats, at_wall: Mask) -> float:
     """Mean distance of grains at walls from the nearest side, in mean radii."""
     gap = outline.gaps(x[at_wall], r[at_wall])[0]
     return float(np.abs(gap).min(axis=1).mean() / r.mean())
 
 
-def bad_fit(outline: Outline, x: Floats, r: Floats, at_wall: Mask) -> str | None:
+def bad_fit(outline: WallOutline, x: Floats, r: Floats, at_wall: Mask) -> str | None:
     """A note if the grains at walls lie far from the outline, or if there are none."""
     if not at_wall.any():
         return f"walls {outline.shape}: no grain lies at these walls; check the numbers"

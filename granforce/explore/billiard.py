@@ -2,8 +2,8 @@
 
 A path is told by the slacks s of all walls and the speeds w at which they change. At a wall that is
 met, its own speed is turned: w ← w − 2 w_k/K_kk · (row k of K). So a turn costs one pass over the
-walls, and a row of K. Where that is not among those that are kept (`Rows`), a path stops where it
-is until it is made, and goes on, bit for bit as if it had been there.
+walls, and a row of K. Where that is missing in the `RowStore`, a path stops where it is until it is
+made, and goes on, bit for bit as if it had been there.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _PATH, _HITS, _TURNS, _REFUSED, _FLYING, _NEXT = range(6)
 RowsOf = Callable[[Integers], Floats]
 
 
-class Kept(NamedTuple):
+class RowCache(NamedTuple):
     """Rows of K that are there."""
 
     values: Floats  # (places, walls)
@@ -46,16 +46,16 @@ class Kept(NamedTuple):
     hand: Integers  # (1,) the next place that may be given away
 
 
-class Rows(NamedTuple):
+class RowStore(NamedTuple):
     """Rows of K, made on demand; threads may share them where there is room for all."""
 
-    kept: Kept
+    cache: RowCache
     making: threading.Lock  # held by the thread that makes some
 
     @property
     def whole(self) -> bool:
         """Whether there is room for all, so that none is ever given up."""
-        return len(self.kept.owner) >= len(self.kept.place)
+        return len(self.cache.owner) >= len(self.cache.place)
 
 
 class Flight(NamedTuple):
@@ -68,21 +68,21 @@ class Flight(NamedTuple):
     count: Integers  # type: ignore[assignment]  # (6,) path, its hits, turns, …, as named above
 
 
-def room_for_rows(walls: int, part: float = 1.0) -> Rows:
+def room_for_rows(walls: int, part: float = 1.0) -> RowStore:
     """Rows of so many walls, with room in a part of MEMORY, none of them there yet."""
     count = max(1, walls)
     places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))
-    kept = Kept(
+    cache = RowCache(
         values=np.zeros((places, walls)),
         place=np.full(walls, -1),
         owner=np.full(places, -1),
         used=np.zeros(places, dtype=bool),
         hand=np.zeros(1, dtype=np.int64),
     )
-    return Rows(kept, threading.Lock())
+    return RowStore(cache, threading.Lock())
 
 
-def make_rows(rows_of: RowsOf, rows: Kept, wanted: Sequence[int]) -> None:
+def make_rows(rows_of: RowsOf, rows: RowCache, wanted: Sequence[int]) -> None:
     """Put the rows of so many walls where others were not used for long; those there stay."""
     wanted = [wall for wall in wanted if rows.place[wall] < 0]
     if not wanted:
@@ -114,7 +114,7 @@ def make_flight(slacks: Floats) -> Flight:
 def follow(
     rows_of: RowsOf,
     dimension: int,
-    rows: Rows,
+    rows: RowStore,
     starts: Sequence[Floats],
     drawn: Sequence[tuple[Floats, Floats, Floats]],
 ) -> tuple[Floats, Floats, Integers]:
@@ -126,24 +126,24 @@ def follow(
     next for each chain are made side by side.
     """
     flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (dimension + 1)
-    outs = np.ones((len(starts), len(drawn[0][0]), len(rows.kept.place)))
-    kept, waiting = rows.kept, list(range(len(starts)))
+    outs = np.ones((len(starts), len(drawn[0][0]), len(rows.cache.place)))
+    cache, waiting = rows.cache, list(range(len(starts)))
     while waiting:
         stop = cancelling.flag()
-        met = {k: fly(kept, *drawn[k], flights[k], limit, outs[k], stop) for k in waiting}
+        met = {k: fly(cache, *drawn[k], flights[k], limit, outs[k], stop) for k in waiting}
         cancelling.check("uniform sample")
         waiting = [k for k in waiting if met[k] >= 0]
         each = lanes.LANES // max(1, len(waiting))
         wanted = [met[k] for k in waiting]
         for k in waiting:
             rates = -flights[k].w / np.maximum(flights[k].s, _LEAST)
-            soon = np.where(kept.place < 0, rates, -1.0)
+            soon = np.where(cache.place < 0, rates, -1.0)
             ahead = np.argpartition(-soon, each)[:each].tolist() if each else []
             wanted += [wall for wall in ahead if soon[wall] > 0]
         wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
         if wanted:
             with rows.making:
-                make_rows(rows_of, kept, wanted)
+                make_rows(rows_of, cache, wanted)
     counts = [flight.count[[_TURNS, _REFUSED]] for flight in flights]
     return np.stack([flight.s for flight in flights]), outs, np.array(counts)
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import norm
 
 from granforce import notebook
 from granforce.explore import billiard
-from granforce.explore.billiard import Rows
+from granforce.explore.billiard import RowStore
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
@@ -112,7 +112,7 @@ def init(made: Walls, seed: int | np.random.SeedSequence) -> ChainState:
 def step(
     made: Walls,
     ends: Sequence[ChainState],
-    rows: Rows | None = None,
+    rows: RowStore | None = None,
     *,
     count: int,
     reach: float,
@@ -163,7 +163,7 @@ def walked(
     return ends, np.stack([made.on_hull(s) for s in slacks]), counts
 
 
-def flown(made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
+def flown(made: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
     """Chains on by a batch of paths; drawn: their speeds, times and middles (`billiard.fly`)."""
     slacks, outs, counts = billiard.follow(
         made.rows, made.dimension, rows, [end.slacks for end in ends], drawn
@@ -261,7 +261,7 @@ def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:
 
 
 def warm_up(
-    made: Walls, chains: int, seed: int, stores: Sequence[Rows], *, method: str = "billiard"
+    made: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
 ) -> tuple[list[ChainState], float, Integers]:
     """Chains ready to draw from: (ChainState of each, reach, turns and refused paths of each)."""
     ends, counts = begun(made, chains, seed), np.zeros((chains, 2), dtype=int)
@@ -274,7 +274,7 @@ def warm_up(
     return ends, reach, counts
 
 
-def stores_for(made: Walls, chains: int, workers: int) -> list[Rows]:
+def stores_for(made: Walls, chains: int, workers: int) -> list[RowStore]:
     """Rows of K for each thread: the same for all where they fit, else in parts of the memory."""
     threads, whole = min(workers, chains), billiard.room_for_rows(made.count)
     if whole.whole:
@@ -283,7 +283,7 @@ def stores_for(made: Walls, chains: int, workers: int) -> list[Rows]:
 
 
 def shared(
-    stores: Sequence[Rows], tasks: Sequence[Any], work: Callable[[list[Any], Rows], Any]
+    stores: Sequence[RowStore], tasks: Sequence[Any], work: Callable[[list[Any], RowStore], Any]
 ) -> list[Any]:
     """work(some tasks, rows) of consecutive parts of the tasks, each by a thread with its store."""
     parts = np.array_split(np.arange(len(tasks)), len(stores))
@@ -292,7 +292,9 @@ def shared(
 
 
 def together(
-    stores: Sequence[Rows], ends: Sequence[ChainState], on: Callable[[list[Any], Rows], Flown]
+    stores: Sequence[RowStore],
+    ends: Sequence[ChainState],
+    on: Callable[[list[Any], RowStore], Flown],
 ) -> Flown:
     """on(some chains, rows) of all chains, over threads."""
     parts, slacks, counts = zip(*shared(stores, ends, on), strict=True)
@@ -302,7 +304,7 @@ def together(
 def drawn(
     ensemble: Ensemble,
     made: Walls,
-    stores: Sequence[Rows],
+    stores: Sequence[RowStore],
     ends: Sequence[ChainState],
     on: Callable[..., Flown],
     have: int,
@@ -336,7 +338,7 @@ def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
 
 def _start(
     ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
-) -> tuple[UniformSample, list[Rows]]:
+) -> tuple[UniformSample, list[RowStore]]:
     """A sample without states yet, its chains warmed up, and rows of K for each thread."""
     begin = time.perf_counter()
     made = walls(ensemble)
@@ -367,7 +369,7 @@ def _start(
 def _extend(
     ensemble: Ensemble,
     sample: UniformSample,
-    stores: Sequence[Rows],
+    stores: Sequence[RowStore],
     states: int,
     progress: Progress | None,
 ) -> tuple[UniformSample, bool]:

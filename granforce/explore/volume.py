@@ -166,7 +166,7 @@ class _Rung(NamedTuple):
     refused: int
 
 
-def _climbed(made: Walls, rows: billiard.Rows, top: float, seed: int) -> list[list[_Rung]]:
+def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
     down: list[_Rung] = []
     beta, slacks, reach = top, np.ones(made.count), float(np.sqrt(made.dimension / top))
@@ -192,7 +192,7 @@ def _climbed(made: Walls, rows: billiard.Rows, top: float, seed: int) -> list[li
 
 def _settled(
     made: Walls,
-    rows: billiard.Rows,
+    rows: billiard.RowStore,
     beta: float,
     reach: float,
     slacks: Floats,
@@ -205,7 +205,7 @@ def _settled(
     return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
 
 
-def _flown(made: Walls, rows: billiard.Rows, rung: _Rung, count: int) -> _Rung:
+def _flown(made: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
     """The rung with so many more paths, in whole batches."""
     h, beta, end, found, drawn = made.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)

@@ -83,13 +83,13 @@ def walls(
     UndecidedError where no solver could tell, or S is thinner than rounding.
     """
     y = ensemble.hull.inner
-    frame = _frame(ensemble, weight, measured)
-    centre = _centred(frame, y, _matrix)
+    setup = _setup(ensemble, weight, measured)
+    centre = _centred(setup, y, _matrix)
     # Where rows are lost, no centre may be found, or a wrong one.
     matrix_at: _MatrixAt = _matrix
-    if _is_thin(frame, y if centre is None else centre):
-        matrix_at = _Thin(frame)
-        centre = _centred(frame, y, matrix_at)
+    if _is_thin(setup, y if centre is None else centre):
+        matrix_at = _Thin(setup)
+        centre = _centred(setup, y, matrix_at)
     if centre is None and np.any(weight):
         raise UndecidedError(
             "no centre of what is measured was found: its errors are too small, for the forces or "
@@ -102,10 +102,10 @@ def walls(
             "these conditions leave so little room to the forces that rounding hides it: take a "
             "larger friction coefficient, or prescribe less"
         )
-    return _walls(frame, centre, matrix_at)
+    return _walls(setup, centre, matrix_at)
 
 
-class _Frame(NamedTuple):
+class _Setup(NamedTuple):
     """What does not change while the centre is looked for."""
 
     ensemble: Ensemble
@@ -147,44 +147,53 @@ class _Frame(NamedTuple):
         return (self.weight * (self.target - self.forces(y))).ravel()
 
 
-def _frame(ensemble: Ensemble, weight: Floats | float, measured: Floats | float) -> _Frame:
+def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float) -> _Setup:
     contacts, unit = len(ensemble.index), knowledge.units(ensemble.mu)
     stiff, target = np.empty((2, contacts, 2))
     stiff[:], target[:] = weight * unit**2, measured / unit
     stiff = np.maximum(stiff, hull.pinned_stiffness(ensemble))
     problem, found = independent_problem_of(ensemble), ensemble.hull
-    frame = _Frame(ensemble, problem, *hull.normals(ensemble), found.held, stiff, target)
+    contact, normal = hull.normals(ensemble)
+    setup = _Setup(
+        ensemble=ensemble,
+        problem=problem,
+        contact=contact,
+        normal=normal,
+        held=found.held,
+        stiff=stiff,
+        target=target,
+    )
     if found.held.any():
-        C, _, _ = frame.conductances(_barrier(frame, found.inner), stiff)
+        C, _, _ = setup.conductances(_barrier(setup, found.inner), stiff)
         _, out = wall_matrix.factored(problem.network, C, problem.diagonal, DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
-        frame = frame._replace(problem=without)
-    return frame
+        setup = setup._replace(problem=without)
+    return setup
 
 
-def _barrier(frame: _Frame, y: Floats) -> Floats:
+def _barrier(setup: _Setup, y: Floats) -> Floats:
     """The curvature of −Σ log y."""
-    return np.where(frame.held, 1.0, y) ** -2.0
+    return np.where(setup.held, 1.0, y) ** -2.0
 
 
-def _matrix(frame: _Frame, y: Floats) -> tuple[WallMatrix, Integers]:
+def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
     """(K at y, its walls' positions in y)."""
-    curvature = _barrier(frame, y)
-    C, _, free = frame.conductances(curvature, frame.stiff)
-    own, _, _ = frame.conductances(curvature, frame.known)
-    moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
+    curvature = _barrier(setup, y)
+    C, _, free = setup.conductances(curvature, setup.stiff)
+    own, _, _ = setup.conductances(curvature, setup.known)
+    moving = np.flatnonzero(~setup.held & (free[setup.contact] > 0))
     padding = -len(moving) % BLOCK
-    contact = np.append(frame.contact[moving], np.zeros(padding, dtype=np.int64))
-    normal = np.vstack([frame.normal[moving] / y[moving, None], np.zeros((padding, 2))])
-    problem = frame.problem
+    contact = np.append(setup.contact[moving], np.zeros(padding, dtype=np.int64))
+    normal = np.vstack([setup.normal[moving] / y[moving, None], np.zeros((padding, 2))])
+    problem = setup.problem
     factors, _ = wall_matrix.factored(problem.network, C, problem.diagonal, 0.0)
     return WallMatrix(problem.network, contact, normal, C, own, factors), moving
 
 
-def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
+def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:
     """Unbalance b − A f of y, by rows of the problem and global rows."""
-    S, problem = frame.ensemble, frame.problem
-    forces = frame.forces(y) * knowledge.units(S.mu)
+    S, problem = setup.ensemble, setup.problem
+    forces = setup.forces(y) * knowledge.units(S.mu)
     rest = np.zeros(len(problem.b) + len(problem.b_border))
     rest[problem.place] = S.b / S.force_scale - S.A @ S.to_vector(forces)
     rest[: len(problem.b)] *= problem.diagonal == 0
@@ -194,32 +203,32 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
 class _Thin:
     """K at y by singular values, and its walls' positions in y, for any y."""
 
-    def __init__(self, frame: _Frame) -> None:
-        _, self.moving = _matrix(frame, frame.ensemble.hull.inner)
-        balance = _balance(frame.ensemble, self.moving)
-        self.basis = thin.basis(balance, frame.ensemble.hull.dimension)
+    def __init__(self, setup: _Setup) -> None:
+        _, self.moving = _matrix(setup, setup.ensemble.hull.inner)
+        balance = _balance(setup.ensemble, self.moving)
+        self.basis = thin.basis(balance, setup.ensemble.hull.dimension)
 
-    def __call__(self, frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
+    def __call__(self, setup: _Setup, y: Floats) -> tuple[ThinMatrix, Integers]:
         moving = self.moving
         count = len(moving) + -len(moving) % BLOCK
-        levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
-        weight = frame.weight.ravel()
+        levers = np.array([setup.forces(one).ravel() for one in np.diag(y)[moving]]).T
+        weight = setup.weight.ravel()
         return thin.thin_matrix(self.basis, y[moving], levers, weight, count), moving
 
 
 def _balanced(
-    frame: _Frame, y: Floats, matrix: WallMatrix | ThinMatrix, moving: Integers
+    setup: _Setup, y: Floats, matrix: WallMatrix | ThinMatrix, moving: Integers
 ) -> Floats:
     """y, what it lacks of the balance added."""
     if isinstance(matrix, ThinMatrix):
-        A, _, _ = frame.ensemble.scaled_form
-        lacking = matrix.inverse @ (frame.ensemble.hull.b - A @ y)
+        A, _, _ = setup.ensemble.scaled_form
+        lacking = matrix.inverse @ (setup.ensemble.hull.b - A @ y)
     else:
-        lacking = wall_matrix.balancing(matrix, *_rest(frame, y))[: len(moving)]
+        lacking = wall_matrix.balancing(matrix, *_rest(setup, y))[: len(moving)]
     return _shifted(y, moving, lacking)
 
 
-_MatrixAt = Callable[[_Frame, Floats], tuple[WallMatrix | ThinMatrix, Integers]]
+_MatrixAt = Callable[[_Setup, Floats], tuple[WallMatrix | ThinMatrix, Integers]]
 
 
 def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
@@ -227,17 +236,17 @@ def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
     return ensemble.scaled_form[0].tocsc()[:, moving].toarray()
 
 
-def _is_thin(frame: _Frame, y: Floats) -> bool:
+def _is_thin(setup: _Setup, y: Floats) -> bool:
     """Whether the sparse factor lost rows of the balance at y, as dense matrices tell."""
-    ensemble = frame.ensemble
+    ensemble = setup.ensemble
     A, b = ensemble.scaled_form[0], ensemble.hull.b
     if A.shape[0] > MOST_DENSE:
         return False
-    matrix, moving = _matrix(frame, y)
+    matrix, moving = _matrix(setup, y)
     if not len(moving):
         return False
     for _ in range(POLISH):
-        y = _balanced(frame, y, matrix, moving)
+        y = _balanced(setup, y, matrix, moving)
     if not (np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 and y[moving].min() > 0):
         return True
     g = np.random.default_rng(0).standard_normal((PROBES, matrix.count))
@@ -245,12 +254,12 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
     balance = _balance(ensemble, moving)
     if not np.abs(change @ (balance * y[moving]).T).max(initial=0.0) <= BALANCED / 10:
         return True
-    h, _ = _shape(frame, _barrier(frame, y), frame.known)
+    h, _ = _shape(setup, _barrier(setup, y), setup.known)
     return h != ensemble.hull.dimension
 
 
 def _centred(
-    frame: _Frame,
+    setup: _Setup,
     y: Floats,
     matrix_at: _MatrixAt,
 ) -> Floats | None:
@@ -260,21 +269,21 @@ def _centred(
     """
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
-        matrix, moving = matrix_at(frame, y)
+        matrix, moving = matrix_at(setup, y)
         if not len(moving):
             return y
-        y = _balanced(frame, y, matrix, moving)
-        pull = frame.pull(y)
+        y = _balanced(setup, y, matrix, moving)
+        pull = setup.pull(y)
         # Newton's step to the centre.
         relative = matrix.moved(np.ones((1, matrix.count)), pull)[0, : len(moving)]
-        change = frame.forces(_shifted(y, moving, relative)) - frame.forces(y)
+        change = setup.forces(_shifted(y, moving, relative)) - setup.forces(y)
         # The decrement squared: the growth of the sum along the step, to first order.
         gain = float(relative.sum() + pull @ change.ravel())
         if gain < _NEAR_CENTRE**2:
             for _ in range(POLISH):
-                y = _balanced(frame, y, matrix, moving)
+                y = _balanced(setup, y, matrix, moving)
             return y
-        slope, curve = float(pull @ change.ravel()), float(np.sum(frame.weight * change**2))
+        slope, curve = float(pull @ change.ravel()), float(np.sum(setup.weight * change**2))
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
@@ -293,37 +302,37 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
     return y
 
 
-def _walls(frame: _Frame, y: Floats, matrix_at: _MatrixAt) -> Walls:
+def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
     """The Walls around y."""
-    ensemble = frame.ensemble
+    ensemble = setup.ensemble
     matrix: WallMatrix | ThinMatrix
     if isinstance(matrix_at, _Thin):
-        matrix, moving = matrix_at(frame, y)
+        matrix, moving = matrix_at(setup, y)
         h = matrix.null.shape[1]
         forces = ensemble.scaled_form[2].tocsc()[:, moving] @ (y[moving, None] * matrix.null)
         units = 0.5 * float(np.linalg.slogdet(forces.T @ forces)[1])
     else:
-        known = frame.known
-        h, shape = _shape(frame, _barrier(frame, y), known)
+        known = setup.known
+        h, shape = _shape(setup, _barrier(setup, y), known)
         # f_t is in units of μ: its own length is μ times that.
         plain = np.maximum(known, knowledge.units(ensemble.mu) ** 2)
-        units = _shape(frame, np.zeros_like(y), plain)[1] - shape
-        matrix, moving = _matrix(frame, y)
+        units = _shape(setup, np.zeros_like(y), plain)[1] - shape
+        matrix, moving = _matrix(setup, y)
         # Its own, or whoever changes a sample's would change the ensemble's.
         matrix = matrix._replace(network=copy.deepcopy(matrix.network))
         matrix = wall_matrix.restored(matrix)
-    root = np.sqrt(frame.weight).ravel()
-    return Walls(y, moving, matrix, h, frame.pull(y), root, units)
+    root = np.sqrt(setup.weight).ravel()
+    return Walls(y, moving, matrix, h, setup.pull(y), root, units)
 
 
-def _shape(frame: _Frame, curvature: Floats, stiff: Floats) -> tuple[int, float]:
+def _shape(setup: _Setup, curvature: Floats, stiff: Floats) -> tuple[int, float]:
     """Dimension h of what balance leaves free, and ½ ln det of the stiffness M there.
 
     For N a basis of the null space of A, det NᵀMN is det M det A M⁻¹Aᵀ but for a factor that only
     A has part in.
     """
-    network, diagonal = frame.problem.network, frame.problem.diagonal
-    C, logs, free = frame.conductances(curvature, stiff)
+    network, diagonal = setup.problem.network, setup.problem.diagonal
+    C, logs, free = setup.conductances(curvature, stiff)
     factors, out = wall_matrix.factored(network, C, diagonal, 0.0)
     rows = int(np.sum((diagonal == 0) & ~out)) + wall_matrix.global_rows(network, factors)
     log_rows = wall_matrix.log_determinant(network, factors)

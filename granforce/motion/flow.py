@@ -60,7 +60,7 @@ OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
 SOLVED, FELL, FAILED = range(3)
 
 
-class Motion(NamedTuple):
+class RowVector(NamedTuple):
     """Rows of W flows: velocities, or what is out of balance."""
 
     rows: Floats  # (rows, W)
@@ -71,16 +71,16 @@ class Flows(NamedTuple):
     """Where W flows stand, and what a Newton step needs. Numbers are (1, W), counters (W,)."""
 
     factors: Factors
-    load: Motion  # b, the pair included
+    load: RowVector  # b, the pair included
     forces: Floats  # (2 N_c, W) f
     following: Floats  # (2 N_c, W) f⁺
     state: Floats  # (N_c, W) OPEN, STICKING, ±SLIDING
     before: Floats  # (N_c, W) the states that the last linear system was made for
-    velocity: Motion  # U
-    base: Motion  # U before the Newton step
-    kept: Motion  # U before the implicit step
-    rest: Motion  # A f⁺ − b − M U
-    direction: Motion  # the Newton step
+    velocity: RowVector  # U
+    base: RowVector  # U before the Newton step
+    kept: RowVector  # U before the implicit step
+    rest: RowVector  # A f⁺ − b − M U
+    direction: RowVector  # the Newton step
     pace: Floats  # τ
     length: Floats  # of the Newton step
     least: Floats  # squared unbalance over masses, now,
@@ -126,8 +126,8 @@ def make_flows(step: Step, width: int) -> Flows:
     """The Flows of `width` lanes that rest."""
     contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
 
-    def motion() -> Motion:
-        return Motion(room(rows, width), room(m, width))
+    def vector() -> RowVector:
+        return RowVector(room(rows, width), room(m, width))
 
     def one() -> Floats:
         return room(1, width, value=1.0)
@@ -137,16 +137,16 @@ def make_flows(step: Step, width: int) -> Flows:
 
     return Flows(
         factors=contact_matrix.make_factors(step.network, width, symmetric=False),
-        load=motion(),
+        load=vector(),
         forces=room(2 * contacts, width),
         following=room(2 * contacts, width),
         state=room(contacts, width),
         before=room(contacts, width),
-        velocity=motion(),
-        base=motion(),
-        kept=motion(),
-        rest=motion(),
-        direction=motion(),
+        velocity=vector(),
+        base=vector(),
+        kept=vector(),
+        rest=vector(),
+        direction=vector(),
         pace=one(),
         length=one(),
         least=one(),
@@ -174,8 +174,8 @@ def start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
     _pushed(step.network, asked.contact, -float(asked.load), pair, border)
     flows.load.rows[:, [lane]], flows.load.border[:, [lane]] = pair, border
     flows.forces[:, lane] = np.asarray(asked.forces).ravel()
-    for motion in (flows.velocity, flows.kept):
-        motion.rows[:, lane], motion.border[:, lane] = 0.0, 0.0
+    for vector in (flows.velocity, flows.kept):
+        vector.rows[:, lane], vector.border[:, lane] = 0.0, 0.0
     flows.pace[0, lane], flows.lately[0, lane], flows.steady[0, lane] = FIRST, np.inf, asked.steady
     flows.newton[lane] = flows.steps[lane] = flows.iterations[lane] = 0
     flows.most[lane], flows.going[lane] = asked.max_steps, True

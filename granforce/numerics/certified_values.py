@@ -21,7 +21,7 @@ from scipy import sparse
 
 from granforce.numerics import certificates, highs, linear_programs
 from granforce.numerics.contact_program import Problem
-from granforce.numerics.linear_programs import Centre, Outcome, Program
+from granforce.numerics.linear_programs import Centre, Program, ProgramOutcome
 from granforce.records import Cancelled, worker_count
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
@@ -180,7 +180,7 @@ class Solver:
                 finished=partial(self._take, asked),
             )
 
-    def _take(self, asked: _Asked, outcomes: Sequence[Outcome]) -> None:
+    def _take(self, asked: _Asked, outcomes: Sequence[ProgramOutcome]) -> None:
         """Certify outcomes; of a key's outcomes keep the better value and the better bound."""
         bounds, points = asked.bounds, asked.points
         attained, bound = certify(self.system, outcomes, asked.tasks)
@@ -209,7 +209,7 @@ def _nearer(one: float, other: float, bound: float) -> float:
 
 
 def certify(
-    system: System, outcomes: Sequence[Outcome], tasks: Sequence[Program]
+    system: System, outcomes: Sequence[ProgramOutcome], tasks: Sequence[Program]
 ) -> tuple[Floats, Floats]:
     """Value attained by each outcome, and a bound on the minimum from A, b and c alone (⟨f_n⟩).
 
@@ -221,7 +221,7 @@ def certify(
 
 
 def _certify(
-    system: System, outcomes: Sequence[Outcome], tasks: Sequence[Program]
+    system: System, outcomes: Sequence[ProgramOutcome], tasks: Sequence[Program]
 ) -> tuple[Floats, Floats]:
     y = np.stack([outcome.y for outcome in outcomes], axis=1)
     cost, gain = np.zeros_like(y), np.zeros(len(outcomes))
@@ -251,7 +251,7 @@ def _certify(
     return np.where(admitted, value, np.inf), np.where(np.isfinite(bound), bound, -np.inf)
 
 
-def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[Outcome]:
+def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[ProgramOutcome]:
     """Yield the outcomes of the programs without a load by HiGHS's simplex method.
 
     Each goes on from the vertex of the one before, which takes a tenth of the time: for S without
@@ -269,7 +269,7 @@ def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[Outc
             )
 
 
-def from_scratch(system: System, number: int, task: Program) -> Iterator[Outcome]:
+def from_scratch(system: System, number: int, task: Program) -> Iterator[ProgramOutcome]:
     """Yield the outcomes of one program by one of HiGHS's methods after another, without a start.
 
     The first takes presolve and tightest tolerances.
@@ -308,7 +308,7 @@ def _outcome(
     cost: Floats,
     number: int,
     task: Program,
-) -> Outcome:
+) -> ProgramOutcome:
     """What HiGHS made of a program whose rows were scaled, from its basis, if any, to rounding."""
     multiplier = scale * np.array(model.getSolution().row_dual) / _DEARER
     basis = highs.basis(model)
@@ -317,7 +317,7 @@ def _outcome(
             y, multiplier = highs.vertex(A, system.b, cost, *basis)
     y = np.maximum(y, 0.0)
     load = float(y[-1]) if task.loaded >= 0 else 0.0
-    outcome = Outcome(
+    outcome = ProgramOutcome(
         number=number,
         loaded=task.loaded,
         y=y[: len(system.weight)],

@@ -44,7 +44,7 @@ class Program(NamedTuple):
     loaded: int  # contact that carries the load F, −1 without
 
 
-class Outcome(NamedTuple):
+class ProgramOutcome(NamedTuple):
     """Where a program ended: nothing is claimed about it before it is certified."""
 
     number: int  # place in the list of programs
@@ -91,12 +91,12 @@ def run(
     *,
     refined: bool = False,
     workers: int = 1,
-    finished: Callable[[Sequence[Outcome]], object],
+    finished: Callable[[Sequence[ProgramOutcome]], object],
 ) -> None:
     """Carry the programs of these numbers from the centre to their optimum on ``workers`` threads.
 
     refined: each step is solved again and again until rounding leaves nothing of the unbalance.
-    finished(list of Outcome) is called from the threads, at most LANES outcomes at a time.
+    finished(list of ProgramOutcome) is called from the threads, at most LANES outcomes at a time.
     Cancelling is asked for before every step. An outcome does not depend on the number of threads,
     bit for bit.
     """
@@ -120,7 +120,7 @@ def _work(
     programs: Sequence[Program],
     waiting: deque[int],
     mode: int,
-    finished: Callable[[Sequence[Outcome]], object],
+    finished: Callable[[Sequence[ProgramOutcome]], object],
 ) -> None:
     """One thread: fill lanes from the queue, step, hand over what has arrived."""
     if not waiting:
@@ -180,11 +180,11 @@ def fill(
 
 def _outcome(
     problem: Problem, at: Iterate, lane: int, number: int, loaded: int, steps: int
-) -> Outcome:
+) -> ProgramOutcome:
     multiplier = np.concatenate([at.v[:, lane], at.v_border[:, lane]])[problem.place]
     load = float(at.y[-1, lane]) if loaded >= 0 else 0.0
     y, z = at.y[:-1, lane].copy(), at.z[:-1, lane].copy()
-    return Outcome(
+    return ProgramOutcome(
         number=int(number),
         loaded=int(loaded),
         y=y,
@@ -219,10 +219,10 @@ def multipliers(
 def balanced(
     problem: Problem,
     middle: Centre,
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[ProgramOutcome],
     work: Workspace | None = None,
     lanes: Any = ONE,
-) -> list[Outcome]:
+) -> list[ProgramOutcome]:
     """As many outcomes as lanes, or fewer, moved into S, if they are close to it.
 
     First A y + a F = b is restored; what this drove below zero is then undone by mixing in as

@@ -20,7 +20,7 @@ from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
 from granforce.paper.highlights import highlights
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.records import InputError
 from granforce.system.files import written
 from granforce.types import Floats, Rows
@@ -56,8 +56,8 @@ def named(files: str | None) -> list[Path]:
     return paths
 
 
-def renew(paths: Sequence[Path], table: Table, claims: Rows, findings: Rows) -> None:
-    """Write the tables of a `tables.Table`, its judged claims and its findings into marked files.
+def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
+    """Write the tables of the study, its judged claims and its findings into marked files.
 
     claims, findings: dicts of `claims.Claim`.
     """
@@ -81,7 +81,7 @@ def renew(paths: Sequence[Path], table: Table, claims: Rows, findings: Rows) -> 
             file.write(renewed.encode())
 
 
-def measures(table: Table) -> str:
+def measures(table: StudyTable) -> str:
     """φ, z, h and η against μ as a table, of the same packings in every column.
 
     Those of the exact intervals; where another column has fewer of them, it says of how many. The
@@ -121,7 +121,7 @@ def measures(table: Table) -> str:
     return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def beside(table: Table) -> str:
+def beside(table: StudyTable) -> str:
     """What walks see, how contacts give way, and how wide S is, against μ as a table.
 
     Means ± standard errors over packings; ratios are of the same packing.
@@ -166,7 +166,7 @@ def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
     ]
 
 
-def sweeps(table: Table) -> str:
+def sweeps(table: StudyTable) -> str:
     """Walks by sweeps, by where these end: what they reach, and how far outside of S, as a table.
 
     Excess: how far the intervals that states span reach beyond the exact ones, over the length of
@@ -207,7 +207,7 @@ def _excess(excess: float, length: float) -> str:
     return f"{part:.2g}" if part >= _NEAR else f"< {_NEAR:g}"
 
 
-def preparation(table: Table) -> str:
+def preparation(table: StudyTable) -> str:
     """What packings depend on: their class by how they are made, as a table, and what it says.
 
     In brackets the difference from the default in the same seeds, in its own standard errors.
@@ -309,7 +309,7 @@ def _number(finding: dict[str, Any]) -> str:
     return f"{finding['value']:.3g}{ends}"
 
 
-def counts(table: Table) -> str:
+def counts(table: StudyTable) -> str:
     """How many packings each part has at each μ, and of which versions, as a table."""
     lines = []
     for part in table.parts():
@@ -339,7 +339,7 @@ def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
     return dict(sorted(found.items()))
 
 
-def _drawn_by(table: Table, sampler: str) -> list[dict[str, Any]]:
+def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
     """Rows of a sampler whose states were drawn, and not known to be one point."""
     return [row for row in drawn(table, sampler) if not skipped(row)]
 

@@ -9,7 +9,7 @@ import numpy as np
 from granforce import figures
 from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn, outside
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder
 from granforce.types import Floats, Progress, Rows
 
@@ -88,14 +88,14 @@ _RELAXED = {
 }
 
 
-def paper_sampler(table: Table) -> str:
+def paper_sampler(table: StudyTable) -> str:
     """Sampler of Figures 1 to 6: the paper's, if the table has it at every μ of its plan."""
     known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
     wanted = set(table.plan.get("frictions", ()))
     return "gauss_seidel" if wanted and wanted <= known else "nearest"
 
 
-def captions(table: Table) -> dict[str, str]:
+def captions(table: StudyTable) -> dict[str, str]:
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
     told = tails.told(table) or "–"
@@ -107,7 +107,7 @@ def captions(table: Table) -> dict[str, str]:
 
 
 def draw(
-    table: Table,
+    table: StudyTable,
     folder: Path,
     *,
     formats: Sequence[str] = FORMATS,
@@ -130,12 +130,12 @@ def draw(
     return paths
 
 
-def all_figures(table: Table) -> dict[str, Callable[..., Any]]:
+def all_figures(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """{file name: figure(backend=…)} of all figures that a table has the data of."""
     return _of_the_paper(table) | _beyond(table)
 
 
-def _of_the_paper(table: Table) -> dict[str, Callable[..., Any]]:
+def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures 1 to 6, by one sampler."""
     sampler, made = paper_sampler(table), {}
     part = SAMPLERS[sampler]
@@ -159,19 +159,19 @@ def _of_the_paper(table: Table) -> dict[str, Callable[..., Any]]:
     return made
 
 
-def _in_S(table: Table, part: str) -> dict[float, list[Floats]]:
+def _in_S(table: StudyTable, part: str) -> dict[float, list[Floats]]:
     """{μ: extents} of a part where its states lie in S, or near it."""
     beyond = outside(table, part)
     return {mu: group for mu, group in table.extents(part).items() if mu not in beyond}
 
 
-def _beyond_S(table: Table, part: str) -> list[dict[str, Any]]:
+def _beyond_S(table: StudyTable, part: str) -> list[dict[str, Any]]:
     """Rows of a part whose states lie outside of S by more than its extent."""
     beyond = outside(table, part)
     return [row for row in table.part(part) if row["mu"] in beyond]
 
 
-def _beyond(table: Table) -> dict[str, Callable[..., Any]]:
+def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """What the paper does not show."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, made = SAMPLERS[paper_sampler(table)], {}
@@ -219,7 +219,7 @@ def _beyond(table: Table) -> dict[str, Callable[..., Any]]:
     return made
 
 
-def _densities(table: Table) -> dict[str, dict[float, list[tuple[float, float]]]]:
+def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, float]]]]:
     """{word: {μ: [(f, P), …]}} of uniform states of large packings."""
     return {
         word: {mu: tails.densities(packings) for mu, packings in known.items()}
@@ -251,12 +251,12 @@ def _some(groups: dict[float, Any]) -> dict[float, Any]:
     return few or groups
 
 
-def _with_sizes(table: Table) -> list[dict[str, Any]]:
+def _with_sizes(table: StudyTable) -> list[dict[str, Any]]:
     frictions = {row["mu"] for row in table.part("size")}
     return [row for row in table.part("size", "walk") if row["mu"] in frictions]
 
 
-def _shown_contacts(table: Table, part: str) -> Iterator[tuple[Any, ...]]:
+def _shown_contacts(table: StudyTable, part: str) -> Iterator[tuple[Any, ...]]:
     """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks that are shown."""
     contacts = {id(row): arrays for row, *arrays in table.contacts(part)}
     for k in sorted({k for k, _ in table.shown}):
@@ -265,7 +265,7 @@ def _shown_contacts(table: Table, part: str) -> Iterator[tuple[Any, ...]]:
             yield k, row, *contacts[id(row)]
 
 
-def _shown_forces(table: Table, part: str) -> dict[float, tuple[Any, ...]]:
+def _shown_forces(table: StudyTable, part: str) -> dict[float, tuple[Any, ...]]:
     counts = dict(table.shown)
     return {
         row["mu"]: (normal, counts[k], least, extent)
@@ -273,7 +273,7 @@ def _shown_forces(table: Table, part: str) -> dict[float, tuple[Any, ...]]:
     }
 
 
-def _shown_places(table: Table, part: str) -> dict[float, tuple[Any, ...]]:
+def _shown_places(table: StudyTable, part: str) -> dict[float, tuple[Any, ...]]:
     return {
         row["mu"]: (table.packings[k], contacts, normal, extent)
         for k, row, contacts, normal, _, extent in _shown_contacts(table, part)

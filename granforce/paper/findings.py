@@ -23,18 +23,18 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import OURS, Claim, peak, slope
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Floats, Rows
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
 
 
-def found(table: Table) -> list[Claim]:
-    """All findings about a `tables.Table`; those without data are left out."""
+def found(table: StudyTable) -> list[Claim]:
+    """All findings about a `tables.StudyTable`; those without data are left out."""
     return [finding for family in FAMILIES for finding in family(table)]
 
 
-def sampled_part(table: Table) -> Iterator[Claim]:
+def sampled_part(table: StudyTable) -> Iterator[Claim]:
     """How much of the exact extent 1000 states see."""
     for source, word in (("walk", "the walk's"), ("uniform", "uniform")):
         yield from _by_range(
@@ -42,7 +42,7 @@ def sampled_part(table: Table) -> Iterator[Claim]:
         )
 
 
-def measure(table: Table) -> Iterator[Claim]:
+def measure(table: StudyTable) -> Iterator[Claim]:
     """How the walk's measure differs from the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         yield from _by_range(
@@ -55,7 +55,7 @@ def measure(table: Table) -> Iterator[Claim]:
         )
 
 
-def exact_shape(table: Table) -> Iterator[Claim]:
+def exact_shape(table: StudyTable) -> Iterator[Claim]:
     """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
@@ -64,7 +64,7 @@ def exact_shape(table: Table) -> Iterator[Claim]:
         yield from _growth(groups, label)
 
 
-def distribution(table: Table) -> Iterator[Claim]:
+def distribution(table: StudyTable) -> Iterator[Claim]:
     """How far P(ΔF_n) is from falling at each μ, in units of each packing's mean, and its width."""
     for sampler in SAMPLERS:
         groups = sampled(table, sampler)
@@ -83,7 +83,7 @@ def distribution(table: Table) -> Iterator[Claim]:
                 )
 
 
-def opened(table: Table) -> Iterator[Claim]:
+def opened(table: StudyTable) -> Iterator[Claim]:
     """How η grows with the friction of the cones alone, in packings made without friction."""
     groups = _values(table.part("opened_exact"), "eta3")
     yield from _growth(groups, "exact η3, packings made at μ = 0,")
@@ -98,7 +98,7 @@ def _growth(groups: Values, label: str) -> Iterator[Claim]:
             yield _trend(f"slope of log {label} against log μ, {ends}", slope, few)
 
 
-def size(table: Table) -> Iterator[Claim]:
+def size(table: StudyTable) -> Iterator[Claim]:
     """Whether exact η3 depends on N."""
     rows = table.part("size_exact", "exact")
     for mu in sorted({row["mu"] for row in table.part("size_exact")}):
@@ -107,7 +107,7 @@ def size(table: Table) -> Iterator[Claim]:
             yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
 
 
-def strength(table: Table) -> Iterator[Claim]:
+def strength(table: StudyTable) -> Iterator[Claim]:
     """How far the critical force stays below the limit load, and what the protocol does to it."""
     rows = [
         row | {"part_of_load": row["critical_force"] / row["limit_load"]}
@@ -135,7 +135,7 @@ def strength(table: Table) -> Iterator[Claim]:
     yield from _by_range(_values(factors, "factor"), told)
 
 
-def shear(table: Table) -> Iterator[Claim]:
+def shear(table: StudyTable) -> Iterator[Claim]:
     """Which shear stress the contacts can carry, and how much of it networks have."""
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = _values(rows, "friction")
@@ -153,7 +153,7 @@ def shear(table: Table) -> Iterator[Claim]:
         yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
 
 
-def volume(table: Table) -> Iterator[Claim]:
+def volume(table: StudyTable) -> Iterator[Claim]:
     """How many networks there are: the width of S and the entropy of forces per grain."""
     rows = table.part("volume")
     for name, told in (
@@ -193,7 +193,7 @@ def volume(table: Table) -> Iterator[Claim]:
             yield _finding(told, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
 
 
-def forces(table: Table) -> Iterator[Claim]:
+def forces(table: StudyTable) -> Iterator[Claim]:
     """How the normal forces of uniform states fall off, against an exponential and a Gaussian."""
     for word, known in tails.counts(table).items():
         for mu, packings in known.items():
@@ -225,7 +225,7 @@ def _values(rows: Rows, name: str) -> Values:
     return {mu: [v for _, v in group] for mu, group in items(rows, name).items()}
 
 
-def _ratios(table: Table, name: str, above: str, below: str) -> Values:
+def _ratios(table: StudyTable, name: str, above: str, below: str) -> Values:
     """{μ: ratios of one number in the same packings}, where both parts have it."""
     rows = [r for r in table.part(above) if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
     return _quotients(statistics.paired(rows, table.part(below)), name, name)

@@ -13,7 +13,7 @@ from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, friction, positive, whole, worker_count
 from granforce.study import scan
-from granforce.study.cells import Cell
+from granforce.study.cells import StudyCell
 from granforce.study.store import open_store
 from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
@@ -152,7 +152,7 @@ def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, .
 
 def compute(
     path: str | Path, wanted: list[Task], arguments: argparse.Namespace
-) -> list[tuple[Cell, str]]:
+) -> list[tuple[StudyCell, str]]:
     """Compute the tasks, with a bar on stderr; returns what failed."""
     begin = time.monotonic()
 

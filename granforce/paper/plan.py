@@ -28,7 +28,7 @@ from granforce.packing.compaction import default_steps
 from granforce.perturb.critical_force import MOST_STEPS
 from granforce.records import InputError
 from granforce.study import kinds, scan
-from granforce.study.cells import Cell, Kind, load
+from granforce.study.cells import Kind, StudyCell, load
 from granforce.study.keys import canonical
 from granforce.study.store import open_store
 
@@ -151,7 +151,7 @@ class Task(NamedTuple):
     """One cell of the study and what it is for."""
 
     part: str
-    cell: Cell
+    cell: StudyCell
     n: int
     mu: float  # of the cones
     seed: int  # of the packing
@@ -172,22 +172,24 @@ def tasks(plan: Plan) -> list[Task]:
     return list(itertools.chain(*found.values()))
 
 
-def packings(wanted: Iterable[Task]) -> list[Cell]:
+def packings(wanted: Iterable[Task]) -> list[StudyCell]:
     """The packing cells that tasks need, each once."""
     unique: dict[Any, Any] = {}
     for task in wanted:
         named = task.cell.parameters["packing"]
-        unique.setdefault(canonical(named), Cell(kinds.PACKING, named))
+        unique.setdefault(canonical(named), StudyCell(kinds.PACKING, named))
     return list(unique.values())
 
 
-def compute(path: str | Path, wanted: Sequence[Task], **options: Any) -> list[tuple[Cell, str]]:
+def compute(
+    path: str | Path, wanted: Sequence[Task], **options: Any
+) -> list[tuple[StudyCell, str]]:
     """Compute tasks into the store at path, in their order; options as for `scan.run`.
 
     A packing is made when the first task needs it: whenever it ends, what is most wanted is there.
     Returns what failed as (cell, error message); cells of failed packings are not tried.
     """
-    cells: dict[str, Cell] = {}
+    cells: dict[str, StudyCell] = {}
     for task in wanted:
         for cell in (*packings([task]), task.cell):
             cells.setdefault(f"{cell.kind.name} {canonical(cell.parameters)}", cell)
@@ -209,7 +211,9 @@ def _task(
     packed = kinds.PACKING.parameters(
         n, mu if packing_mu is None else packing_mu, seed, **made or {}
     )
-    return Task(part, Cell(kind, kind.parameters(packed, *arguments, mu=mu, **how)), n, mu, seed)
+    return Task(
+        part, StudyCell(kind, kind.parameters(packed, *arguments, mu=mu, **how)), n, mu, seed
+    )
 
 
 def _walk(

@@ -35,7 +35,7 @@ FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
 
 
-class Table(NamedTuple):
+class StudyTable(NamedTuple):
     """The reduced study."""
 
     plan: dict[str, Any]  # fields of `plans.Plan`
@@ -89,8 +89,8 @@ class Table(NamedTuple):
         return [row | {eta: other[eta]} for row, other in pairs]
 
 
-def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> Table:
-    """The Table of what the store at path has of a plan. InputError where it has nothing.
+def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> StudyTable:
+    """The StudyTable of what the store at path has of a plan. InputError where it has nothing.
 
     wanted: the tasks whose lack is counted and told, by default all of the plan.
     """
@@ -138,7 +138,7 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     known = {_name(row) for row in rows}
     missing = sum(_name(_named(task)) not in known for task in wanted)
     skipped = {"missing_cells": missing}
-    return Table(
+    return StudyTable(
         plan=plan._asdict(),
         rows=rows,
         samples=joined,
@@ -267,8 +267,8 @@ def _counted(dataset: xr.Dataset) -> Floats:
     return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
 
 
-def merged(new: Table, old: Table) -> Table:
-    """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
+def merged(new: StudyTable, old: StudyTable) -> StudyTable:
+    """The StudyTable `new` with the rows of its plan that it lacks and `old` has, after its own.
 
     Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
     where those cells are gone. Raises InputError where rows are of other versions than those that
@@ -342,7 +342,7 @@ def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
                 )
 
 
-def save(table: Table, path: str | Path) -> None:
+def save(table: StudyTable, path: str | Path) -> None:
     """Keep a table, and the packings it shows, in a small store of its own at path."""
     store = open_store(path)
     dataset = _dataset(table)
@@ -363,8 +363,8 @@ def save(table: Table, path: str | Path) -> None:
         kinds.keep_packing(store, named, packing)
 
 
-def load(path: str | Path) -> Table:
-    """The Table kept at path. InputError where there is none."""
+def load(path: str | Path) -> StudyTable:
+    """The StudyTable kept at path. InputError where there is none."""
     store = open_store(path, readonly=True)
     for entry in store.find("study"):
         if entry.version == VERSION:
@@ -373,7 +373,7 @@ def load(path: str | Path) -> Table:
     raise InputError(f"the store at {path} holds no reduced study")
 
 
-def _dataset(table: Table) -> xr.Dataset:
+def _dataset(table: StudyTable) -> xr.Dataset:
     names = sorted({name for row in table.rows for name in row} - {"part"})
     parts = sorted({row["part"] for row in table.rows})
     arrays: dict[str, Any] = {
@@ -399,7 +399,7 @@ def _number(value: Any) -> Any:
     return np.nan if value is None else value
 
 
-def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> Table:
+def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
     parts = json.loads(dataset.attrs["parts"])
     columns = {
         name.removeprefix("row_"): dataset[name].values
@@ -434,7 +434,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> Table:
         both = np.column_stack([dataset["decay_radius"], dataset["decay_size"]])
         decays = {int(k): both[at == k] for k in np.unique(at)}
     skipped = json.loads(dataset.attrs["skipped"])
-    return Table(plan, rows, samples, shown, packings, skipped, tails, decays)
+    return StudyTable(plan, rows, samples, shown, packings, skipped, tails, decays)
 
 
 def _packing(store: Store, row: dict[str, Any]) -> Packing:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.paper.tables import FORCES, Table
+from granforce.paper.tables import FORCES, StudyTable
 from granforce.types import Floats
 
 # What uniform states of large packings are drawn for, in words.
@@ -34,7 +34,7 @@ class Tail(NamedTuple):
     off_gaussian: float  # and of b = 2
 
 
-def counts(table: Table) -> dict[str, dict[float, list[Floats]]]:
+def counts(table: StudyTable) -> dict[str, dict[float, list[Floats]]]:
     """{words: {μ: [counts of f_n in the bins that end at FORCES, of each packing]}}."""
     found: dict[Any, Any] = {}
     for k, counted in table.tails.items():
@@ -75,7 +75,7 @@ def fitted(packings: Sequence[Floats]) -> Tail | None:
     )
 
 
-def told(table: Table) -> str:
+def told(table: StudyTable) -> str:
     """All fits in words."""
     fits = (
         (f"{word}, μ = {mu:g}", fitted(packings))

@@ -38,7 +38,7 @@ class Kind(NamedTuple):
     reached: Callable[[Parameters, xr.Dataset], Parameters] = _as_asked
 
 
-class Cell(NamedTuple):
+class StudyCell(NamedTuple):
     """One dataset of a study."""
 
     kind: Kind

@@ -12,7 +12,7 @@ from granforce.packing.importers.network import judged
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.records import InputError, Packing
 from granforce.study import kinds
-from granforce.study.cells import Cell, get
+from granforce.study.cells import StudyCell, get
 from granforce.study.scan import run
 from granforce.study.schema import VARIABLES
 from granforce.study.series import ends_of, over_frames, pair_names
@@ -62,7 +62,7 @@ def evolution(
     """
     store = open_store(path)
     failed: list[tuple[int, str]] = []
-    read: list[tuple[int, Snapshot, list[Cell]]] = []
+    read: list[tuple[int, Snapshot, list[StudyCell]]] = []
     for number in snapshots.numbers if numbers is None else numbers:
         try:
             found = snapshots.snapshot(number)
@@ -71,9 +71,9 @@ def evolution(
             continue
         named = kinds.imported_parameters(found.packing)
         kinds.keep_packing(store, named, found.packing)
-        cells = [Cell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
+        cells = [StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
         if states:
-            cells.append(Cell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))
+            cells.append(StudyCell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))
         read.append((number, found, cells))
     work = [cell for *_, cells in read for cell in cells]
     refused = run(path, work, workers=workers, scheduler=scheduler, progress=progress)

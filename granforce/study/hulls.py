@@ -24,7 +24,7 @@ _RANK = 1e-10
 _OUTLINED = 1e-4
 
 
-class Hull(NamedTuple):
+class BalanceSpace(NamedTuple):
     """The affine space of all networks on the N_c contacts of a packing that are in balance."""
 
     A: Floats  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then P
@@ -35,14 +35,16 @@ class Hull(NamedTuple):
     equations: int  # independent rows
 
 
-def hull(packing: Packing) -> Hull:
-    """The Hull of a packing whose every contact may carry, whatever its friction."""
+def hull(packing: Packing) -> BalanceSpace:
+    """The BalanceSpace of a packing whose every contact may carry, whatever its friction."""
     whole = ensemble(packing, 1.0, prune=False)
     A = whole.A.toarray()
     left, values, right = np.linalg.svd(A)
     rank = int(np.sum(values > _RANK * values.max(initial=0.0)))
     lift = right[:rank].T @ (left[:, :rank] / values[:rank]).T
-    return Hull(A=A, b=whole.b, lift=lift, axes=right[rank:], grains=whole.grains, equations=rank)
+    return BalanceSpace(
+        A=A, b=whole.b, lift=lift, axes=right[rank:], grains=whole.grains, equations=rank
+    )
 
 
 def fall(packing: Packing) -> Floats | None:

@@ -28,7 +28,7 @@ from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
 from granforce.records import InputError, Packing
 from granforce.study import kinds
-from granforce.study.cells import Cell, get, load, row
+from granforce.study.cells import StudyCell, get, load, row
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import open_store
 from granforce.system.terminal import one_line
@@ -43,7 +43,7 @@ CELL_BYTES = 2000  # of memory, that a cell takes until it is computed
 TRIES = 3  # a cell under way when a worker died is begun anew so often: it may have been its fault
 
 # What workers are to run: path of the store, cell, dtypes.
-Tasks = dict[int, tuple[str, Cell, Mapping[str, str] | None]]
+Tasks = dict[int, tuple[str, StudyCell, Mapping[str, str] | None]]
 
 _SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -62,7 +62,7 @@ def scan(
     """
     store = open_store(path)
     rows: dict[int, dict[str, Any]] = {}
-    named = [Cell(kinds.WALK, parameters) for parameters in cells]
+    named = [StudyCell(kinds.WALK, parameters) for parameters in cells]
 
     def done(k: int, cached: bool) -> None:
         # Computed anew where others have removed it meanwhile.
@@ -76,7 +76,7 @@ def scan(
 
 def run(
     path: str | Path,
-    cells: Sequence[Cell],
+    cells: Sequence[StudyCell],
     *,
     workers: int = 2,
     scheduler: str | None = None,
@@ -84,7 +84,7 @@ def run(
     progress: Progress | None = None,
     on_done: Callable[[int, bool], object] | None = None,
     enough: Callable[[], bool] | None = None,
-) -> list[tuple[Cell, str]]:
+) -> list[tuple[StudyCell, str]]:
     """Compute cells into the store at path, on one processor each; finished ones are found.
 
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
@@ -150,7 +150,7 @@ class Waits(NamedTuple):
         return self.needs.get(k) in self.failed
 
 
-def _needs(cells: Mapping[int, Cell]) -> dict[int, int]:
+def _needs(cells: Mapping[int, StudyCell]) -> dict[int, int]:
     """{cell: the one among them that makes its packing}."""
     made = {
         canonical(cell.parameters): k for k, cell in cells.items() if cell.kind == kinds.PACKING
@@ -288,7 +288,7 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def run_cell(path: str | Path, cell: Cell, dtypes: Mapping[str, str] | None = None) -> bool:
+def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None = None) -> bool:
     """Compute one cell into the store at path; whether it was there. Runs in a worker process."""
     if not Path(path, "zarr.json").exists():
         raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")

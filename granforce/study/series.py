@@ -25,7 +25,7 @@ from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.records import InputError, friction, positive, random_seed, whole
 from granforce.study import entries
-from granforce.study.cells import Cell, Kind, get
+from granforce.study.cells import Kind, StudyCell, get
 from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
@@ -179,7 +179,7 @@ def infer_series(
 
     Raises InputError where the store cannot be written.
     """
-    cells = [Cell(FRAME, parameters(frame, **options)) for frame in frames]
+    cells = [StudyCell(FRAME, parameters(frame, **options)) for frame in frames]
     failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)
     lost = {id(cell): message for cell, message in failed}
     store = open_store(path)

@@ -58,7 +58,7 @@ class _Stream:
                 self._stream.flush()
 
 
-class _Output(_Stream):
+class _OutputStream(_Stream):
     def failed(self, error: OSError) -> None:
         kind = ReaderGone if isinstance(error, BrokenPipeError) else OutputError
         raise kind(error.strerror or str(error)) from None
@@ -73,7 +73,7 @@ class _Progress(_Stream):
 def guarded() -> Iterator[None]:
     """Within, stdout raises OutputError where it cannot be written, and stderr never raises."""
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = _Output(sys.stdout, 1), _Progress(sys.stderr, 2)
+    sys.stdout, sys.stderr = _OutputStream(sys.stdout, 1), _Progress(sys.stderr, 2)
     try:
         yield
     finally:

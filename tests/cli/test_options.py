@@ -230,7 +230,7 @@ def _clashes():
     """(command, words) in which an output is an input, another output, or inside the store."""
     for command, one in PARSERS.items():
         outputs = _of_role(one, parsing.Output, parsing.Workplace)
-        others = [*outputs, *_of_role(one, parsing.Input, parsing.Kept)]
+        others = [*outputs, *_of_role(one, parsing.Input, parsing.StorePath)]
         for out in outputs:
             for other in others:
                 if other is not out:
@@ -245,7 +245,7 @@ def test_no_output_is_an_input_or_another_output(alias, tmp_path, monkeypatch, c
     tried = 0
     for command, out, other in _clashes():
         name, file = "data", Path("data")
-        folder = parsing.Workplace in (out.type, other.type) or other.type is parsing.Kept
+        folder = parsing.Workplace in (out.type, other.type) or other.type is parsing.StorePath
         if folder and alias == "hard":
             continue
         file.mkdir() if folder else file.write_text("precious")

@@ -6,7 +6,7 @@ from frames import file
 
 from granforce.experiment.infer import infer
 from granforce.experiment.pegs import read_pegs
-from granforce.experiment.walls import Outline, read_outline, read_wall_force
+from granforce.experiment.walls import WallOutline, read_outline, read_wall_force
 from granforce.forces.build import ensemble
 from granforce.records import InputError
 
@@ -92,7 +92,7 @@ def test_an_annulus_is_found_from_the_grains_at_its_walls(rng):
 
 def test_words_for_walls():
     assert read_outline("box") == "box" and read_outline("open") == "open"
-    assert read_outline("annulus:1,2,3,4") == Outline("annulus", (1, 2, 3, 4))
+    assert read_outline("annulus:1,2,3,4") == WallOutline("annulus", (1, 2, 3, 4))
     assert read_wall_force("right: 1 2 0.1") == ("right", (1, 2, 0.1))
     wrong = ("square", "box:1,2", "box:2,1,0,1", "annulus:0,0,2,1", "circle:0,0,-1", "open:1")
     for text in (*wrong, "box:a,b,c,d", "box:nan,1,0,1"):

@@ -41,7 +41,7 @@ def synthetic(eta, **options):
         answer |= {name: f(row["mu"]) for name, f in options.items() if name in answer}
         rows.append(answer | {"limit_load": 2 * answer["critical_force"]})
     joined = {name: np.concatenate(parts) for name, parts in samples.items()}
-    return tables.Table({}, rows, joined, [], {}, {})
+    return tables.StudyTable({}, rows, joined, [], {}, {})
 
 
 SWEEPS = groups.SAMPLERS["gauss_seidel"]
@@ -521,7 +521,7 @@ def test_every_claim_names_its_sampler_and_its_source():
 
 
 def test_without_data_there_is_no_verdict():
-    empty = tables.Table({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
+    empty = tables.StudyTable({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
     assert set(judged(empty).values()) == {verdicts.MISSING}
 
 
@@ -537,7 +537,7 @@ def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
     assert tail.off <= right < 0.3 * wrong
     assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
     row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
-    table = tables.Table({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
+    table = tables.StudyTable({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
     told = [finding.statement for finding in findings.forces(table)]
     assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
     assert tails.told(table).startswith("whole stress prescribed, μ = 0.1: b = ")
@@ -551,7 +551,7 @@ def test_volumes_tell_where_they_are_largest_and_what_they_follow():
             sized = {"extent": width + 0.001 * seed, "log_volume_per_grain": np.log(width)}
             rows.append(row | {"part": "volume"} | sized)
             rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
-    table = tables.Table({}, rows, {}, [], {}, {})
+    table = tables.StudyTable({}, rows, {}, [], {}, {})
     told = {finding.statement: finding.value for finding in findings.volume(table)}
     assert told["μ where ln V per grain, forces in ⟨f_n⟩ is largest"] == pytest.approx(0.1)
     extent = told["μ where width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩ is largest"]

@@ -18,7 +18,7 @@ from test_cells import cell
 
 from granforce.records import InputError
 from granforce.study import kinds, scan
-from granforce.study.cells import Cell, load
+from granforce.study.cells import StudyCell, load
 from granforce.study.store import open_store
 
 
@@ -50,8 +50,8 @@ def test_a_failed_cell_leaves_the_others(tmp_path):
 def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path):
     good, hopeless = cell(0.3), cell(0.3, 2)
     hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
-    walks = [Cell(kinds.WALK, walk) for walk in (hopeless, good)]
-    made = [Cell(kinds.PACKING, walk.parameters["packing"]) for walk in walks]
+    walks = [StudyCell(kinds.WALK, walk) for walk in (hopeless, good)]
+    made = [StudyCell(kinds.PACKING, walk.parameters["packing"]) for walk in walks]
     done = []
     # Walks come first: each waits for its packing all the same, which is made once.
     cells, told = [*walks, *made], lambda k, cached: done.append((k, cached))
@@ -171,9 +171,9 @@ def small_cells(seeds=(1, 2)):
     for seed in seeds:
         packing = cell(seed=seed)["packing"]
         cells += [
-            Cell(kinds.WALK, cell(seed=seed, states=40)),
-            Cell(kinds.INTERVALS, kinds.INTERVALS.parameters(packing)),
-            Cell(kinds.LIMIT_LOADS, kinds.LIMIT_LOADS.parameters(packing, mu=0.5)),
+            StudyCell(kinds.WALK, cell(seed=seed, states=40)),
+            StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(packing)),
+            StudyCell(kinds.LIMIT_LOADS, kinds.LIMIT_LOADS.parameters(packing, mu=0.5)),
         ]
     return cells
 
@@ -220,7 +220,7 @@ def test_dask_workers_give_the_same_as_processes(tmp_path, by_processes, cluster
     cells, done = small_cells(), []
     failed = scan.run(
         tmp_path / "two",
-        [*cells, Cell(kinds.WALK, {**cells[0].parameters, "packing": {"imported": "0"}})],
+        [*cells, StudyCell(kinds.WALK, {**cells[0].parameters, "packing": {"imported": "0"}})],
         scheduler=cluster.scheduler_address,
         dtypes={"states": "float32"},
         on_done=lambda k, cached: done.append(cached),
@@ -241,7 +241,7 @@ def kill_one(processes):
 
 @pytest.mark.slow
 def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
-    cells = [Cell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
+    cells = [StudyCell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
     killed = []
 
     def kill(k, cached):
@@ -256,7 +256,7 @@ def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
 
 @pytest.mark.slow
 def test_a_killed_worker_process_costs_nothing_but_time(tmp_path):
-    cells = [Cell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
+    cells = [StudyCell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
     killed, told = [], []
 
     def kill(k, cached):
@@ -278,7 +278,7 @@ def die(*asked, **options):
 
 @pytest.mark.slow
 def test_a_cell_that_kills_its_worker_is_given_up(tmp_path):
-    deadly = Cell(kinds.WALK._replace(name="deadly", compute=die), cell())
+    deadly = StudyCell(kinds.WALK._replace(name="deadly", compute=die), cell())
     failed = scan.run(tmp_path / "s", [deadly])
     assert "died 3 times" in failed[0][1]
 
@@ -323,7 +323,7 @@ def test_a_scheduler_without_workers_says_so_and_goes_on_once_one_comes(
     tmp_path, monkeypatch, empty_cluster
 ):
     said = when_it_waits(monkeypatch, lambda: empty_cluster.scale(1))
-    cells = [Cell(kinds.WALK, cell())]
+    cells = [StudyCell(kinds.WALK, cell())]
     assert not scan.run(tmp_path / "s", cells, scheduler=empty_cluster.scheduler_address)
     assert len(said) == 1 and "no worker at the dask scheduler tcp://" in said[0]
     assert load(open_store(tmp_path / "s"), *cells[0]) is not None

@@ -61,8 +61,8 @@ def one_endless_path(S):
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
     path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
     rows = billiard.room_for_rows(made.count)
-    billiard.make_rows(made.rows, rows.kept, range(made.count))
-    billiard.fly(rows.kept, *path, out, cancelling.flag())
+    billiard.make_rows(made.rows, rows.cache, range(made.count))
+    billiard.fly(rows.cache, *path, out, cancelling.flag())
     cancelling.check()
 
 

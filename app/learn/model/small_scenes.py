@@ -102,7 +102,7 @@ def geometry(packing: Packing) -> dict[str, Any]:
     }
 
 
-def _balance(found: hulls.Hull) -> dict[str, Any]:
+def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
     return {
         "A": found.A.ravel(),
         "b": found.b,

@@ -217,7 +217,7 @@ def open_mercury(
     return Snapshots("time step", numbers, read, lost)
 
 
-class _Step(NamedTuple):
+class _TimeStep(NamedTuple):
     """The particles of one time step."""
 
     name: str
@@ -237,7 +237,7 @@ class _Step(NamedTuple):
 
 
 def _mercury_packing(
-    step: _Step,
+    step: _TimeStep,
     links: Table,
     mu: float,
     cell: Cell,
@@ -435,11 +435,11 @@ def _yade_bodies(source: Source) -> Table:
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 
 
-def _mercury_steps(source: Source) -> tuple[list[_Step], str]:
+def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
     """The time steps that are whole, at least one, and which one is cut off, in words."""
     name, rows, _ = _split(source)
     at = 0
-    steps: list[_Step] = []
+    steps: list[_TimeStep] = []
     while at < len(rows):
         number, fields = rows[at]
         lost = f"time step {len(steps)} is cut off in {name}"
@@ -463,7 +463,7 @@ def _mercury_steps(source: Source) -> tuple[list[_Step], str]:
                 f"{name}, line {number}: {fields[0][:20]} particles are announced, and "
                 f"{len(left)} lines follow; is the file cut off?"
             )
-        steps.append(_Step(name, float(head.numbers("time")[0]), len(fields), left))
+        steps.append(_TimeStep(name, float(head.numbers("time")[0]), len(fields), left))
         at += 1 + int(count)
     return steps, ""
 

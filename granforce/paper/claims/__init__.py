@@ -38,7 +38,7 @@ from granforce.paper.claims.figure5 import counts, enrichment, frozen, patterns,
 from granforce.paper.claims.figure6 import correlation, error_bars, origin
 from granforce.paper.claims.groups import SAMPLERS, outside
 from granforce.paper.claims.verdicts import FEW, MISSING, Claim
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 
 BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
 BY_WALKS = (*BY_SWEEPS, "nearest")
@@ -76,8 +76,8 @@ FAMILIES = {
 }
 
 
-def judged(table: Table) -> list[Claim]:
-    """All claims about a `tables.Table`, the paper's sampler first; those without data say so.
+def judged(table: StudyTable) -> list[Claim]:
+    """All claims about a `tables.StudyTable`, the paper's sampler first; those without data say so.
 
     Samplers of which the table has no row are left out, except the paper's.
     """

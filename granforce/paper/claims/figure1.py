@@ -30,7 +30,7 @@ from granforce.paper.claims.verdicts import (
     slope,
     turns,
 )
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 
 PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
 # How near its limits z has to come: its whole fall is 1.
@@ -38,7 +38,7 @@ NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 
 
-def agreement(table: Table, sampler: str) -> Iterator[Claim]:
+def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η1 ≈ η2 ≈ 0.15 η3 over all μ, up to a constant factor."""
     rows = dynamic(drawn(table, sampler))
     for above, below, word, good, fair in (
@@ -76,7 +76,7 @@ def peaked(
     return over_all(claim, what, peak, groups, good=good, fair=fair, least=3)
 
 
-def maximum(table: Table, sampler: str) -> Iterator[Claim]:
+def maximum(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η(μ) is largest near μ = 0.1."""
     rows = drawn(table, sampler)
     names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
@@ -90,7 +90,7 @@ def _measure_of(sampler: str) -> tuple[str, str]:
     return ("eta3", "η3") if sampler == "exact" else ("eta2", "η2")
 
 
-def small_friction(table: Table, sampler: str) -> Iterator[Claim]:
+def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η ∝ μ at small μ."""
     name, label = _measure_of(sampler)
     groups = positive_friction(items(drawn(table, sampler), name, positive=(name,)))
@@ -112,7 +112,7 @@ def small_friction(table: Table, sampler: str) -> Iterator[Claim]:
         )
 
 
-def vanishing(table: Table, sampler: str) -> list[Claim]:
+def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
     """η vanishes at μ = 0, where S is one point: as measured, not as it must be."""
     name, label = _measure_of(sampler)
     at_rest = [row for row in table.part(SAMPLERS[sampler]) if row["mu"] == 0 and enough(row)]
@@ -138,7 +138,7 @@ def skipped(row: dict[str, Any]) -> bool:
     return row.get("skipped_part", float(row["dimension"] == 0)) > 0
 
 
-def measure(table: Table, sampler: str) -> Iterator[Claim]:
+def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η3, from largest and smallest forces, does not depend on how states are drawn."""
     rows = [
         row | {"part_seen": row["eta3"] / exact["eta3"]}
@@ -158,7 +158,7 @@ def measure(table: Table, sampler: str) -> Iterator[Claim]:
 _AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
 
 
-def reproducible(table: Table, sampler: str) -> Iterator[Claim]:
+def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η of another walk, and of a longer one, in the same packing is the same."""
     part, first = _AGAIN[sampler], drawn(table, sampler)
     known = {(row["mu"], row["seed"]): row for row in first}
@@ -191,7 +191,7 @@ def reproducible(table: Table, sampler: str) -> Iterator[Claim]:
         )
 
 
-def causes(table: Table, sampler: str) -> Iterator[Claim]:
+def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Cones that open make η rise, contacts that vanish make it fall: each by itself."""
     opened = [row for row in table.part("opened_exact")]
     widest = max((row["mu"] for row in opened), default=np.nan)
@@ -228,7 +228,7 @@ def causes(table: Table, sampler: str) -> Iterator[Claim]:
         )
 
 
-def coordination(table: Table, sampler: str) -> Iterator[Claim]:
+def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """z falls from 4 towards 3."""
     rows = table.part("exact") or table.part("walk") or drawn(table, "gauss_seidel")
     groups = items(rows, "coordination")
@@ -248,7 +248,7 @@ def coordination(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def size(table: Table, sampler: str) -> Iterator[Claim]:
+def size(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η hardly depends on N."""
     name, label = _measure_of(sampler)
     part = {"exact": "size_exact", "nearest": "size", "gauss_seidel": "size_sweeps"}[sampler]

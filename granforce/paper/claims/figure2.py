@@ -9,21 +9,21 @@ from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
 FEWEST_SHELLS = 4  # fewer tell no law from another
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 
 
-def perturbation(table: Table, sampler: str) -> Iterator[Claim]:
+def perturbation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """F_crit and α are largest near μ = 0.1."""
     for name, label in _ANSWERS:
         groups = positive_friction(items(table.responses(), name))
         yield peaked(f"{label} is largest near μ = 0.1", groups)
 
 
-def response(table: Table, sampler: str) -> Iterator[Claim]:
+def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """F_crit and α rise with η, and are similar where η is."""
     eta, word = ("eta3", "exact η3") if sampler == "exact" else ("eta2", "η2")
     rows = table.answers(SAMPLERS[sampler], eta)
@@ -51,7 +51,7 @@ def response(table: Table, sampler: str) -> Iterator[Claim]:
         )
 
 
-def law(table: Table, sampler: str) -> Iterator[Claim]:
+def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The first motion falls with distance as a power law, and not exponentially."""
     found: dict[float, list[tuple[int, Any]]] = {}
     part = {row["part"] for row in table.responses()}

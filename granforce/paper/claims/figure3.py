@@ -17,10 +17,10 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import PRL, Claim, at_each, turns
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 
 
-def pairs(table: Table, sampler: str) -> Iterator[Claim]:
+def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
         "distances between pairs of states are sharply peaked",
@@ -31,7 +31,7 @@ def pairs(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def relative(table: Table, sampler: str) -> Iterator[Claim]:
+def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Weak contacts can change most for what they carry, and most at intermediate μ."""
     judged = may_be_judged(table, sampler)
     ratios: dict[float, list[tuple[int, float]]] = {}
@@ -56,7 +56,7 @@ def relative(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def centre(table: Table, sampler: str) -> Iterator[Claim]:
+def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The original network lies closer to the centre of S than sampled states."""
     name = "original_ratio" if sampler == "uniform" else "centre_ratio"
     rows = [

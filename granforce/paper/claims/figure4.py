@@ -19,7 +19,7 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
 # Of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
@@ -27,7 +27,7 @@ FLAT, RAISED = 0.05, 0.1
 TAILS = ((0.5, "median"), (0.75, "upper quartile"), (0.9, "upper decile"))
 
 
-def shape(table: Table, sampler: str) -> Iterator[Claim]:
+def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """P(ΔF_n) falls monotonically at small and large μ and has a peak between."""
     everywhere = sampled(table, sampler)
     scaled = each(everywhere, lambda values: values / values.mean())
@@ -62,7 +62,7 @@ def departure(values: Sequence[Floats], level: float) -> tuple[float, float, flo
     return value, max(low, 0.0), high
 
 
-def tails(table: Table, sampler: str) -> Iterator[Claim]:
+def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """How the tail of P(ΔF_n) falls at each μ, beyond several quantiles."""
     everywhere = sampled(table, sampler)
     for quantile, beyond in TAILS:
@@ -90,7 +90,7 @@ def _exponents(quantile: float) -> Callable[[Any, float], Any]:
     return lambda values, level: np.exp(statistics.jackknife(log_exponent, values, level))
 
 
-def widths(table: Table, sampler: str) -> Iterator[Claim]:
+def widths(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """ΔF_n and the width of its distribution are largest at intermediate μ."""
     everywhere = positive_friction(sampled(table, sampler))
     for measure, statement, what in (
@@ -101,7 +101,7 @@ def widths(table: Table, sampler: str) -> Iterator[Claim]:
         yield peaked(statement, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
 
 
-def elongation(table: Table, sampler: str) -> Iterator[Claim]:
+def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """S is elongated at small and at large μ: some of its extents are much larger than others."""
     ratio = each(sampled(table, sampler), lambda values: values.std() / values.mean())
     middle = within(ratio, MIDDLE)

@@ -16,11 +16,11 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import PRL, Claim, at_each
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Mask
 
 
-def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
+def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Groups:
     """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
     found: dict[Any, Any] = {}
     judged = may_be_judged(table, sampler)
@@ -32,7 +32,7 @@ def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
     return dict(sorted(found.items()))
 
 
-def counts(table: Table, sampler: str) -> Iterator[Claim]:
+def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """As many strong forces as large extents at μ = 0.1."""
     groups = _marked(
         table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
@@ -46,7 +46,7 @@ def counts(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
+def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Strong contacts are less determined than others at intermediate μ."""
     groups = _marked(table, sampler, _enriched)
     yield at_each(
@@ -58,7 +58,7 @@ def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def patterns(table: Table, sampler: str) -> Iterator[Claim]:
+def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Strong and undetermined contacts form different patterns at large μ."""
     groups = _marked(table, sampler, _enriched)
     yield at_each(
@@ -75,7 +75,7 @@ def _enriched(strong: Mask, loose: Mask) -> float:
     return loose[strong].mean() / loose.mean() if strong.any() and loose.any() else np.nan
 
 
-def place(table: Table, sampler: str) -> Iterator[Claim]:
+def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Indeterminacy is everywhere in a periodic packing."""
     rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
     yield at_each(
@@ -94,7 +94,7 @@ def place(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
-def frozen(table: Table, sampler: str) -> Iterator[Claim]:
+def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Inside a frozen boundary indeterminacy is everywhere at small μ, in clusters at large μ."""
     for part in ("frozen", "frozen_large"):
         rows = [row for row in table.part(part) if row.get("contacts")]

@@ -19,13 +19,13 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
 PERMUTATIONS = 40
 
 
-def correlation(table: Table, sampler: str) -> Iterator[Claim]:
+def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """corr(f_n, ΔF_n): significant at intermediate μ, weaker at small, vanishing at large μ."""
     rows = [row for row in drawn(table, sampler) if row["mu"] > 0]
     everywhere = items(rows, "correlation")
@@ -63,7 +63,7 @@ def correlation(table: Table, sampler: str) -> Iterator[Claim]:
         )
 
 
-def origin(table: Table, sampler: str) -> Iterator[Claim]:
+def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The correlation comes from intervals alone: it is the same wherever f_n lies in them."""
     judged = may_be_judged(table, sampler)
     found: dict[float, list[tuple[int, float]]] = {}
@@ -104,7 +104,7 @@ def _mean_difference(keys: Floats, means: Floats, span: Ends) -> float:
     return means[outer].mean() - means[inner].mean() if outer.any() and inner.any() else np.nan
 
 
-def error_bars(table: Table, sampler: str) -> Iterator[Claim]:
+def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The paper's error bars, the range over all other networks of the walk."""
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from granforce.measures import statistics
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Rows
 
 Ends = tuple[float, float]  # of a range or of an interval
@@ -30,19 +30,19 @@ WHOLE_WALK = 0.3
 DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
-def drawn(table: Table, sampler: str) -> list[dict[str, Any]]:
+def drawn(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
     """Rows of a sampler that may be judged: see `may_be_judged`."""
     judged = may_be_judged(table, sampler)
     return [row for row in table.part(SAMPLERS[sampler]) if judged(row)]
 
 
-def may_be_judged(table: Table, sampler: str) -> Callable[[dict[str, Any]], bool]:
+def may_be_judged(table: StudyTable, sampler: str) -> Callable[[dict[str, Any]], bool]:
     """Whether a row's states are enough, and lie in S or near it."""
     beyond = outside(table, SAMPLERS[sampler])
     return lambda row: enough(row) and row["mu"] not in beyond
 
 
-def outside(table: Table, part: str) -> list[float]:
+def outside(table: StudyTable, part: str) -> list[float]:
     """The μ at which states reach beyond the exact intervals by more than those are long.
 
     Sweeps that end early leave networks that are not balanced: what they differ by is then no
@@ -53,7 +53,7 @@ def outside(table: Table, part: str) -> list[float]:
     ]
 
 
-def excesses(table: Table, part: str) -> dict[float, tuple[float, float]]:
+def excesses(table: StudyTable, part: str) -> dict[float, tuple[float, float]]:
     """{μ: how far the intervals of states reach beyond the exact ones, how long those are}.
 
     Means over components and over the packings that have both, in ⟨f_n⟩.
@@ -94,7 +94,7 @@ def items(
     return {key: found[key] for key in sorted(found)}
 
 
-def sampled(table: Table, sampler: str) -> Groups:
+def sampled(table: StudyTable, sampler: str) -> Groups:
     """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
     found: dict[Any, Any] = {}
     judged = may_be_judged(table, sampler)
