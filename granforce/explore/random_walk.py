@@ -7,7 +7,7 @@ and for every perturbation; it visits the same kind of states (see `granforce be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -154,9 +154,19 @@ def walk(
         with cancelling.threads(workers) as pool:
             groups = _groups(all_chains, relax, workers, options)
             list(pool.map(lambda group: _run(group, relax, tell, watch, enough, options), groups))
-    *fields, counts = zip(*(chain.walked() for chain in all_chains), strict=True)
-    summed = {name: sum(own[name] for own in counts) for name in counts[0]}
-    return Walk._make([*(np.concatenate(field) for field in fields), summed])
+    return _joined([chain.walked() for chain in all_chains])
+
+
+def _joined(walks: Sequence[Walk]) -> Walk:
+    """The walks of several chains, one after the other."""
+    return Walk(
+        states=np.concatenate([one.states for one in walks]),
+        residual=np.concatenate([one.residual for one in walks]),
+        violation=np.concatenate([one.violation for one in walks]),
+        sweeps=np.concatenate([one.sweeps for one in walks]),
+        attempts=np.concatenate([one.attempts for one in walks]),
+        counts={name: sum(one.counts[name] for one in walks) for name in walks[0].counts},
+    )
 
 
 def _groups(
@@ -239,8 +249,14 @@ class _Chain:
         # At the packing's own network, or at the nearest admissible one if that left S.
         self.forces, self.rng = np.array(starting_network(ensemble)), np.random.default_rng(seed)
         self.counts = {"accepted": 0, "rejected": 0, "unconverged": 0, "skipped": 0}
-        room = np.empty((states, *self.forces.shape)), *np.empty((2, states))
-        self.walk = Walk._make([*room, *np.zeros((2, states), dtype=np.int64), self.counts])
+        self.walk = Walk(
+            states=np.empty((states, *self.forces.shape)),
+            residual=np.empty(states),
+            violation=np.empty(states),
+            sweeps=np.zeros(states, dtype=np.int64),
+            attempts=np.zeros(states, dtype=np.int64),
+            counts=self.counts,
+        )
 
     @property
     def done(self) -> bool:
@@ -254,8 +270,10 @@ class _Chain:
         if len(begun.states) > len(self.walk.states) or tried != sum(begun.counts.values()):
             raise InputError("the walk to go on from has more states, or ended between two")
         self.counts.update(begun.counts)
-        for mine, before in zip(self.walk[:-1], begun[:-1], strict=True):
-            mine[: len(begun.states)] = before
+        count = len(begun.states)
+        self.walk.states[:count], self.walk.residual[:count] = begun.states, begun.residual
+        self.walk.violation[:count], self.walk.sweeps[:count] = begun.violation, begun.sweeps
+        self.walk.attempts[:count] = begun.attempts
         for _ in range(tried):  # each attempt drew so many numbers
             self.rng.uniform(size=self.forces.shape)
         self.forces = begun.states[-1]
@@ -283,26 +301,28 @@ class _Chain:
 
     def take(self, relaxation: Relaxation, options: dict[str, Any]) -> bool:
         """Count an attempt, and keep its state if it is accepted; whether it was."""
-        (states, residual, violation, sweeps, attempts, counts), k = (
-            self.walk,
-            self.counts["accepted"],
-        )
+        walk, k = self.walk, self.counts["accepted"]
         outcome = judge(relaxation, options.get("tolerance", BALANCED))
-        counts[outcome] += 1
-        sweeps[k] += relaxation.iterations
-        attempts[k] += 1
+        self.counts[outcome] += 1
+        walk.sweeps[k] += relaxation.iterations
+        walk.attempts[k] += 1
         if outcome != "accepted":
             return False
-        states[k] = self.forces = relaxation.forces
-        residual[k], violation[k] = relaxation.residual, relaxation.violation
+        walk.states[k] = self.forces = relaxation.forces
+        walk.residual[k], walk.violation[k] = relaxation.residual, relaxation.violation
         return True
 
     def found(self, k: int = -1) -> Found:
         """A state accepted, by default the last one."""
         k %= self.counts["accepted"]
-        states, residual, violation, _, attempts, _ = self.walk
-        numbers = float(residual[k]), float(violation[k]), int(attempts[k])
-        return Found(self.number, k, states[k].copy(), *numbers)
+        return Found(
+            chain=self.number,
+            number=k,
+            forces=self.walk.states[k].copy(),
+            residual=float(self.walk.residual[k]),
+            violation=float(self.walk.violation[k]),
+            attempts=int(self.walk.attempts[k]),
+        )
 
     def stay(self) -> None:
         """Every state is where the chain stands: S is this one point."""
@@ -314,4 +334,11 @@ class _Chain:
     def walked(self) -> Walk:
         """The walk with the states that it has."""
         count = self.counts["accepted"] + self.counts["skipped"]
-        return Walk._make([*(field[:count] for field in self.walk[:-1]), self.counts])
+        return Walk(
+            states=self.walk.states[:count],
+            residual=self.walk.residual[:count],
+            violation=self.walk.violation[:count],
+            sweeps=self.walk.sweeps[:count],
+            attempts=self.walk.attempts[:count],
+            counts=self.counts,
+        )

@@ -113,7 +113,16 @@ def volume(
     grains = max(1, len(ensemble.grains))
     if not made.dimension:
         counts = dict.fromkeys(("rungs", "paths", *_COUNTS), 0)
-        return Volume(0.0, 0.0, 0, 0.0, np.zeros(2), True, counts, time.perf_counter() - begin)
+        return Volume(
+            log_volume=0.0,
+            error=0.0,
+            dimension=0,
+            per_grain=0.0,
+            ladders=np.zeros(2),
+            reached=True,
+            counts=counts,
+            seconds=time.perf_counter() - begin,
+        )
     top, log_top, top_variance = _top(made, np.random.default_rng([seed, 0]))
     stores = uniform.stores_for(made, workers, workers)
     rungs = _climbed(made, stores[0], top, seed)
@@ -131,8 +140,14 @@ def volume(
     counts = {"rungs": len(rungs[0]), "paths": int(sum(len(r.q) for way in rungs for r in way))}
     counts |= {name: sum(getattr(r, name) for way in rungs for r in way) for name in _COUNTS}
     return Volume(
-        *(found, float(error), made.dimension, found / grains, ladders),
-        *(bool(error <= accuracy and agree), counts, time.perf_counter() - begin),
+        log_volume=found,
+        error=float(error),
+        dimension=made.dimension,
+        per_grain=found / grains,
+        ladders=ladders,
+        reached=bool(error <= accuracy and agree),
+        counts=counts,
+        seconds=time.perf_counter() - begin,
     )
 
 
@@ -199,8 +214,15 @@ def _settled(
     seed: list[int],
 ) -> _Rung:
     """A rung whose chain has left where it came from, with the paths after that."""
-    end = uniform.ChainState(slacks, np.random.default_rng(seed))
-    fresh = _Rung(beta, reach, end, np.zeros(0), np.zeros(0), 0, 0)
+    fresh = _Rung(
+        beta=beta,
+        reach=reach,
+        end=uniform.ChainState(slacks, np.random.default_rng(seed)),
+        q=np.zeros(0),
+        x=np.zeros(0),
+        turns=0,
+        refused=0,
+    )
     begun = _flown(made, rows, fresh, _PILOT)
     return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
 
@@ -221,9 +243,13 @@ def _flown(made: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Ru
         (end,), outs, done = uniform.flown(made, rows, [end], [(speeds, lengths, middle)])
         found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
-    turns, refused = rung.turns + int(counts[0]), rung.refused + int(counts[1])
-    q, x = np.concatenate(found), np.concatenate(drawn)
-    return _Rung(beta, rung.reach, end, q, x, turns, refused)
+    return rung._replace(
+        end=end,
+        q=np.concatenate(found),
+        x=np.concatenate(drawn),
+        turns=rung.turns + int(counts[0]),
+        refused=rung.refused + int(counts[1]),
+    )
 
 
 def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import weakref
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
@@ -120,29 +120,47 @@ def forces_of(ensemble: Ensemble, y: Floats) -> Floats:
     return ensemble.pin(forces)
 
 
-_known: weakref.WeakKeyDictionary[Ensemble, list[Any]] = weakref.WeakKeyDictionary()
-_systems: weakref.WeakKeyDictionary[Ensemble, certified_values.System] = weakref.WeakKeyDictionary()
-_centres: weakref.WeakKeyDictionary[Ensemble, Centre] = weakref.WeakKeyDictionary()
+@dataclass
+class _Shared:
+    """What the programs of one ensemble share; what is None is made on first use."""
+
+    problem: Problem
+    idle: Floats  # (rows,) 1 for rows that the ensemble does not have
+    independent: Problem | None = None
+    centre: Centre | None = None
+    system: certified_values.System | None = None
+
+
+# As long as the ensembles live; a field of theirs would go with them to other processes.
+_shared: weakref.WeakKeyDictionary[Ensemble, _Shared] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
+
+
+def _shared_of(ensemble: Ensemble) -> _Shared:
+    with _lock:
+        if ensemble not in _shared:
+            problem, idle = make_problem(ensemble)
+            _shared[ensemble] = _Shared(problem, idle)
+        return _shared[ensemble]
 
 
 def problem_of(ensemble: Ensemble) -> Problem:
     """The Problem for networks nearest to others: all rows, those that others imply shifted."""
-    return _kept(ensemble)[0]
+    return _shared_of(ensemble).problem
 
 
 def independent_problem_of(ensemble: Ensemble) -> Problem:
     """The Problem for linear programs: independent rows, exactly."""
-    kept = _kept(ensemble)
-    if len(kept) == 2:
-        problem, idle = kept
+    shared = _shared_of(ensemble)
+    if shared.independent is None:
+        problem, idle = shared.problem, shared.idle
         if len(ensemble.frozen) and ensemble.A.shape[0] <= MOST_DENSE:
             out = np.zeros(len(idle), bool)
             out[problem.place] = _dependent_rows(ensemble)
         else:
             out = interior_point.dependent_rows(problem, idle)
-        kept.append(contact_program.without_rows(problem, idle, out))
-    return kept[2]
+        shared.independent = contact_program.without_rows(problem, idle, out)
+    return shared.independent
 
 
 def _dependent_rows(ensemble: Ensemble) -> Mask:
@@ -159,21 +177,12 @@ def _dependent_rows(ensemble: Ensemble) -> Mask:
     return out
 
 
-def _kept(ensemble: Ensemble) -> list[Any]:
-    """[Problem, idle rows, …], made on first use and kept as long as the ensemble."""
-    with _lock:
-        found = _known.get(ensemble)
-        if found is None:
-            found = _known[ensemble] = list(make_problem(ensemble))
-    return found
-
-
 def centre_of(ensemble: Ensemble) -> Centre:
     """The analytic centre of an ensemble's independent Problem, found on first use."""
-    found = _centres.get(ensemble)
-    if found is None:
-        found = _centres[ensemble] = linear_programs.centre(independent_problem_of(ensemble))
-    return found
+    shared = _shared_of(ensemble)
+    if shared.centre is None:
+        shared.centre = linear_programs.centre(independent_problem_of(ensemble))
+    return shared.centre
 
 
 def make_system(ensemble: Ensemble) -> certified_values.System:
@@ -183,10 +192,10 @@ def make_system(ensemble: Ensemble) -> certified_values.System:
     errors as those of `certified_values.make_system`.
     """
     cancelling.check()
-    found = _systems.get(ensemble)
-    if found is None:
-        found = _systems[ensemble] = _new_system(ensemble)
-    return found
+    shared = _shared_of(ensemble)
+    if shared.system is None:
+        shared.system = _new_system(ensemble)
+    return shared.system
 
 
 def _new_system(ensemble: Ensemble) -> certified_values.System:

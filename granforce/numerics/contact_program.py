@@ -78,7 +78,8 @@ class Workspace(NamedTuple):
     K: Floats  # (3 N_c, W) nn, nt, tt
     h: Floats  # (n + 1, W)
     dy: Floats  # (n + 1, W)
-    turn: Floats  # (n + 1, W) δy δz of the predictor, then δz
+    turn: Floats  # (n + 1, W) δy δz of the predictor
+    dz: Floats  # (n + 1, W)
     r: Floats  # (rows, W) b − A T y − a F
     r_border: Floats  # (m, W)
     dv: Floats  # (rows, W)
@@ -120,6 +121,7 @@ def make_workspace(problem: Problem, width: int) -> Workspace:
         h=room(n + 1, width),
         dy=room(n + 1, width),
         turn=room(n + 1, width),
+        dz=room(n + 1, width),
         r=room(rows, width),
         r_border=room(m, width),
         dv=room(rows, width),

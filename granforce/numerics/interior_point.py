@@ -148,7 +148,7 @@ def advance(problem, loads, mode, at, work, lanes):
     if optimum or mode == CENTRE:
         _measure(pairs, _INSIDE if optimum else _CENTRING, at, work, lanes)
         primal, dual = load(work.primal, 0, lanes), load(work.dual, 0, lanes)
-        _move(at.z, work.turn, dual, pairs, lanes)
+        _move(at.z, work.dz, dual, pairs, lanes)
     if mode != PROJECTED:
         _move(at.y, work.dy, primal, pairs, lanes)
     if mode != BALANCE:
@@ -360,7 +360,7 @@ def _aim(problem, pairs, at, work, lanes):
 
 @within
 def _measure(pairs, inside, at, work, lanes):
-    """Lengths of the step, part `inside` of the way to the nearest wall at most, and its δz."""
+    """Lengths of the step, part `inside` of the way to the nearest wall at most, and δz."""
     primal = dual = same(lanes, inside)
     target = load(work.target, 0, lanes)
     for k in range(pairs):
@@ -369,7 +369,7 @@ def _measure(pairs, inside, at, work, lanes):
         dz = fma(-z, ratio, (target - load(work.turn, k, lanes)) / y - z)
         primal = larger(-ratio, primal)
         dual = larger(-dz / z, dual)
-        store(work.turn, k, lanes, dz)
+        store(work.dz, k, lanes, dz)
     going = load(work.going, 0, lanes) * inside
     store(work.primal, 0, lanes, going / primal)
     store(work.dual, 0, lanes, going / dual)

@@ -26,7 +26,10 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
+from granforce.system.compiled import skip_unreadable_indices
 from granforce.types import Floats
+
+skip_unreadable_indices()
 
 LANES = 8
 # Kernels that are called from Python, and those that are called by kernels only: without what the

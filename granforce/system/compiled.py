@@ -68,6 +68,24 @@ def compile_ahead(statement: str, last: str) -> bool:
     return False
 
 
+def skip_unreadable_indices() -> None:
+    """Let numba compile kernels anew whose cached index names a class that has gone.
+
+    It unpickles the index before it compares dates, and would raise after an upgrade of granforce.
+    """
+    from numba.core.caching import IndexDataCacheFile
+
+    read = IndexDataCacheFile._load_index
+
+    def read_or_none(self: Any) -> Any:
+        try:
+            return read(self)
+        except (AttributeError, ImportError):
+            return {}
+
+    IndexDataCacheFile._load_index = read_or_none
+
+
 def _usual_places() -> Iterator[Path]:
     """Where numba looks first: beside the sources, then the user's folder of caches."""
     yield Path(__file__).parent / "__pycache__"

@@ -8,8 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import granforce
+from granforce.numerics import lanes
 from granforce.system import compiled
 
 PACKAGE = Path(granforce.__file__).parent
@@ -84,3 +86,18 @@ def test_a_folder_of_somebody_else_is_not_taken(tmp_path):
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     usual.symlink_to(tmp_path / "elsewhere")
     assert compiled.temporary_place(tmp_path) != str(usual)
+
+
+def test_kernels_kept_by_another_version_are_compiled_anew(tmp_path, monkeypatch):
+    """Their index may name a class that has gone, which unpickling does not survive."""
+    kept = IndexDataCacheFile(str(tmp_path), "kernel", 1)
+    monkeypatch.setattr(
+        lanes, "Gone", type("Gone", (), {"__module__": lanes.__name__}), raising=False
+    )
+    kept.save(lanes.Gone, "compiled")
+    assert kept.load(lanes.Gone) == "compiled"
+    key = lanes.Gone
+    monkeypatch.undo()
+    assert kept.load(key) is None
+    kept.save("another", "compiled anew")
+    assert kept.load("another") == "compiled anew"
