@@ -265,13 +265,13 @@ def _apart(rows: Rows, others: Rows, name: str) -> float:
     return float(apart.mean() / (apart.std(ddof=1) / np.sqrt(len(apart))))
 
 
-def headlines(table: Table, claims: Rows, findings: Rows) -> str:
+def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """The first highlights as a list."""
     found = highlights(table, claims, findings)[:HEADLINES]
     return "".join(f"- {one.sentence}\n" for one in found)
 
 
-def highlighted(table: Table, claims: Rows, findings: Rows) -> str:
+def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """All highlights as a numbered list, each with its figure and how it was measured."""
     return "".join(
         f"{k}. {one.sentence} ([figure]({FIGURES}/{one.figure}.png), "

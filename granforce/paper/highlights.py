@@ -7,7 +7,7 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper.claims.groups import SAMPLERS
-from granforce.paper.tables import Table
+from granforce.paper.tables import StudyTable
 from granforce.types import Rows
 
 WALK_OVER_EXACT = "η3 of the walk's states over exact η3, intermediate μ"
@@ -26,7 +26,7 @@ class Highlight(NamedTuple):
 class _Numbers:
     """The numbers that sentences quote; KeyError for those that the study lacks."""
 
-    def __init__(self, table: Table, claims: Rows, findings: Rows) -> None:
+    def __init__(self, table: StudyTable, claims: Rows, findings: Rows) -> None:
         self.table = table
         self._judged = {(row["statement"], row["sampler"]): row for row in (*claims, *findings)}
 
@@ -173,7 +173,7 @@ SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
 )
 
 
-def highlights(table: Table, claims: Rows, findings: Rows) -> list[Highlight]:
+def highlights(table: StudyTable, claims: Rows, findings: Rows) -> list[Highlight]:
     """The findings for which the study has all numbers."""
     numbers, found = _Numbers(table, claims, findings), []
     for sentence in SENTENCES:
