@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from granforce.cli import parsing
-from granforce.cli.parser import make_parser
+from granforce.cli.words import make_parser
 
 LONG = "9" * 30
 WHOLE = ["-1", "0", "1", "2", "1.5", "nan", "", "three", "1e3", LONG]

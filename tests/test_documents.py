@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.cli.parser import main, make_parser
+from granforce.cli.parser import main
+from granforce.cli.words import make_parser
 from granforce.paper import claims, documents, tables
 
 ROOT = Path(__file__).parents[1]

@@ -9,10 +9,8 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from granforce import __version__
-from granforce.cli import words
-from granforce.cli.options import EXAMPLE
 from granforce.cli.parsing import Input, Output, Parser, StorePath, Workplace, refused
+from granforce.cli.words import make_parser
 from granforce.system import interrupts, streams
 
 # Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
@@ -118,17 +116,3 @@ def _told_interrupted() -> int:
 def _say_compiling() -> None:
     # As a line of progress, which later ones may follow on the same row.
     print("\rgranforce: compiling, once per machine …", file=sys.stderr)
-
-
-def make_parser() -> Parser:
-    parser = Parser(
-        prog="granforce",
-        description="Explore how undetermined the forces in a packing of rigid disks are.",
-        epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
-        formatter_class=EXAMPLE,
-    )
-    parser.add_argument("--version", action="version", version=f"granforce {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for add in words.COMMANDS:
-        add(commands)
-    return parser

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from granforce import __version__
 from granforce.cli.options import (
+    EXAMPLE,
     Commands,
     add_any_packing,
     add_cell,
@@ -25,7 +27,7 @@ from granforce.cli.options import (
     import_format,
     subcommand,
 )
-from granforce.cli.parsing import Edited, Input, Output, StorePath, Workplace
+from granforce.cli.parsing import Edited, Input, Output, Parser, StorePath, Workplace
 
 
 def add_pack(commands: Commands) -> None:
@@ -547,3 +549,18 @@ COMMANDS = (
     ),
     add_cache,
 )
+
+
+def make_parser() -> Parser:
+    """The parser of the whole command line."""
+    parser = Parser(
+        prog="granforce",
+        description="Explore how undetermined the forces in a packing of rigid disks are.",
+        epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
+        formatter_class=EXAMPLE,
+    )
+    parser.add_argument("--version", action="version", version=f"granforce {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for add in COMMANDS:
+        add(commands)
+    return parser

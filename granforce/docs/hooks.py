@@ -14,7 +14,7 @@ from mkdocs.structure.pages import Page
 
 import granforce
 from granforce import glossary
-from granforce.cli.parser import make_parser
+from granforce.cli.words import make_parser
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "examples.md"

@@ -6,7 +6,8 @@ import itertools
 import pytest
 
 from granforce.cli.commands.packings import READERS
-from granforce.cli.parser import main, make_parser
+from granforce.cli.parser import main
+from granforce.cli.words import make_parser
 from granforce.experiment.pegs import read_pegs
 
 FILES = {"help", "json", "out", "measured", "grains", "contacts"}

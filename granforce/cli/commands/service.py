@@ -120,7 +120,7 @@ def completion(arguments: argparse.Namespace) -> None:
     """The script with which a shell completes what is typed."""
     import shtab
 
-    from granforce.cli.parser import make_parser
+    from granforce.cli.words import make_parser
 
     parser = make_parser()
     for action in parser.every_action():
