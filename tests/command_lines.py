@@ -55,7 +55,7 @@ EXACT = {
     "--ensemble-mu": FRICTION,
     "--contacts": CONTACTS,
     "--slice": SLICES,
-    "--csv": OUTPUTS,
+    "--out": OUTPUTS,
     **CONDITIONS,
     **KNOWN,
 }
@@ -122,7 +122,7 @@ COMMANDS = {
         | {
             "--ensemble-mu": FRICTION,
             "--angles": [*WHOLE, "5000", LONG],
-            "--csv": OUTPUTS,
+            "--out": OUTPUTS,
             **KNOWN,
         },
     ),
@@ -136,7 +136,7 @@ COMMANDS = {
             "--draw-seed": SEEDS,
             "--ensemble-mu": FRICTION,
             "--precision": [*POSITIVE, "1e-300"],
-            "--csv": OUTPUTS,
+            "--out": OUTPUTS,
         },
     ),
     "scan": (

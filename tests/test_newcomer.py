@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from packings import packed
 
 import granforce as gf
@@ -142,7 +143,7 @@ def test_report_table_and_library_agree_in_the_unit_that_names_carry(unit, cache
     gf.save_packing(packed(30, 0.3), "p.npz")
     S = gf.ensemble(packed(30, 0.3))
     scale = {"packing": 1, "mean": S.force_scale}[unit]
-    words = ["--packing", "p.npz", "--unit", unit, "--csv", "table.csv"]
+    words = ["--packing", "p.npz", "--unit", unit, "--out", "table.csv"]
     told, exact = report(capsys, "intervals", *words), gf.intervals(S)
     table = pd.read_csv("table.csv")
     assert table[f"f_t_high [{unit}]"].to_numpy() == pytest.approx(
@@ -222,3 +223,29 @@ def test_a_packing_is_drawn_with_states_and_walls(suffix, colour, tmp_path):
     assert (tmp_path / f"picture.{suffix}").stat().st_size > 5000
     with pytest.raises(gf.InputError, match=r"contacts=S\.index"):
         gf.plot(packing, states[:, :1])
+
+
+@pytest.mark.parametrize("command", ["walk", "uniform"])
+def test_states_are_written_in_the_format_of_the_suffix(command, cache, capsys):
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    words = [command, "--packing", "p.npz", "--states", "8"]
+    for suffix in ("csv", "npz", "zarr"):
+        assert main([*words, "--out", f"states.{suffix}"]) == 0
+    table, arrays = pd.read_csv("states.csv"), np.load("states.npz")
+    dataset, S = xr.open_zarr("states.zarr"), gf.ensemble(packed(30, 0.3))
+    states = arrays["states [packing]"]
+    assert np.array_equal(dataset["states [packing]"], states) and len(states) >= 8
+    assert np.array_equal(dataset["contact"], S.index) and S.residual(states).max() < 1e-9
+    assert np.allclose(table["f_t [packing]"], states[..., 1].ravel(), rtol=1e-15)
+    assert np.array_equal(table["j"][: len(S.index)], S.contacts.j)
+    assert main([*words, "--out", "mean.csv", "--unit", "mean"]) == 0
+    mean = pd.read_csv("mean.csv")["f_n [mean]"] * S.force_scale
+    assert np.allclose(mean, table["f_n [packing]"], rtol=1e-12)
+
+
+def test_a_suffix_that_is_not_known_is_refused(cache, capsys):
+    for words in ("pack -n 20 --mu 0.3 --out p.csv", "walk -n 20 --mu 0.3 --out states.xlsx"):
+        assert main(words.split()) == 2
+        told = capsys.readouterr().err
+        assert "the name must end with .npz" in told or ".csv, .npz or .zarr" in told
+    assert list(cache.iterdir()) == []

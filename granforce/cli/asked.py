@@ -17,6 +17,7 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
+from granforce.study.series import check_folder, save_series
 from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, written
 from granforce.system.terminal import Bar
@@ -49,7 +50,9 @@ def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[A
 def check_outputs(*paths: str | None) -> None:
     """Files that cannot be written are told before anything is computed."""
     for path in paths:
-        if path is not None:
+        if path is not None and path.endswith(".zarr"):
+            check_folder(path)
+        elif path is not None:
             check_file(path)
 
 
@@ -77,6 +80,7 @@ def required_mu(arguments: argparse.Namespace) -> float:
 def store_of(arguments: argparse.Namespace) -> Store:
     """The store of a command, by which it is known at the end whether all results were kept."""
     arguments.store = open_store(arguments.cache)
+    arguments.store.make()  # before anything is computed for it
     return arguments.store
 
 
@@ -251,6 +255,51 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
         lines["directions_taken_as_pinned"] = dataset["flat_directions"].item()
         lines["as_narrower_than"] = dataset["resolution"].item()
     return lines
+
+
+def write_columns(path: str, columns: Mapping[str, Any]) -> None:
+    """Columns {name: array}, contact by contact or so, in the format of a suffix."""
+    if path.endswith(".zarr"):
+        rows = next(iter(columns))
+        named = {name: (rows, values) for name, values in columns.items() if name != rows}
+        save_series(xr.Dataset(named, {rows: columns[rows]}), path)
+    elif path.endswith(".npz"):
+        write_arrays(path, columns)
+    else:
+        write_csv(path, columns)
+
+
+def write_arrays(path: str, arrays: Mapping[str, Any]) -> None:
+    with written(path) as file:
+        np.savez(file, **arrays)
+
+
+def write_states(
+    arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
+) -> None:
+    """The states of a walk or sample with their contacts, where --out asks for them."""
+    path = arguments.out
+    if path is None:
+        return
+    packing, _ = get_packing(arguments.store, parameters["packing"])
+    numbers, forces = dataset["backbone"].values, unit(arguments, dataset)
+    contacts, at = packing.contacts.picked(numbers), packing.contact_points[numbers]
+    labels = {"contact": numbers, "i": contacts.i, "j": contacts.j, "x": at[:, 0], "y": at[:, 1]}
+    states = dataset["states"].values.astype(np.float64)
+    if path.endswith(".npz"):
+        write_arrays(path, {**forces.named({"states": states}), **labels})
+    elif path.endswith(".zarr"):
+        (name, values), *_ = forces.named({"states": states}).items()
+        coordinates: dict[str, Any] = {k: ("contact", column) for k, column in labels.items()}
+        coordinates["component"] = ["f_n", "f_t"]
+        dims = ("state", "contact", "component")
+        save_series(xr.Dataset({name: (dims, values)}, coordinates), path)
+    else:
+        count = len(states)
+        columns = {"state": np.repeat(np.arange(count), len(numbers))}
+        columns |= {label: np.tile(column, count) for label, column in labels.items()}
+        pair = {"f_n": states[..., 0].ravel(), "f_t": states[..., 1].ravel()}
+        write_csv(path, columns | forces.named(pair))
 
 
 def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:

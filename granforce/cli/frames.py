@@ -35,6 +35,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if arguments.out is not None:
         series.check_folder(arguments.out)
     store = open_store(arguments.cache)
+    store.make()
     with Bar("frames", "frame") as progress:
         dataset, failed = series.infer_series(
             store.path,
@@ -69,6 +70,7 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     if arguments.out is not None:
         series.check_folder(arguments.out)
     store = open_store(arguments.cache)
+    store.make()
     if snapshots.lost:
         print(f"granforce: {snapshots.lost}", file=sys.stderr)
     with Bar("snapshots", "cell") as progress:

@@ -92,6 +92,9 @@ def add_series(command: Parser) -> None:
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_scheduler(group)
     add_store(group)
+    for action in command._actions:
+        if action.dest == "out":  # a folder for all of them
+            action.metavar = "FILE.{npz,zarr}"
     series = command.options.keys() - others - {"frames"}
     command.leaves_out("without --frames", lambda asked: asked.frames is None, series)
     command.leaves_out("with --frames", lambda asked: asked.frames is not None, {"frame"})
@@ -254,6 +257,21 @@ def add_unit(command: argparse._ActionsContainer) -> None:
     )
 
 
+def add_out(command: argparse._ActionsContainer, what: str) -> None:
+    command.add_argument(
+        "--out",
+        type=Output,
+        metavar="FILE.{csv,npz,zarr}",
+        help=f"write {what}: a table (.csv), arrays (.npz) or an xarray dataset (.zarr)",
+    )
+
+
+def add_states_out(command: Parser) -> None:
+    add_out(command, "the states")
+    add_unit(command)
+    command.leaves_out("without --out", lambda asked: asked.out is None, {"unit"})
+
+
 def add_scheduler(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--scheduler",
@@ -278,9 +296,7 @@ def add_exact(command: Parser) -> None:
         help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument(
-        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
-    )
+    add_out(group, "the result per contact")
     add_unit(group)
     add_conditions(command)
     add_store(command)

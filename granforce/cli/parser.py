@@ -94,6 +94,7 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
 
 def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
     """InputError where a file that is read would be replaced, or two results have one name."""
+    from granforce.records import InputError
     from granforce.study.store import default_path
     from granforce.system.files import check_apart
 
@@ -106,6 +107,8 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
         stores=[(typed, path) for typed, path in named if isinstance(path, StorePath)],
         read=[(typed, path) for typed, path in named if isinstance(path, Input)],
     )
+    if strange := command.strange_suffix(arguments):
+        raise InputError(strange)
 
 
 def _told_interrupted() -> int:

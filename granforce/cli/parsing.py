@@ -6,6 +6,9 @@ Only the standard library, as for all that `--help` needs.
 from __future__ import annotations
 
 import argparse
+import os
+import re
+import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, NoReturn
@@ -38,6 +41,15 @@ class Edited(str):
 
 
 ROLES = (Input, Output, Workplace, StorePath, Edited)
+
+
+def _no_file(path: str) -> bool:
+    """Whether a path is a device, a pipe or an open file, which have no suffix."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
 
 
 class Unused(NamedTuple):
@@ -131,6 +143,22 @@ class Parser(argparse.ArgumentParser):
                 chosen: Parser = action.choices[getattr(arguments, action.dest)]
                 return chosen.chosen(arguments)
         return self
+
+    def strange_suffix(self, arguments: argparse.Namespace) -> str | None:
+        """What is wrong with the suffix of a file to be written, which decides on its format.
+
+        A metavar names those that there are: FILE.npz, FILE.{csv,npz,zarr}.
+        """
+        for action in self._actions:
+            path = getattr(arguments, action.dest, None)
+            known = re.search(r"\.\{?([a-z,]+)\}?$", str(action.metavar))
+            if isinstance(path, Output) and known and not _no_file(path):
+                suffixes = [f".{suffix}" for suffix in known[1].split(",")]
+                if not path.endswith(tuple(suffixes)):
+                    *others, last = suffixes
+                    words = f"{', '.join(others)} or {last}" if others else last
+                    return f"{action.option_strings[-1]} {path}: the name must end with {words}"
+        return None
 
     def paths(self, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
         """(as it is typed, path in its role) of every path that a command line names."""

@@ -14,12 +14,14 @@ from granforce.cli.options import (
     add_flaws_and_walls,
     add_frame,
     add_known,
+    add_out,
     add_packing,
     add_reading,
     add_reverse,
     add_scheduler,
     add_series,
     add_source,
+    add_states_out,
     add_store,
     add_unit,
     add_walk_options,
@@ -60,9 +62,10 @@ def add_walk(commands: Commands) -> None:
         commands,
         "walk",
         "walk at random through the force networks of a packing",
-        "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
+        "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000 --out states.zarr",
     )
     add_source(command)
+    add_states_out(command)
 
 
 def add_uniform(commands: Commands) -> None:
@@ -84,6 +87,7 @@ def add_uniform(commands: Commands) -> None:
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
     add_store(command)
+    add_states_out(command)
 
 
 def add_volume(commands: Commands) -> None:
@@ -302,7 +306,7 @@ def add_intervals(commands: Commands) -> None:
         commands,
         "intervals",
         "compute the exact interval of every contact force",
-        "granforce intervals -n 400 --mu 0.1 --seed 1 --csv bounds.csv",
+        "granforce intervals -n 400 --mu 0.1 --seed 1 --out bounds.csv",
     )
     add_exact(command)
 
@@ -322,7 +326,7 @@ def add_stress(commands: Commands) -> None:
         commands,
         "stress",
         "compute which stresses the contacts can carry at their pressure, and the largest shear",
-        "granforce stress -n 400 --mu 0.1 --seed 1 --csv outline.csv",
+        "granforce stress -n 400 --mu 0.1 --seed 1 --out outline.csv",
     )
     add_any_packing(command)
     group = command.add_argument_group("the outline")
@@ -330,9 +334,7 @@ def add_stress(commands: Commands) -> None:
     group.add_argument("--angles", type=int, default=64, help="directions told (default 64)")
     add_known(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument(
-        "--csv", type=Output, metavar="FILE.csv", help="write the largest stress by direction"
-    )
+    add_out(group, "the largest stress by direction")
     add_store(command)
 
 
@@ -355,9 +357,7 @@ def add_perturb(commands: Commands) -> None:
         "--precision", type=float, default=0.01, help="of F_crit, in ⟨f_n⟩ (default 0.01)"
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument(
-        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
-    )
+    add_out(group, "the result per contact")
     add_unit(group)
     add_conditions(command, known=False)
     add_store(command)

@@ -132,7 +132,7 @@ def test_scan_table_and_resume(run, tmp_path):
 def test_intervals_hold_the_walk(run, tmp_path):
     exact, seen = tmp_path / "exact.csv", tmp_path / "seen.csv"
     words = SMALL[:4]
-    report = json.loads(run("intervals", *words, "--csv", exact, "--json")[1])
+    report = json.loads(run("intervals", *words, "--out", exact, "--json")[1])
     assert report["largest_duality_gap"] <= 1e-8
     assert report["exact_eta3"] > json.loads(run("measure", *SMALL, "--json")[1])["eta3"]
     run("measure", *SMALL, "--contacts", seen)
@@ -144,7 +144,7 @@ def test_intervals_hold_the_walk(run, tmp_path):
     assert json.loads(run("intervals", *words, "--json")[1])["cached"] is True
     # A subset gives the same bounds for what was asked.
     part = tmp_path / "part.csv"
-    run("intervals", *words, "--contacts", f"{bounds['contact'][3]:.0f}", "--csv", part)
+    run("intervals", *words, "--contacts", f"{bounds['contact'][3]:.0f}", "--out", part)
     one = pd.read_csv(part)["f_n_high [packing]"].item()
     assert one == pytest.approx(bounds["f_n_high [packing]"][3], rel=1e-7)
 
@@ -152,13 +152,13 @@ def test_intervals_hold_the_walk(run, tmp_path):
 def test_what_is_known_can_be_what_intervals_wrote(run, tmp_path):
     words = ["intervals", *SMALL[:4], "--json"]
     bounds, known, after = (tmp_path / f"{name}.csv" for name in ("bounds", "known", "after"))
-    free = json.loads(run(*words, "--csv", bounds)[1])
+    free = json.loads(run(*words, "--out", bounds)[1])
     # The bounds of all contacts, of which three have become half as wide.
     table, most = pd.read_csv(bounds), "f_n_high [packing]"
     middle = 0.5 * (table["f_n_low [packing]"] + table[most])
     table.loc[[2, 9, 20], most] = middle[[2, 9, 20]]
     table.to_csv(known, index=False)
-    code, out, _ = run(*words, "--known", known, "--csv", after)
+    code, out, _ = run(*words, "--known", known, "--out", after)
     report = json.loads(out)
     assert code == 0 and report["largest_duality_gap"] <= 1e-8
     assert report["mean_extent_of_f_n [packing]"] < free["mean_extent_of_f_n [packing]"]
@@ -195,7 +195,7 @@ def test_prescribed_stress_is_kept_by_every_command(run):
 def test_the_outline_of_stresses(run, tmp_path):
     table = tmp_path / "stress.csv"
     words = ["stress", *SMALL[:4], "--angles", 8, "--json"]
-    report = json.loads(run(*words, "--csv", table)[1])
+    report = json.loads(run(*words, "--out", table)[1])
     assert report["own_shear_over_pressure"] <= report["largest_shear_over_pressure"]
     assert report["largest_shear_over_pressure"] <= report["certainly_not_above"]
     rows = pd.read_csv(table)
@@ -224,7 +224,7 @@ def test_a_frozen_frame_determines_more(run):
 
 def test_perturbation_of_chosen_contacts(run, tmp_path):
     table = tmp_path / "contacts.csv"
-    words = ["perturb", *SMALL[:4], "--json", "--csv", table]
+    words = ["perturb", *SMALL[:4], "--json", "--out", table]
     code, out, _ = run(*words, "--random", 3)
     assert code == 0
     report = json.loads(out)
@@ -242,7 +242,7 @@ def test_perturbation_of_chosen_contacts(run, tmp_path):
 
 def test_limit_loads_of_chosen_contacts(run, tmp_path):
     bounds = tmp_path / "loads.csv"
-    words = ["limit-loads", *SMALL[:4], "--json", "--csv", bounds]
+    words = ["limit-loads", *SMALL[:4], "--json", "--out", bounds]
     report = json.loads(run(*words)[1])
     assert report["least_limit_load [packing]"] >= 0
     assert report["largest_duality_gap"] <= 1e-8

@@ -108,7 +108,7 @@ def place(tmp_path_factory):
     (folder / "known.csv").write_text("contact,f_n_low\n0,0\n")
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
     frames.write(folder, grains, rows)
-    open_store(folder / "done" / "cells.zarr")
+    open_store(folder / "done" / "cells.zarr").make()
     return folder
 
 
@@ -293,9 +293,14 @@ def _clash_line(command, given):
 def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "cache").mkdir()
+    names = ("positions.txt", "adjacency.txt")
+    for folder in ("cache", "frames.zarr", "done/cells.zarr", "done/study.zarr"):
+        (tmp_path / folder).mkdir(parents=True)
+    for name in ("r.txt", *names, *(f"frames.zarr/{name}" for name in names)):
+        (tmp_path / name).touch()
+    before = sorted(tmp_path.rglob("*"))
     for words in (
-        "intervals -n 8 --mu 0.3 --csv cache/zarr.json",
+        "intervals -n 8 --mu 0.3 --out cache/zarr.json",
         "pack -n 8 --mu 0.3 --cache kept --out kept/packing.npz",
         "infer frames.zarr/positions.txt frames.zarr/adjacency.txt --frames all --out frames.zarr",
         "infer positions.txt adjacency.txt --frames all --out cache",
@@ -305,7 +310,7 @@ def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkey
     ):
         assert parser.main(words.split()) == 2, words
         assert "would overwrite" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.rglob("*")] == ["cache"]
+    assert sorted(tmp_path.rglob("*")) == before
     # Devices may be named more than once, and nothing there can be lost.
     words = "import table /dev/null --mu 0.3 --out /dev/null"
     assert parser.main(words.split()) == 2

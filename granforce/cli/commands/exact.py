@@ -15,7 +15,7 @@ from granforce.cli.asked import (
     known_forces,
     numbers,
     unit,
-    write_csv,
+    write_columns,
 )
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
@@ -27,7 +27,7 @@ def perturb(arguments: argparse.Namespace) -> None:
     """Critical forces and first motions of contacts, computed or found; report them."""
     chosen = numbers("--contacts", arguments.contacts, int)
     _, _, dataset, ends = found(
-        *(arguments, kinds.PERTURBATION, arguments.csv),
+        *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
         random=None if arguments.all or chosen is not None else arguments.random,
         seed=arguments.draw_seed,
@@ -55,12 +55,12 @@ def perturb(arguments: argparse.Namespace) -> None:
         **ends,
     }
     print_report(lines, arguments.json)
-    if arguments.csv is not None:
+    if arguments.out is not None:
         names = ("limit_load", "critical_low", "critical_high")
         columns = {"contact": dataset["backbone"].values}
         columns |= forces.named({name: dataset[name].values for name in names})
         names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
-        write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
+        write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
 
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[str, Any]]:
@@ -68,7 +68,7 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[
     contacts = numbers("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
     asked = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
-    return found(arguments, kind, arguments.csv, **asked)[2:]
+    return found(arguments, kind, arguments.out, **asked)[2:]
 
 
 def intervals(arguments: argparse.Namespace) -> None:
@@ -93,14 +93,14 @@ def intervals(arguments: argparse.Namespace) -> None:
         **ends,
     }
     print_report(lines, arguments.json)
-    if arguments.csv is not None:
+    if arguments.out is not None:
         bounds = {
             f"{part}_{side}": dataset[side].values[:, k]
             for side in ("low", "high")
             for k, part in enumerate(("f_n", "f_t"))
         }
         columns = {"contact": dataset["backbone"].values, **forces.named(bounds)}
-        write_csv(arguments.csv, columns | {"cluster": cluster})
+        write_columns(arguments.out, columns | {"cluster": cluster})
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
@@ -121,15 +121,15 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         **ends,
     }
     print_report(lines, arguments.json)
-    if arguments.csv is not None:
+    if arguments.out is not None:
         columns = {"contact": dataset["backbone"].values}
-        write_csv(arguments.csv, columns | forces.named({"limit_load": load}))
+        write_columns(arguments.out, columns | forces.named({"limit_load": load}))
 
 
 def stress(arguments: argparse.Namespace) -> None:
     """The outline of stresses, computed or found; report it."""
     asked = {"angles": arguments.angles, **known_forces(arguments)}
-    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.csv, **asked)
+    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **asked)
     own = dataset["stress_own"].values
     lines = {
         **extension(dataset),
@@ -143,6 +143,6 @@ def stress(arguments: argparse.Namespace) -> None:
         **ends,
     }
     print_report(lines, arguments.json)
-    if arguments.csv is not None:
+    if arguments.out is not None:
         names = {"angle [rad]": "stress_angle", "largest [pressure]": "stress_support"}
-        write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
+        write_columns(arguments.out, {k: dataset[v].values for k, v in names.items()})

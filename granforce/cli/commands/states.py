@@ -15,6 +15,7 @@ from granforce.cli.asked import (
     unit,
     walked,
     write_csv,
+    write_states,
 )
 from granforce.cli.options import RELAXATIONS
 from granforce.records import whole, worker_count
@@ -30,7 +31,8 @@ from granforce.types import Rows
 
 def walk(arguments: argparse.Namespace) -> None:
     """Random walk, made or found; report how it went."""
-    entry, _, dataset, ends = walked(arguments)
+    entry, parameters, dataset, ends = walked(arguments, arguments.out)
+    write_states(arguments, parameters, dataset)
     lines = {
         "entry": entry,
         **{name: dataset[name].item() for name in (*study.ROW, *study.ROW_COUNTS)},
@@ -52,14 +54,15 @@ UNIFORM_LINES = (
 
 def uniform(arguments: argparse.Namespace) -> int:
     """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
-    entry, _, dataset, ends = found(
-        *(arguments, kinds.UNIFORM),
+    entry, parameters, dataset, ends = found(
+        *(arguments, kinds.UNIFORM, arguments.out),
         states=arguments.states,
         seed=arguments.sample_seed,
         chains=arguments.chains,
         effective=arguments.effective,
         **conditions(arguments),
     )
+    write_states(arguments, parameters, dataset)
     reached = bool(dataset["reached"].item())
     lines = {
         "entry": entry,

@@ -14,7 +14,7 @@ def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
     f_n, f_t: known exactly; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as `granforce intervals
-    --csv` writes them. Forces are in the packing's unit, which names may end with: ``f_n
+    --out` writes them. Forces are in the packing's unit, which names may end with: ``f_n
     [packing]``. Empty fields and other columns are ignored. source: a path or an open file. Raises
     InputError naming the line of what is wrong, and for a column in another unit.
     """
