@@ -52,7 +52,7 @@ def differs(state: AppState) -> str:
 
 
 class Controls:
-    """Widgets for the state's selection and view; they follow what is on screen."""
+    """Widgets for the state's selection: the `line`, and `made`, which it opens."""
 
     def __init__(self, state: AppState) -> None:
         self.state, self.work = state, state.work

@@ -13,7 +13,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
-    <label for="mu"><b>Friction μ</b><small>each μ has its own packing</small></label>
+    <label for="mu" data-term="mu"><b>Friction μ</b><small>each μ has its own packing</small></label>
     <div class="track">
       <div class="hill"></div>
       <div class="rail"><div class="ticks"></div>

@@ -6,10 +6,14 @@ from typing import Any
 import numpy as np
 import param
 
+from ..background.jobs import Job, reading
 from ..browser.messages import Message
+from ..results.library import Cell
 from ..state.app_state import AppState
 from ..widgets.progress import Progress
 from . import result_values
+
+CERTIFICATE = "distance_to_rest"  # in the record of a packing that was shown to be at rest
 
 
 class StatusLine(Progress):
@@ -23,13 +27,34 @@ class StatusLine(Progress):
         tasks = work.computation, work.loading, work.measuring, state.besides.task
         super().__init__(*tasks, knowledge.task, knowledge.ranking, **params)
         self._state = state
+        self._rest: tuple[Cell, bool] | None = None  # whether it is certified
+        self._looking = work.task(reading, told=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
+        state.param.watch(self._look, "cell")
         work.param.watch(self._fail, "message")
+        self._look()
         self._tell()
         self._fail()
 
+    def _look(self, *events: Any) -> None:
+        """Have the packing's record read for the certificate that it was given when it was made."""
+        library, cell = self._state.library, self._state.cell
+        if cell is not None:
+
+            def read(job: Job) -> tuple[Cell, bool]:
+                return cell, CERTIFICATE in library.packing(cell.params["packing"]).info
+
+            self._looking.start(read, self._take)
+
+    def _take(self, found: tuple[Cell, bool]) -> None:
+        self._rest = found
+        self._tell()
+
     def _tell(self, *events: Any) -> None:
-        self.facts = list(facts(self._state))
+        told = list(facts(self._state))
+        if self._rest is not None and self._rest[0] == self._state.cell:
+            told.append("at rest: certified" if self._rest[1] else "at rest: not certified")
+        self.facts = told
 
     def _fail(self, *events: Any) -> None:
         self.failed = self._state.work.message

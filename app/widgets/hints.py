@@ -19,9 +19,6 @@ LABELS = {
     "States from": "s",
     "Relaxation": "accelerated",
     "Precomputed results": "store",
-    "Colour": "mobilisation",
-    "Width": "fn",
-    "Strong and undetermined contacts": "overlay",
     "force as packed": "original",
     "ΔFₙ of all networks": "seen",
     "exact ΔFₙ": "exact",
@@ -45,7 +42,7 @@ LABELS = {
     "Which force to measure next?": "informative",
     "Push": "push",
     "Force space": "s",
-    "How far?": "exact",
+    "Intervals": "exact",
 } | {words: EXPLAINED[key] for shown in (COLOURS, WIDTHS) for key, words in shown.items()}
 
 

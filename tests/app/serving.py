@@ -15,8 +15,7 @@ CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as older links have it; an address without a view says the same.
 MANY = "?scene=many"
 PATIENCE = 180_000  # ms, on a busy machine
-# What makes a browser one that was here before: neither the tour nor a guess is asked of it, and
-# what is offered after the first gesture is there at once.
+# What makes a browser one that was here before, for the small scenes.
 SEEN = "['tour', 'guess', 'hand', 'network']"
 KNOW = f"for (const what of {SEEN}) localStorage.setItem(`granforce.${{what}}`, 'seen')"
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
