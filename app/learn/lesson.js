@@ -103,7 +103,10 @@ class Lesson {
   show() {
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
       const item = made("li", {}), link = item.appendChild(made("a", { textContent: title, href: this.address(name) }))
-      if (k === this.number) link.ariaCurrent = "step"
+      if (k === this.number) {
+        link.ariaCurrent = "step"
+        requestAnimationFrame(() => this.list.parentNode.scrollTo({ left: item.offsetLeft - 40 })) // where the list is a line
+      }
       if (this.progress.of(name).done) item.append(made("span", { className: "done", textContent: " ✓", title: "done" }))
       link.addEventListener("click", (event) => {
         if (event.metaKey || event.ctrlKey || event.shiftKey) return

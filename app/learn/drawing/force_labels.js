@@ -43,12 +43,13 @@ export function drawNames(arrows, F) {
   }
   for (const { contact, at, inward, across } of arrows.ends()) {
     const [px, py] = arrows.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
-    const along = [t * across[0], t * across[1]], slanted = Math.min(...across.map(Math.abs)) > 0.1 ? " the wall" : "", way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? `, ${along[1] > 0 ? "up" : "down"}${slanted}` : along[0] > 0 ? ", right" : ", left"
+    const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? `, ${along[1] > 0 ? "up" : "down"}` : along[0] > 0 ? ", right" : ", left"
     const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? arrows.easel.wide - x : x
     const fits = (line) => g.measureText(line).width < room - 4
     const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
     const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
-    const lines = [name, `normal force ${number(n)}`, ...both]
+    const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n)}`).find(fits) ?? number(n)
+    const lines = [name, pressed, ...both]
     write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
   }
   const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])

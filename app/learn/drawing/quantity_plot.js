@@ -77,7 +77,7 @@ export class QuantityPlot {
     const left = this.axes.y ? 66 : 26, bottom = high - 54
     Object.assign(this, { wide, high, left, bottom, top: 52 })
     this.x = new Scale(this.axes.x, left, wide - 26)
-    this.y = this.axes.y ? new Scale(this.axes.y, bottom - 8, this.top + 16) : null
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 18, this.top + 16) : null // below it the prediction
     this.drawAxes()
     this.draw(this.state)
   }
@@ -90,7 +90,7 @@ export class QuantityPlot {
   drawAxes() {
     const { frame, left, wide, bottom, top, x, y } = this
     frame.replaceChildren()
-    element(frame, "path", { class: "axis", d: `M${left} ${bottom}H${wide - 26}${y ? `M${left} ${bottom}V${top - 16}` : ""}` })
+    element(frame, "path", { class: "axis", d: `M${left} ${bottom}H${wide - 26}${y ? `M${left} ${y.from}V${top}` : ""}` })
     for (const tick of x.ticks) {
       const at = x.px(tick)
       element(frame, "path", { class: "axis", d: `M${at} ${bottom}v5` })

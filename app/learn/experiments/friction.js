@@ -17,13 +17,14 @@ export class Friction extends PackingExperiment {
   /** The packing at a friction comes on screen. */
   async go(mu) {
     const packing = await this.source.get("packing", String(mu))
-    if (mu !== this.mu) return // the hand is elsewhere
-    this.packing = packing
-    this.network = Float32Array.from(this.asPacked(packing))
-    this.before = this.asPacked(packing)
-    this.canvas.show(packing, packing.typical)
     if (!this.locked) this.visited.set(mu, packing)
     this.found ||= this.enough()
+    if (mu === this.mu) { // else the hand is elsewhere by now
+      this.packing = packing
+      this.network = Float32Array.from(this.asPacked(packing))
+      this.before = this.asPacked(packing)
+      this.canvas.show(packing, packing.typical)
+    }
     this.changed()
   }
 
@@ -63,7 +64,9 @@ export class Friction extends PackingExperiment {
     const away = (mu) => Math.abs(Math.log(mu / x))
     const mu = this.frictions.reduce((one, other) => (away(other) < away(one) ? other : one))
     if (mu === this.mu && this.visited.has(mu)) return
+    this.visited.set(this.packing.mu, this.packing)
     this.mu = mu
+    this.changed()
     this.go(mu)
   }
 
