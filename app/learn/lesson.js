@@ -87,6 +87,7 @@ class Lesson {
     const { number } = this, last = number === CHAPTERS.length - 1
     const heading = made("h1", { textContent: chapter.heading, tabIndex: -1 }), text = made("p", { className: "text" })
     const pictures = made("div", { className: "pictures" }), voice = made("div", { className: "voice", ariaLive: "polite" })
+    voice.textContent = "Loading …"
     const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(made("figure", { className })))
     const row = made("div", { className: "row" }), turn = made("span", { className: "turn" })
     const move = (words, by) => button(words, () => this.go(number + by), { disabled: !CHAPTERS[number + by] })

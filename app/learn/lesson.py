@@ -10,10 +10,10 @@ from ..background.jobs import Task, Visitor, computing, reading
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..widgets.plot_style import palettes
-from .model import lesson_data
+from .model import lesson_data, small_scenes
 from .model.lesson_data import Packings
 
-# The forces over which S, or its shadow, is drawn in each small scene: across, and up.
+# The forces over which S is drawn in each small scene, across and up, as in chapters.js.
 PLANES = {"groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
 
 
@@ -54,7 +54,9 @@ class Lesson(Scripted):
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match message["want"]:
             case "scene" if name in PLANES:
-                self._send("scene", name, lambda: lesson_data.scene(name, PLANES[name]))
+                self._send("scene", name, lambda: small_scenes.drawn(name))
+            case "ends" if name in PLANES:
+                self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]))
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))

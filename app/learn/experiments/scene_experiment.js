@@ -26,10 +26,23 @@ export class SceneExperiment {
       this.body.goInside()
       this.body.u = middleOf(this.body)
     }
-    const outline = [...scene.outline]
-    this.outline = Array.from({ length: outline.length / 2 }, (_, k) => [outline[2 * k], outline[2 * k + 1]])
-    ;[this.low, this.high] = scene.bounds[this.options.x / 2]
     this.start = this.at
+    if (this.body.whole) this.end(this.body.interval(this.options.x), this.corners)
+    else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], pairs([...outline])))
+  }
+
+  /** Before the answer can be found: where S is not drawn whole, only the server knows it. */
+  ready() { return this.ends }
+
+  /** The least and the largest value that is asked for, and the corners of S on its axes, around it. */
+  end([low, high], outline) { Object.assign(this, { low, high, outline }) }
+
+  /** Corners of a polygon S on its axes, around it. */
+  get corners() {
+    const { body, options: { x, y } } = this
+    const flat = body.corners.map(({ u }) => { const F = body.forces(u); return [F[x], y === null ? 0 : F[y]] })
+    const [a, b] = [0, 1].map((d) => flat.reduce((sum, point) => sum + point[d], 0) / flat.length)
+    return flat.sort((one, other) => Math.atan2(one[1] - b, one[0] - a) - Math.atan2(other[1] - b, other[0] - a))
   }
 
   get at() {
@@ -110,3 +123,6 @@ export class SceneExperiment {
 
   stop() { /* nothing moves by itself */ }
 }
+
+/** Pairs of numbers that follow each other. */
+const pairs = (flat) => Array.from({ length: flat.length / 2 }, (_, k) => [flat[2 * k], flat[2 * k + 1]])

@@ -1,4 +1,4 @@
-"""What the chapters of Learn show: small scenes with their exact ends, and stored packings."""
+"""What the chapters of Learn show: the exact ends of a small scene, and stored packings."""
 
 from functools import lru_cache
 from typing import Any
@@ -22,11 +22,9 @@ NEAR = 0.5  # how far from the middle a marked contact may be, in half of what i
 STRONG = 1.5  # ⟨f_n⟩ that a contact carries at least which is pulled
 
 
-def scene(name: str, plane: tuple[int, int]) -> dict[str, Any]:
-    """A small scene as `small_scenes.drawn`, with exact ends, and its outline on two forces."""
-    drawn = small_scenes.drawn(name)
-    packing = small_scenes.packing_of(name, drawn["mu"])
-    return drawn | small_scenes.measured(packing, plane=plane)
+def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
+    """Exact ends of every normal force in a small scene, and the outline of S on two forces."""
+    return small_scenes.measured(small_scenes.packing_of(name), plane=plane)
 
 
 class Packings:
