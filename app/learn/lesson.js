@@ -7,6 +7,9 @@ import { PredictDoSee } from "./predict_do_see.js"
 import { Progress } from "./progress.js"
 import { Source } from "./source.js"
 
+// What later chapters show, asked for one after the other while the first is read: some of it is computed.
+const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push"]]
+
 class Lesson {
   constructor(model, view) {
     Object.assign(this, { model, source: new Source(model, view), progress: new Progress(), asked: 0 })
@@ -80,6 +83,11 @@ class Lesson {
     const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
     this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name).prediction, kept, () => this.paint())
     this.sized.observe(parts.picture)
+    this.ahead ??= this.fetch()
+  }
+
+  async fetch() {
+    for (const [want, name] of AHEAD) await this.source.get(want, name).catch(() => {}) // who wants it, is told
   }
 
   /** The parts of a chapter's page. */

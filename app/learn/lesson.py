@@ -10,7 +10,7 @@ from ..background.jobs import Task, Visitor, computing, reading
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..widgets.plot_style import palettes
-from .model import lesson_data, small_scenes
+from .model import lesson_data
 from .model.lesson_data import Packings
 
 # The forces over which S is drawn in each small scene, across and up, as in chapters.js.
@@ -54,7 +54,7 @@ class Lesson(Scripted):
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match message["want"]:
             case "scene" if name in PLANES:
-                self._send("scene", name, lambda: small_scenes.drawn(name))
+                self._send("scene", name, lambda: lesson_data.scene(name))
             case "ends" if name in PLANES:
                 self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]))
             case "packing":

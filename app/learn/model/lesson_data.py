@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.measures import growing  # noqa: F401
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import entries
@@ -22,6 +21,13 @@ NEAR = 0.5  # how far from the middle a marked contact may be, in half of what i
 STRONG = 1.5  # ⟨f_n⟩ that a contact carries at least which is pulled
 
 
+@lru_cache
+def scene(name: str) -> dict[str, Any]:
+    """A small scene as `small_scenes.drawn`; made once."""
+    return small_scenes.drawn(name)
+
+
+@lru_cache
 def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
     """Exact ends of every normal force in a small scene, and the outline of S on two forces."""
     return small_scenes.measured(small_scenes.packing_of(name), plane=plane)
