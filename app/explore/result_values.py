@@ -149,6 +149,14 @@ def with_error(value: float, error: float) -> str:
     return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
 
 
+def between(low: float, high: float) -> str:
+    """Two values with as many digits as tell them apart: "1.682 … 1.690"; one where they agree."""
+    if not high > low:
+        return short(low)
+    digits = min(9, max(2, 1 - int(f"{high - low:.0e}".partition("e")[2])))
+    return f"{low:.{digits}f} … {high:.{digits}f}".replace("-", "−")
+
+
 def short(value: float) -> str:
     """A value to four digits, and 0 of what is only rounding."""
     if not np.isfinite(value):

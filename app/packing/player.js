@@ -405,7 +405,7 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
-  model.on(["tab", "wide", "figure", "pushing"], () => {
+  model.on(["tab", "wide", "pushing"], () => {
     if (!player.replay || player.live.moves) return
     player.tellTab()
     player.again()

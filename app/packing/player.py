@@ -93,7 +93,6 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "tilt": replay.tilt,
         "window": list(replay.window),
         "inviting": replay.inviting,
-        "typical": replay.typical,
         "x": disks.x,
         "y": disks.y,
         "r": disks.r,

@@ -57,7 +57,6 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "drawn": str,
     "sort": str,
     "scale": str,
-    "figure": str,
     "axis": str,
     "pushing": str,
     "axes": str,

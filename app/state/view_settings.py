@@ -44,18 +44,11 @@ SORTS = {
 }
 DRAWN = {"all": "all", "some": "a few"}
 # What single tabs can show.
-FIGURES = {
-    "eta": "How does friction matter?",
-    "extent": "How far can single forces differ?",
-    "correlation": "Are strong contacts the less determined ones?",
-    "scatter": "Which contacts are least determined?",
-    "force": "How many forces are large?",
-}
 AXES = {"linear": "linear", "log": "logarithmic"}
 PUSHES = {
-    "one": "How hard can two touching disks be pushed apart?",
-    "all": "Which contacts bear most?",
-    "store": "Are undetermined packings weaker?",
+    "one": "one contact",
+    "all": "every contact",
+    "store": "against indeterminacy (Figure 2)",
 }
 PLANES = {
     "pair": "the normal forces of two contacts",
@@ -78,7 +71,6 @@ class Seen(param.Parameterized):
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    guess = param.Boolean(doc="whether the curve over friction is to be guessed before it is shown")
     fresh = param.Boolean(doc="whether no force was dragged yet in this browser")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
@@ -91,7 +83,6 @@ class Seen(param.Parameterized):
     )  # fmt: skip
     stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
-    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
     pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
     scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
 

@@ -219,6 +219,18 @@ def effective_number(groups: Sequence[Sequence[float] | Floats]) -> float:
     return len(joined) / max(1.0, float(excess))
 
 
+def decay_misfits(r: Floats, u: Floats) -> tuple[float, float]:
+    """How far ln u (k,) at distances r (k,) lies from its best power law and exponential, rms.
+
+    NaN for fewer than three distances.
+    """
+    if len(r) < 3:
+        return float("nan"), float("nan")
+    y = np.log(u)
+    power, exponential = (np.std(y - np.polyval(np.polyfit(x, y, 1), x)) for x in (np.log(r), r))
+    return float(power), float(exponential)
+
+
 def tail_exponent(values: npt.ArrayLike, quantile: float = 0.5) -> float:
     """Exponent b of P(X > x) ∝ exp(−(λ x)^b) beyond a quantile, by maximum likelihood.
 

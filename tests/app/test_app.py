@@ -583,7 +583,7 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
 
 
 def test_a_link_keeps_what_single_tabs_show(state, visited):
-    chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
+    chosen = {"axis": "log", "pushing": "all", "axes": "stress"}
     chosen["zoom"] = (3.5, 4.25, 2.0)
     state.looks.param.update(**chosen)
     again = visited(f"?{state.link()}")

@@ -129,7 +129,7 @@ def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = scene(page, "scene.offset")
     page.get_by_role("button", name="Let the push grow").click()
-    page.get_by_text("the packing gives way:").wait_for()
+    page.get_by_text("contacts open,").first.wait_for()
     assert before is None
     until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
     assert scene(page, "scene.offset.field.length") == 2 * DISKS
@@ -155,7 +155,7 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
     until(page, "scene.hand.player.replay.held === null")
     assert slider.evaluate("e => e.value") == "0"
     slider.evaluate("e => { e.value = e.max; e.dispatchEvent(new Event('input')) }")
-    page.get_by_text("the packing gives way:").wait_for()
+    page.get_by_text("contacts open,").first.wait_for()
     end = scene(page, "scene.hand.player.pushed.load")
     assert load < end < float(slider.get_attribute("max"))
     until(page, "scene.offset !== null")

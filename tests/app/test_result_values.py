@@ -4,7 +4,7 @@ import pytest
 from small_store import ROOT
 
 from app.explore import result_values
-from app.explore.result_values import short, with_error
+from app.explore.result_values import between, short, with_error
 from app.results.library import Library
 
 
@@ -51,4 +51,5 @@ def test_errors_have_two_digits():
     assert with_error(0.101234, 0.00123) == "0.1012 ± 0.0012"
     assert with_error(-487.23, 12.7) == "−487 ± 13"
     assert with_error(0.5, float("nan")) == "0.5"
+    assert between(1.40012, 1.40034) == "1.40012 … 1.40034" and between(2.0, 2.0) == "2"
     assert short(1e-17) == "0" and short(float("nan")) == "–"

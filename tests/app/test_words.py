@@ -4,7 +4,7 @@ import re
 from html import unescape
 
 from app.results.selection import KINDS, SOLVERS
-from app.state.view_settings import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
+from app.state.view_settings import COLOURS, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.widgets import hints
 from granforce import notebook
 from granforce.glossary import TERMS
@@ -13,7 +13,7 @@ from granforce.glossary import TERMS
 def test_every_symbol_and_option_has_its_sentence():
     known = hints.labels()
     assert set(known.values()) <= set(TERMS)
-    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PUSHES, FIGURES):
+    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PUSHES):
         for words in options.values():
             assert words in known, words
     for word, sentence, _ in TERMS.values():

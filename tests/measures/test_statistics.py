@@ -128,3 +128,12 @@ def test_the_interval_of_a_difference_is_welchs(rng):
     np.testing.assert_allclose((low, high), ends, rtol=1e-12)
     assert difference == pytest.approx(one.mean() - other.mean())
     assert statistics.difference_interval(np.ones(3), np.zeros(3)) == (1, 1, 1)
+
+
+def test_a_power_law_and_an_exponential_are_told_apart():
+    r = np.geomspace(2, 20, 12)
+    power, exponential = statistics.decay_misfits(r, 3 * r**-1.5)
+    assert power < 1e-12 and exponential > 0.1
+    power, exponential = statistics.decay_misfits(r, np.exp(-r / 4))
+    assert exponential < 1e-12 and power > 0.1
+    assert np.isnan(statistics.decay_misfits(r[:2], r[:2])).all()

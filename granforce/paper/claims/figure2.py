@@ -83,12 +83,9 @@ def misfit_ratio(decays: Sequence[Floats]) -> float:
     r = np.array(sorted(set.intersection(*(set(decay) for decay in known))))
     if len(r) < FEWEST_SHELLS:
         return np.nan
-    u = np.mean([[np.log(decay[x]) for x in r] for decay in known], axis=0)
-
-    def off(x: Floats) -> float:
-        return float(np.std(u - np.polyval(np.polyfit(x, u, 1), x)))
-
-    return off(np.log(r)) / off(r)
+    u = np.exp(np.mean([[np.log(decay[x]) for x in r] for decay in known], axis=0))
+    power, exponential = statistics.decay_misfits(r, u)
+    return power / exponential
 
 
 def branches(means: Any) -> float:

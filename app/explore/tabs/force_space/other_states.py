@@ -25,7 +25,7 @@ class OtherStates:
         """changed(): there are others, or none any more."""
         self.state, self._changed = state, changed
         self.replay: Replay | None = None
-        self.switch = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
+        self.switch = pmui.Switch(label=ALSO["walk"], size="small", margin=(6, 8))
         self.task = state.work.task()
         self.progress = Progress(self.task)
         self.switch.param.watch(lambda event: together(self.fetch), "value")

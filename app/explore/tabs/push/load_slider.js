@@ -1,5 +1,5 @@
 // Slider for the push on a contact. Where it is moved, arrows in the packing grow and the network follows
-// (pushed.js); it stops where the disks set off, which is not told before, but can be guessed on its scale.
+// (push_animation.js); it stops where the disks set off, at the critical force.
 
 import { ask } from "../../../browser/send.js"
 
@@ -7,7 +7,6 @@ const STEPS = 400 // of the slider
 const RISE_S = 5 // from nothing to the end, by the button
 const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
 const TICKS = 8 // numbers on the scale, about
-const WAITS = 0.2 // of the scale, where a guess waits
 const THUMB = 8 // px from the slider's ends to where its thumb stands for them
 
 export function render({ model, view }) {
@@ -16,11 +15,11 @@ export function render({ model, view }) {
   root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
       <span class="scale"></span></span></label>
     <span class="told"><output></output> × mean force<b></b></span>
-    <button type="button" class="soft">Let the push grow</button>`
+    <button type="button" class="soft">Find F<sub>crit</sub>: let the push grow</button>`
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.values?.length > 0, end = () => (known() ? model.path.values.at(-1) : Infinity)
-  let load = 0, guess = null, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: whom the load is shown by
+  let load = 0, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: whom the load is shown by
 
   function find() {
     if (known() || asked) return
@@ -46,7 +45,7 @@ export function render({ model, view }) {
   }
 
   function show() {
-    const there = load >= end(), said = there ? `: something moves${guess === null ? "" : ` (you guessed ${guess.toFixed(1)})`}` : ""
+    const there = load >= end(), said = there ? ": disks set off" : ""
     range.value = load
     told.textContent = load.toFixed(2)
     part("b").textContent = said
@@ -63,7 +62,6 @@ export function render({ model, view }) {
   function anew() {
     load = rising = 0
     asked = gave = false
-    guess = null
     scale()
   }
 
@@ -78,19 +76,13 @@ export function render({ model, view }) {
   const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / range.max})`
   const mark = (kind, value, words) => `<span class="${kind}" style="left:${along(value)}">${words}</span>`
 
-  /** Numbers, and a guess, which waits at the left. */
+  /** Numbers, and the critical force once it is known. */
   function drawScale() {
     const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
     let drawn = ""
     for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
-    const words = guess === null ? "your guess: drag me" : `your guess ${guess.toFixed(1)}`
-    line.innerHTML = drawn + mark(guess === null ? "guess waits" : "guess", guess ?? WAITS * most, `▲ <i>${words}</i>`)
-  }
-
-  function put(event) {
-    const { left, width } = line.getBoundingClientRect()
-    guess = Math.min(1, Math.max(0, (event.clientX - left - THUMB) / (width - 2 * THUMB))) * range.max
-    drawScale()
+    if (known()) drawn += mark("critical", end(), "▲ F<sub>crit</sub>")
+    line.innerHTML = drawn
   }
 
   /** By itself, as soon as it is known how far. */
@@ -106,7 +98,7 @@ export function render({ model, view }) {
       if (known()) {
         set(load + ((before === null ? 0 : now - before) / 1000 / RISE_S) * end())
         before = now
-        if (load >= end()) { rising = 0; by?.leave(); return show() }
+        if (load >= end()) { rising = 0; return show() }
       }
       requestAnimationFrame(step)
     }
@@ -115,11 +107,7 @@ export function render({ model, view }) {
   }
 
   range.addEventListener("input", () => { rising = 0; set(Number(range.value)) })
-  range.addEventListener("change", () => by?.leave())
   run.addEventListener("click", rise)
-  line.addEventListener("pointerdown", (event) => { line.setPointerCapture(event.pointerId); put(event) })
-  line.addEventListener("pointermove", (event) => { if (line.hasPointerCapture(event.pointerId)) put(event) })
-  line.addEventListener("click", (event) => event.preventDefault()) // the label would hand it to the slider
   model.on("remove", () => player()?.listeners.delete(look))
   model.on("contact", anew)
   model.on("most", scale)

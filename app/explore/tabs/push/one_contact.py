@@ -1,0 +1,121 @@
+"""What a push on one contact does, in words, as a table, and against distance."""
+
+import numpy as np
+from bokeh.models import BoxAnnotation
+from bokeh.plotting import figure as Figure
+
+from granforce.measures import statistics
+
+from ....results.replays import Replay
+from ....state.perturbations import Pushed
+from ....widgets.hints import term
+from ....widgets.parts import figure
+from ....widgets.plot_style import DARK, DOT, ORIGINAL, legend_above
+from ...result_values import between
+
+F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<sub>crit</sub>")
+LIMIT = term("limit_load", "limit load")
+HEADING = "<b>How hard can the two disks of contact {} be pushed apart?</b> "
+ASKED = (
+    "As packed they press on each other with {now:.2f} mean forces. A pair of opposite forces "
+    f"grows until disks set off: the {F_CRIT}. Beyond the {LIMIT} no forces balance it. Click "
+    "another line to push there."
+)
+FOUND = (
+    "<b>At F<sub>crit</sub> {opened} contacts open, {slid} slide and {kept} hold.</b> At the end "
+    "of the slider the packing shows how disks set off."
+)
+HELD = (
+    " Held forces are not respected here: {} may change like all others, and the push begins with "
+    "the network as packed."
+)
+COMPUTED = (
+    "Of all sets of forces that balance the push, those nearest to the forces as packed are shown; "
+    "orange carries more than before, blue less. F<sub>crit</sub> lies between the largest load at "
+    "which contact dynamics finds rest and the least at which it finds none. |u| is how far a disk "
+    "moves first, against the root mean square over all disks."
+)
+TABLE = '<table class="claims"><tr>{}</tr><tr>{}</tr></table>'
+
+
+def sentence(replay: Replay, contact: int, pushed: Pushed | None, held: int) -> str:
+    """What is pushed, what came of it, and whether `held` forces are respected, as HTML."""
+    text = HEADING.format(replay.backbone[contact])
+    if pushed is None:
+        text += ASKED.format(now=replay.normal[0, contact])
+    else:
+        text += FOUND.format(opened=pushed.opened, slid=pushed.slid, kept=pushed.kept)
+    count = "the held one" if held == 1 else f"the {held} held ones"
+    return text + (HELD.format(count) if held else "")
+
+
+def table(replay: Replay, contact: int, pushed: Pushed) -> str:
+    """Critical force, limit load, force as packed and decay exponent, as HTML."""
+    cells = {
+        F_CRIT: between(pushed.low, pushed.high) + " ⟨fₙ⟩",
+        LIMIT: f"{pushed.limit:.4g} ⟨fₙ⟩",
+        term("fn", "fₙ as packed"): f"{replay.normal[0, contact]:.4g} ⟨fₙ⟩",
+        term("alpha", "decay exponent α"): f"{pushed.exponent:.2f}",
+    }
+    if not np.isfinite(pushed.exponent):  # in boxes too small for a fit
+        cells[term("alpha", "decay exponent α")] = "–"
+    heads = "".join(f"<th>{head}</th>" for head in cells)
+    return TABLE.format(heads, "".join(f"<td>{cell}</td>" for cell in cells.values()))
+
+
+def decay_sentence(pushed: Pushed) -> str:
+    """Whether |u| falls like a power law or an exponential over the range of the fit, as HTML."""
+    if not np.isfinite(pushed.exponent):
+        return ""
+    r, u = _fitted(pushed)
+    (inner, outer), (least, most) = pushed.fit, pushed.spread
+    text = (
+        f"Mean |u| falls like r⁻ᵅ with α = {pushed.exponent:.2f} from r = {inner:.1f} to "
+        f"{outer:.1f} (shaded); over other ranges α is {between(least, most)}."
+    )
+    power, exponential = statistics.decay_misfits(r, u)
+    if not np.isfinite([power, exponential]).all():
+        return text
+    better = "a power law" if power < exponential else "an exponential"
+    return (
+        f"{text} Here {better} fits better: ln |u| is off by {power:.3f} (rms) from the best power "
+        f"law and by {exponential:.3f} from the best exponential."
+    )
+
+
+def decay(pushed: Pushed) -> Figure:
+    """|u| of every grain against its distance from the contact, and its mean in shells."""
+    fig = figure(
+        "displacement", None, "distance from the pushed contact, in largest radii",
+        "first motion |u| (rms = 1)", height=300, x_axis_type="log", y_axis_type="log",
+    )  # fmt: skip
+    seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
+    fig.scatter(
+        pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
+        legend_label="one dot, one disk",
+    )  # fmt: skip
+    known = np.isfinite(pushed.profile) & (pushed.profile > 0)
+    fig.line(
+        pushed.radius[known], pushed.profile[known], color=ORIGINAL, line_width=2.5,
+        legend_label="mean at this distance",
+    )  # fmt: skip
+    if np.isfinite(pushed.exponent):
+        r, u = _fitted(pushed)
+        middle = np.exp(np.log(u).mean() + pushed.exponent * np.log(r).mean())
+        inner, outer = pushed.fit
+        ends = np.array([inner, outer])
+        fig.line(
+            ends, middle * ends**-pushed.exponent, color=DOT, line_width=2.5, line_dash="dashed",
+            legend_label=f"fit, α = {pushed.exponent:.2f}",
+        )  # fmt: skip
+        fig.add_layout(BoxAnnotation(left=inner, right=outer, fill_alpha=0.1, fill_color="#808080"))
+    legend_above(fig)
+    return fig
+
+
+def _fitted(pushed: Pushed) -> tuple[np.ndarray, np.ndarray]:
+    """Radius and mean |u| of the shells in which α is fitted."""
+    inner, outer = pushed.fit
+    known = np.isfinite(pushed.profile) & (pushed.profile > 0)
+    known &= (pushed.radius >= inner) & (pushed.radius <= outer)
+    return pushed.radius[known], pushed.profile[known]
