@@ -32,6 +32,7 @@ _HOME = {
     "margin": "packing.closing",
     "Margin": "packing.closing",
     "scene": "packing.scenes",
+    "from_disks": "packing.importers",
     "ensemble": "forces.build",
     "Ensemble": "forces.ensemble",
     "Known": "forces.knowledge",

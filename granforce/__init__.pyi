@@ -67,6 +67,7 @@ from granforce.packing.exporters import save_lammps as save_lammps
 from granforce.packing.exporters import save_vtk as save_vtk
 from granforce.packing.importers import Snapshot as Snapshot
 from granforce.packing.importers import Snapshots as Snapshots
+from granforce.packing.importers import from_disks as from_disks
 from granforce.packing.importers import load_packing as load_packing
 from granforce.packing.importers import open_lammps as open_lammps
 from granforce.packing.importers import open_mercury as open_mercury

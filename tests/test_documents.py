@@ -88,6 +88,7 @@ def folder(away):
     np.savetxt("grains.csv", size * rows, delimiter=",", header="x,y,r", comments="")
     pairs = np.column_stack([packing.contacts.i, packing.contacts.j])
     np.savetxt("contacts.csv", pairs, fmt="%d", delimiter=",", header="i,j", comments="")
+    Path("pile.csv").write_text("x,y,r\n1,1,1\n3,1,1\n2,2.7320508,1\n")
     grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
     frames.write(away, grains, rows)
     (away / "data").mkdir()

@@ -5,6 +5,7 @@ import json
 import pydoc
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -249,3 +250,30 @@ def test_a_suffix_that_is_not_known_is_refused(cache, capsys):
         told = capsys.readouterr().err
         assert "the name must end with .npz" in told or ".csv, .npz or .zarr" in told
     assert list(cache.iterdir()) == []
+
+
+def test_a_pile_of_own_disks_stands_on_its_floor_from_tables_and_from_arrays(cache, capsys):
+    x = np.array([[1, 1], [3, 1], [5, 1], [2, 1 + 3**0.5], [4, 1 + 3**0.5]])
+    table = pd.DataFrame({"x": x[:, 0], "y": x[:, 1], "r": 1.0})
+    table.to_csv("grains.csv", index=False)
+    words = "import table grains.csv --mu 0.6 --gravity 2 --out pile.npz --walls"
+    told = report(capsys, *words.split(), "floor")
+    assert (told["disks"], told["dimension"]) == (5, 5)
+    packing = gf.from_disks(x, np.ones(5), 0.6, walls="floor", gravity=2)
+    assert np.array_equal(gf.load_packing("pile.npz").forces, packing.forces)
+    floor = packing.contacts.j >= 5
+    assert packing.forces[floor, 0].sum() == pytest.approx(5 * 2 * np.pi)
+    assert packing.contact_points[floor][:, 1] == pytest.approx([0, 0, 0], abs=1e-12)
+    exact = gf.intervals(gf.ensemble(packing))
+    assert exact.converged and np.all(exact.low[floor, 0] > 0)
+    same = report(capsys, *words.split(), "0,0,6,0")
+    assert same["mean_normal_force [packing]"] == pytest.approx(told["mean_normal_force [packing]"])
+    table.assign(open=[1, 1, 1, 0, 0]).to_csv("grains.csv", index=False)
+    glued = report(capsys, *"import table grains.csv --mu 0.6 --gravity 2 --out g.npz".split())
+    assert glued["backbone_grains"] == 2
+    for wrong in ("lid", "0,0,6"):
+        with suppress(SystemExit):
+            assert main([*words.split(), wrong]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert main(f"{words} floor --box 9 9".split()) == 2
+    assert "leave out the box" in capsys.readouterr().err

@@ -257,6 +257,19 @@ def add_unit(command: argparse._ActionsContainer) -> None:
     )
 
 
+def walls(word: str) -> str | list[list[float]]:
+    """Walls as they are typed: a name, or segments X,Y,X,Y separated by blanks."""
+    if "," not in word:
+        return word
+    try:
+        segments = [[float(part) for part in segment.split(",")] for segment in word.split()]
+    except ValueError:
+        segments = []
+    if any(len(segment) != 4 for segment in segments) or not segments:
+        raise argparse.ArgumentTypeError(f"{word[:40]!r}: give segments X,Y,X,Y")
+    return segments
+
+
 def add_out(command: argparse._ActionsContainer, what: str) -> None:
     command.add_argument(
         "--out",

@@ -28,6 +28,7 @@ from granforce.cli.options import (
     add_wall_contacts,
     import_format,
     subcommand,
+    walls,
 )
 from granforce.cli.parsing import Edited, Input, Output, Parser, StorePath, Workplace
 
@@ -473,6 +474,23 @@ def add_import(commands: Commands) -> None:
     add_cell(table)
     add_columns(table)
     add_reverse(table)
+    table.add_argument(
+        "--walls",
+        type=walls,
+        metavar="floor|box|X,Y,X,Y",
+        help="held walls around the disks: a floor, a box open at the top, or segments "
+        "X,Y,X,Y separated by blanks",
+    )
+    table.add_argument(
+        "--gravity",
+        type=float,
+        help="acceleration times mass density, downwards: a disk of radius r weighs π r² times it",
+    )
+    table.add_argument(
+        "--tolerance",
+        type=float,
+        help="gap or overlap, in largest radii, of disks that touch (default 1e-6)",
+    )
     table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"

@@ -192,7 +192,7 @@ def _places(x: Floats, walls: Floats) -> tuple[Integers, Integers, Floats]:
     return disk[first], wall[first], flat[first]
 
 
-class _Behind(NamedTuple):
+class Behind(NamedTuple):
     """Grains behind walls: those that press, then one for each place where another is touched."""
 
     disk: Integers  # (k,) that touches
@@ -204,7 +204,12 @@ class _Behind(NamedTuple):
     lids: Integers  # (l,) which walls press
 
 
-def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: float) -> _Behind:
+def places_behind(x: Floats, r: Floats, walls: Floats, tolerance: float) -> Behind:
+    """Grains behind the places where disks touch walls that are held."""
+    return _behind(x, r, walls, np.zeros(len(walls)), tolerance)
+
+
+def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: float) -> Behind:
     disk, wall, place = _places(x, walls)
     away = place - x[disk]
     against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
@@ -221,7 +226,7 @@ def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: fl
     load = np.full((len(lids) + len(stud), 3), np.nan)
     load[: len(lids)] = np.column_stack([inwards * pressing[lids, None], np.zeros(len(lids))])
     centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - inwards * lid
-    return _Behind(
+    return Behind(
         disk=disk,
         grain=grain,
         away=away,

@@ -92,7 +92,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
         raise InputError("--pressure is of a table without forces or loads: leave it out")
     for note in packing.info.get("notes", []):
         print(f"granforce: {note}", file=sys.stderr)
-    named = ("timestep", "time", "contacts_skipped", "walls")
+    named = ("timestep", "time", "contacts_skipped", "disks", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
     _report(lines, packing, arguments)

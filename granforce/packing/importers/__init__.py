@@ -4,6 +4,7 @@ Whatever a file holds, these functions return a validated Packing or raise Input
 """
 
 from granforce.packing.importers.dem import open_mercury, read_mercury, read_yade
+from granforce.packing.importers.disks import from_disks
 from granforce.packing.importers.known import read_known
 from granforce.packing.importers.lammps import open_lammps, read_lammps
 from granforce.packing.importers.network import report
@@ -15,6 +16,7 @@ from granforce.packing.importers.text import read_columns
 __all__ = [
     "Snapshot",
     "Snapshots",
+    "from_disks",
     "load_packing",
     "open_lammps",
     "open_mercury",

@@ -223,7 +223,7 @@ def _settled(packing: Packing) -> Packing:
     unbalanced = np.abs(rest).max(axis=1)
     if unbalanced.max() > LOAD_MISFIT:
         named = ", ".join(str(whole.grains[k]) for k in np.argsort(-unbalanced, kind="stable")[:5])
-        total = ", ".join(f"{value:.3g}" for value in packing.load[:, :2].sum(axis=0))
+        total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads or contacts: "
             f"most is left over at grains {named} (counted from 0)"

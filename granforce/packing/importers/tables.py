@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.cell import Cell
+from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, listed, touching
 from granforce.packing.importers.network import adopt, find
 from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
@@ -23,7 +24,7 @@ from granforce.tolerances import LISTED_TOUCHING
 from granforce.types import Floats
 
 # Columns of grains, then of contacts.
-NAMES = ("id", "x", "y", "r", "fx", "fy", "torque")
+NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open")
 NAMES += ("i", "j", "nx", "ny", "length", "fn", "ft")
 
 
@@ -38,12 +39,15 @@ def read_table(
     forces: bool | None = None,
     reverse: bool = False,
     pressure: float = 1.0,
+    walls: str | npt.ArrayLike | None = None,
+    gravity: float = 0.0,
     tolerance: float = LISTED_TOUCHING,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from a CSV of grains and, if there is one, a CSV of contacts (paths or open files).
 
-    grains: columns x, y, r; optionally id, and fx, fy, torque (external load in an open set).
+    grains: columns x, y, r; optionally id, and fx, fy, torque (external load in an open set), and
+    open, 1 where the balance of a grain is left open and 0 elsewhere.
     contacts: columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny,
     length (else the nearest images are joined) and fn, ft. Without it, grains closer than
     tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
@@ -51,7 +55,8 @@ def read_table(
     files} of columns that are called otherwise. forces: whether to take fn, ft, by default if they
     are there; the pressure is then what they carry (in an open set: the loads). reverse: ft has the
     other sign. Otherwise the network nearest to equal normal forces at the given pressure (or the
-    given loads) is found; pressure is not used with fn, ft. most_grains: how many are taken.
+    given loads) is found; pressure is not used with fn, ft. walls ("floor", "box" or segments) and
+    gravity, for tables without forces: see `from_disks`. most_grains: how many are taken.
 
     Raises InputError naming file and line, NotJammedError where no network exists.
     """
@@ -83,9 +88,12 @@ def read_table(
         cell.tilt,
     )
     if given is None:
+        packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
             raise InputError("reverse is of tables with forces (fn, ft): leave it out")
         return find(packing, forces="found")
+    if walls is not None or gravity:
+        raise InputError("walls and gravity are of tables without forces: leave out fn and ft")
     return adopt(packing, reverse=reverse, forces="given")
 
 
@@ -103,6 +111,11 @@ def _loads(table: Table, cell: Cell) -> Floats:
         if column in table.header:
             load[:, k] = table.numbers(column)
     loaded = np.flatnonzero(load.any(axis=1))
+    if "open" in table.header:
+        left_open = table.whole("open")
+        for row in np.flatnonzero(left_open > 1)[:1]:
+            raise InputError(f"{table.place(row)}: open must be 0 or 1")
+        load[left_open == 1] = np.nan
     if len(loaded) and np.all(np.isfinite(cell.box)):
         raise InputError(
             f"{table.place(loaded[0])}: a load in a periodic box; "

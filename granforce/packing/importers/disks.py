@@ -1,0 +1,124 @@
+"""Packings from disks alone: contacts where they touch, walls around them, and gravity."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.packing.importers.geometry import check_disks, touching
+from granforce.packing.importers.network import find
+from granforce.packing.scenes import places_behind
+from granforce.records import (
+    InputError,
+    Packing,
+    brief,
+    float_array,
+    friction,
+    make_cell,
+    make_contacts,
+    make_packing,
+    positive,
+)
+from granforce.tolerances import LISTED_TOUCHING
+from granforce.types import Floats
+
+WALLS = ("floor", "box")
+
+
+def from_disks(
+    x: npt.ArrayLike,
+    r: npt.ArrayLike,
+    mu: Any,
+    *,
+    box: npt.ArrayLike | None = None,
+    tilt: float = 0.0,
+    walls: str | npt.ArrayLike | None = None,
+    gravity: float = 0.0,
+    pressure: float = 1.0,
+    tolerance: float = LISTED_TOUCHING,
+) -> Packing:
+    """A Packing of disks, with the force network nearest to equal normal forces.
+
+    x (N, 2): centres. r (N,): radii. mu: friction coefficient. Disks closer than tolerance (in
+    largest radii) touch. box: sides (L_x, L_y) of a periodic cell with this pressure, and its tilt;
+    by default the set is open, and needs walls and gravity. walls: "floor", "box" (a floor and two
+    sides), as far out as the disks reach, or segments (k, 4) x, y, x, y. Walls are held: behind
+    each place that a disk touches is one more grain, whose balance is left open. gravity: g times
+    the mass density, downwards: a disk weighs g π r².
+
+    Raises InputError for disks that overlap and for what makes no sense together, NotJammedError
+    where no network exists.
+    """
+    mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
+    r = float_array(r, (-1,), "radii")
+    x = cell.wrapped(float_array(x, (len(r), 2), "centres"))
+    check_disks(x, r, cell, lambda k: f"disk {k}")
+    contacts = touching(x, r, cell, tolerance)
+    closed = bool(np.all(np.isfinite(cell.box)))
+    packing = make_packing(
+        x,
+        r,
+        cell.box,
+        contacts,
+        np.zeros((len(contacts.i), 2)),
+        mu,
+        positive(pressure, "pressure") if closed else np.nan,
+        info={"source": "disks"},
+        tilt=cell.tilt,
+    )
+    return find(enclosed(packing, walls, gravity, tolerance), forces="found")
+
+
+def enclosed(
+    packing: Packing,
+    walls: str | npt.ArrayLike | None,
+    gravity: float = 0.0,
+    tolerance: float = LISTED_TOUCHING,
+) -> Packing:
+    """A packing without forces, with walls and gravity as `from_disks` has them.
+
+    Raises InputError in a periodic box, and where no disk touches a wall.
+    """
+    gravity = positive(gravity, "gravity", or_zero=True)
+    if walls is None and not gravity:
+        return packing
+    if np.isfinite(packing.box).any():
+        raise InputError("walls and gravity are of open packings: leave out the box")
+    load = packing.load.copy()
+    load[:, 1] -= gravity * np.pi * packing.r**2
+    if walls is None:
+        return packing._replace(load=load)
+    segments, count = _segments(packing, walls), len(packing.r)
+    behind = places_behind(packing.x, packing.r, segments, tolerance)
+    if not len(behind.disk):
+        raise InputError("no disk touches a wall; correct the walls, or raise the tolerance")
+    r = np.concatenate([packing.r, behind.r])
+    outer = make_contacts(
+        behind.disk,
+        count + behind.grain,
+        behind.away,
+        packing.r[behind.disk] + behind.r[behind.grain],
+        r,
+    )
+    contacts = packing.contacts.joined(outer)
+    return packing._replace(
+        x=np.concatenate([packing.x, behind.x]),
+        r=r,
+        contacts=contacts,
+        forces=np.zeros((len(contacts.i), 2)),
+        load=np.concatenate([load, behind.load]),
+        info=packing.info | {"walls": segments.tolist(), "disks": count, "pressing": []},
+    )
+
+
+def _segments(packing: Packing, walls: str | npt.ArrayLike) -> Floats:
+    """Ends (k, 4) of walls."""
+    if not isinstance(walls, str):
+        return float_array(np.atleast_2d(np.asarray(walls)), (-1, 4), "walls")
+    if walls not in WALLS:
+        raise InputError(f"walls must be {', '.join(WALLS)}, or segments, got {brief(walls)}")
+    left, bottom = (packing.x - packing.r[:, None]).min(axis=0)
+    right, top = (packing.x + packing.r[:, None]).max(axis=0)
+    floor = (left, bottom, right, bottom)
+    sides = [(left, bottom, left, top), (right, bottom, right, top)]
+    return np.array([floor, *(sides if walls == "box" else [])])
