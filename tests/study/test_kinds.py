@@ -17,20 +17,20 @@ MADE = PACKING.parameters(20, 0.1, 1)
 
 MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 
-# What entries are called since packings are of version 5, which all others name by its parameters.
+# What entries are called since packings are of version 6, which all others name by its parameters.
 NAMES = {
-    "packing": ((20, 0.1, 1), {}, "packing-34fbbbf2f613c89f808b"),
-    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-417af975d4af9349f3e0"),
-    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-dc65bf63ca6732742139"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-037dfc72fb97a9423a4e"),
-    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-4d5522eb169673ca28b4"),
-    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-abcb6295f9317f470012"),
-    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-39f84f14637fc00aea2e"),
-    "stress": ((MADE,), {"angles": 16}, "stress-cd2ae91851eed4885d5b"),
-    "perturbation": ((MADE,), {"random": 4}, "perturbation-c57710a58d0f54569030"),
-    "informative": ((MADE,), {"k": 5}, "informative-92e47291bb165ef366c7"),
-    "volume": ((MADE, 0.1), {}, "volume-19b24a9b418d78c66fce"),
-    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-6ca8eead7d3ce27166dc"),
+    "packing": ((20, 0.1, 1), {}, "packing-dc70e5d57c5abb998c77"),
+    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-6b236bcc451c2f2aaf84"),
+    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-e8f1719d2e28a69e533f"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-e80f4013e33c60008307"),
+    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-0777d4fa4413662edc74"),
+    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-0223c67f44639d7a4a80"),
+    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-0b9d0c4a4b5cc4a5efa7"),
+    "stress": ((MADE,), {"angles": 16}, "stress-aa70c5de3c49c75f2ed6"),
+    "perturbation": ((MADE,), {"random": 4}, "perturbation-720119d8f88c8dd5b2b7"),
+    "informative": ((MADE,), {"k": 5}, "informative-ac74199898c5e715fff2"),
+    "volume": ((MADE, 0.1), {}, "volume-154fb2bc53d4fa29339f"),
+    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-160db7aaaccd3122a7f7"),
 }
 
 
