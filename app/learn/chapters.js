@@ -103,7 +103,7 @@ export const CHAPTERS = [
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), last = rows.at(-1)
       return [
         `From the left, forces vary more as friction lets them lean further. Then contacts vanish, and free numbers with them: at μ = ${most.mu} there are ${most.free} in ${most.contacts} contacts, at μ = ${last.mu} only ${last.free} in ${last.contacts}.`,
-        `So more friction does not mean more freedom: with very much of it, forces are nearly determined again. The line is the mean over many packings.`,
+        `So more friction does not mean more freedom: with very much of it, hardly any number is free. The line is the mean over many packings.`,
       ]
     },
     count: ({ rows }) => ({

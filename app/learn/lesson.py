@@ -6,6 +6,8 @@ from typing import Any
 
 import param
 
+from granforce.packing.scenes import SCENES
+
 from ..background.jobs import Task, Visitor, computing, reading
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
@@ -54,9 +56,10 @@ class Lesson(Scripted):
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match message["want"]:
             case "scene" if name in PLANES:
-                self._send("scene", name, lambda: lesson_data.scene(name))
+                pool = computing if SCENES[name].packed else reading
+                self._send("scene", name, lambda: lesson_data.scene(name), pool)
             case "ends" if name in PLANES:
-                self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]))
+                self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]), computing)
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))
