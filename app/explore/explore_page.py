@@ -149,6 +149,7 @@ class _Around:
         pale_when_old([*tabs.pages.items(), ("results", self.results), ("plane", self.space)])
         self.panels[:] = [tabs.tabs]
         self.results[:] = [Results(state, Volume(state), **WIDE)]
+        tabs.reserve(self.space)
         state.looks.param.watch(lambda event: state.work.piecewise(tabs.beside(self.space)), "wide")
         yield
         yield from tabs.filling(state.looks.tab)

@@ -52,6 +52,7 @@ class Tabs:
         self.names = list(TABS)
         self._begun: set[str] = set()
         self._space: Any = None  # the view of force space, wherever it is
+        self._apart = False  # whether that is in a place of its own, or on its way there
         self.pages = {
             name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
             for name in self.names
@@ -78,15 +79,22 @@ class Tabs:
         if name == self.names[self.tabs.active]:
             self.looks.tab = name
 
+    def reserve(self, place: Any) -> None:
+        """Have a wide screen show at once that force space comes to a place of its own."""
+        wide = self.looks.wide
+        self.tabs.sx = WITHOUT_SPACE if wide else LOOK
+        place.visible = wide  # nobody else need begin with it
+        if wide and not place.objects:
+            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE)]
+
     def beside(self, place: Any) -> Iterator[None]:
         """Put force space into a place of its own on a wide screen, else back into its tab."""
         wide, page = self.looks.wide, self.pages["plane"]
-        self.tabs.sx = WITHOUT_SPACE if wide else LOOK
-        if wide == place.visible:
+        self.reserve(place)
+        if wide == self._apart:
             return
-        place.visible = wide  # at once: nobody else need begin with it
+        self._apart = wide
         if wide:
-            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE)]
             if self.looks.tab == "plane":
                 self.tabs.active = self.names.index("intervals")
             self._begun.add("plane")
