@@ -4,7 +4,7 @@
 import { made } from "../browser/dom.js"
 import { Keyboard } from "./keyboard.js"
 import { PlayerBar } from "./player_bar.js"
-import { LEAST } from "./drawing/scene.js"
+import { LEAST } from "./drawing/chain_strokes.js"
 
 const ICONS = {
   pin: "M12 2a7 7 0 0 1 7 7c0 5-7 13-7 13S5 14 5 9a7 7 0 0 1 7-7zm0 4a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",

@@ -5,24 +5,22 @@ import { actions } from "./hand/actions.js"
 import { ask, knownThere } from "../browser/send.js"
 import { Buttons } from "./buttons.js"
 import { Grab, UNCHOSEN } from "./hand/drag_force.js"
-import { CATCH_UP, extend, Live, roomy } from "./replay/live.js"
+import { extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
 import { plain } from "../browser/to_object.js"
 import { Pins } from "./drawing/pins.js"
 import { Plots } from "./drawing/bokeh_plots.js"
+import { Playback } from "./replay/playback.js"
 import { Pushed } from "./hand/push_animation.js"
 import { Replay } from "./replay/replay.js"
 import { Scene } from "./drawing/scene.js"
 import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
-const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
-const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
-const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
-const LONGEST_S = 6 // but no longer than this
+const PLOTS_MS = 30 // the plots beside are repainted no more often than this while a force is pulled
 const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
-const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
+const REST_MS = 400 // after which a view that was moved is taken into the link
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
 
@@ -51,8 +49,7 @@ class Player {
       },
     })
     this.replay = this.look = this.loaded = null
-    this.resting = null // where a pause comes to rest, while it is on its way
-    this.playing = this.follows = false // the newest state of a walk under way
+    this.playback = new Playback(this)
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(this)
@@ -98,7 +95,7 @@ class Player {
     const shown = this.loaded !== null, zoom = shown ? null : model.zoom // of the link that opened the page
     this.loaded = model.walk
     const view = this.live.leave(), place = this.grownInto(walk)
-    this.playing = false
+    this.playback.halt()
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
     this.hand.settle()
@@ -119,7 +116,7 @@ class Player {
     scene.repaint()
     this.live.glide(view)
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
-    this.follows = walk.room > 0 || (this.follows && place !== null)
+    this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null)
     if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
     else if (!shown) this.playFirst()
   }
@@ -153,6 +150,11 @@ class Player {
   }
 
   tellTrack() { this.buttons.tellTrack(this.replay, this.model.keepable && !this.grows) }
+
+  get speed() { return this.buttons.bar.speed }
+
+  /** Whether the packing is on the page. */
+  get shown() { return this.scene.root.isConnected }
 
   /** Whether more states are to come. */
   get grows() { return this.replay?.walk.room > 0 }
@@ -190,7 +192,7 @@ class Player {
 
   paintPlots(now = performance.now()) {
     const { model, plots, replay } = this
-    this.told = now
+    this.playback.painted = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
@@ -226,7 +228,7 @@ class Player {
     this.replay.mix()
     this.paint()
     const now = performance.now()
-    if (now - this.told > PLOTS_MS) this.paintPlots(now)
+    if (now - this.playback.painted > PLOTS_MS) this.paintPlots(now)
     else this.buttons.read(this.replay)
   }
 
@@ -243,26 +245,32 @@ class Player {
 
   // Playing
 
-  play(on) {
+  get playing() { return this.playback.running }
+
+  play(on) { this.playback.run(on) }
+
+  /** Playing began or ended. */
+  changed(playing) {
     const { replay, model } = this
-    this.playing = on && replay !== null
-    if (model.paused === this.playing) model.paused = !this.playing
-    this.plots.move(this.playing)
-    this.buttons.tellPlaying(this.playing)
+    if (model.paused === playing) model.paused = !playing
+    this.plots.move(playing)
+    this.buttons.tellPlaying(playing)
     if (!replay) return
-    this.resting = null
-    if (this.playing) this.say("")
-    else {
-      this.settle(replay)
-      model.frame = replay.frame
-      this.paintPlots()
-      this.mark()
-      return
+    if (playing) return this.say("")
+    model.frame = replay.frame
+    this.paintPlots()
+    this.mark()
+  }
+
+  /** Play, or come to rest, whichever it does not just now. */
+  toggle() {
+    const { playback, buttons } = this
+    playback.newest = false
+    if (!playback.running) return playback.run(true)
+    if (playback.resting === null) { if (playback.pause()) buttons.tellPlaying(false) } else {
+      playback.resume()
+      buttons.tellPlaying(true)
     }
-    if (replay.atEnd && !replay.swinging) this.show(0, false)
-    this.direction = 1
-    this.before = performance.now()
-    requestAnimationFrame((now) => this.tick(now))
   }
 
   /** The page opens playing, unless its link says that it rests, or nothing is to move. */
@@ -270,51 +278,6 @@ class Player {
     const { model } = this
     if (STILL.matches || model.paused || model.between || this.pulled || this.pushes) model.paused = true
     else requestAnimationFrame(() => this.play(true))
-  }
-
-  /** What rests is a network that has a name: the nearest one, but between two that are compared. */
-  settle(replay) {
-    if (replay.held || replay.swinging || !(replay.position % 1)) return
-    replay.go(Math.round(replay.position))
-    this.paint()
-  }
-
-  /** Pause: playing ends at the nearest network, to which it goes over. */
-  pause(replay) {
-    if (replay.held || replay.swinging || STILL.matches) return this.play(false)
-    this.resting = Math.round(replay.position)
-    this.buttons.tellPlaying(false)
-  }
-
-  /** One step of the way to where it comes to rest; whether it is there. */
-  rest(replay, took) {
-    const way = this.resting - replay.position, step = (took / REST_MS) * Math.sign(way)
-    if (Math.abs(way) <= Math.abs(step)) { this.play(false); return true }
-    replay.go(replay.position + step)
-    return false
-  }
-
-  tick(now) {
-    if (!this.playing || !this.scene.root.isConnected) return
-    const { replay } = this, took = Math.max(0, now - this.before)
-    const behind = this.follows ? (replay.last - replay.position) / CATCH_UP : 0
-    const speed = Math.max(this.buttons.bar.speed, behind)
-    const steps = (took / 1000) * (replay.swinging ? Math.max(speed / CROSSING, 1 / LONGEST_S) : speed)
-    this.before = now
-    if (this.resting !== null) {
-      if (this.rest(replay, took)) return
-      this.paint()
-      return void requestAnimationFrame((next) => this.tick(next))
-    }
-    if (this.grows && replay.atEnd && !replay.swinging) return void requestAnimationFrame((next) => this.tick(next))
-    replay.go(replay.position + this.direction * steps)
-    if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.direction = replay.atEnd ? -1 : 1
-    this.paint()
-    if (now - this.told > Math.max(PLOTS_MS, PLOTS_FRAMES * took)) this.paintPlots(now)
-    if (!replay.swinging && replay.atEnd && !this.grows) {
-      this.play(false)
-      this.show(replay.last)
-    } else requestAnimationFrame((next) => this.tick(next))
   }
 
   /** Select the next contact, the one with the largest force on screen first. */
@@ -361,12 +324,12 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
-      tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
+      tab: loaded(() => { if (this.pushes && this.playing && this.playback.resting === null) this.toggle() }),
       legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
       asked: () => this.tellAsked(),
       opened: () => buttons.tellOpen(model.opened),
-      paused: loaded(() => { if (model.paused === this.playing && this.resting === null) this.play(!model.paused && !STILL.matches) }),
+      paused: loaded(() => { if (model.paused === this.playing && this.playback.resting === null) this.play(!model.paused && !STILL.matches) }),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),

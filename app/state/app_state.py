@@ -223,9 +223,11 @@ class AppState(param.Parameterized):
             message, asked = damage or self.work.message, meant(cells)
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
-            if shown is not None:
+            there = shown is not None and (asked is None or shown.cell.selection.names(asked))
+            # What was on screen stays until the wanted states are there; Cancel goes back to it.
+            if shown is not None and (there or self.cell is None):
                 self._show(shown, view)
-            if asked is not None and (shown is None or not shown.cell.selection.names(asked)):
+            if asked is not None and not there:
                 dear = LIMITS.shared and asked.dear
                 self._ask(asked, at_once=not dear)
                 if dear and self.missing:

@@ -1,5 +1,6 @@
 """What of the states on screen is looked at, and how, as parameters: no widgets, no plots."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import param
@@ -113,17 +114,35 @@ class Looks(Seen):
 
     def keep_open(self, panel: Any, name: str) -> None:
         """Keep the parameter `open` of a panel and `opened` alike."""
+        self._keep(panel, "open", lambda: name in self.opened, lambda on: [name] * on, [name])
 
+    def keep_active(self, folds: Any, *names: str) -> None:
+        """Keep the parameter `active` of panels under each other, and `opened`, alike."""
+
+        def active() -> list[int]:
+            return [k for k, name in enumerate(names) if name in self.opened]
+
+        self._keep(folds, "active", active, lambda now: [names[k] for k in now], names)
+
+    def _keep(
+        self,
+        panel: Any,
+        parameter: str,
+        wanted: Callable[[], Any],
+        opened: Callable[[Any], list[str]],
+        names: Sequence[str],
+    ) -> None:
         def follow(*events: Any) -> None:
-            panel.open = name in self.opened
+            if getattr(panel, parameter) != wanted():
+                panel.param.update({parameter: wanted()})
 
         def tell(event: Any) -> None:
-            others = [other for other in self.opened if other != name]
-            if event.new != (name in self.opened):
-                self.opened = [*others, name] if event.new else others
+            if event.new != wanted():
+                others = [other for other in self.opened if other not in names]
+                self.opened = [*others, *opened(event.new)]
 
         self.param.watch(follow, "opened")
-        panel.param.watch(tell, "open")
+        panel.param.watch(tell, parameter)
         follow()
 
     def shows(self, name: str) -> bool:

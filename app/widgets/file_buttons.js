@@ -71,13 +71,11 @@ export function render({ model, view }) {
       context.textAlign = "right"
       context.fillText(it.replay.title, WHERE[0], SIDE + WHERE[1])
       if (button) button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
-      const swung = it.replay.swinging && it.direction > 0 && it.turned
-      if (it.replay.swinging && it.direction < 0) it.turned = true
+      const swung = it.replay.swinging && it.playback.turns > 1
       if (!it.playing || swung) over ??= now
       if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
       else requestAnimationFrame(frame)
     }
-    it.turned = false
     requestAnimationFrame(frame)
     await ended
     const took = performance.now() - begun

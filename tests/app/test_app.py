@@ -552,6 +552,21 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state):
     assert len(state.catalogue) == 3
 
 
+def test_cancel_goes_back_to_what_a_visitor_saw_before_a_link_to_other_states(state):
+    """Forward, say, to a walk that was never finished."""
+    state.show(cell_at(state.library, 1))
+    wait_for(state, lambda: state.cell.mu == 1)
+    shown = state.replay
+    state.open("?mu=0.47&n=30&states=30&relax=nearest")
+    while state.work.reader.running:
+        state.work.poll()
+    assert state.work.computation.running and state.missing and state.replay is shown
+    state.work.computation.dismiss()
+    wait_for(state)
+    assert not state.missing and state.seen is state.replay is shown
+    assert "mu=1&" in state.link() and state.source.startswith("μ = 1,")
+
+
 def test_a_friction_stands_beside_another_one_only(state):
     """Back after a comparison once showed 0.1 beside 0.1."""
     first = state.cell.mu

@@ -260,7 +260,7 @@ def test_leaving_out_thin_and_unseen_chains_changes_no_pixel(page):
             geometry.contact.forEach((c, k) => { width[k] = style.width[c]; bin[k] = style.bin[c] })
             scene.begin(scene.chains)
             const every = Array.from(geometry.contact.keys()).filter(k => width[k] > 0)
-            scene.strokeEach(every, every.length, style.colours)
+            scene.stroke(every, style.colours)
             return every.length
         }"""
     )

@@ -9,7 +9,7 @@ from app.browser.bundle import APP
 def test_every_script_is_a_module_by_itself(run):
     """As they are written, not as they are joined: `module` makes no module of what is none."""
     names = [str(path.relative_to(APP).with_suffix("")) for path in APP.glob("**/*.js")]
-    assert len(run("".join(names), "(all) => Object.keys(all)")) > len(names) / 2
+    assert len(run(" ".join(names), "(all) => Object.keys(all)")) > len(names) / 2
 
 
 def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
@@ -120,7 +120,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
     np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
     np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
     assert there["distance"] == pytest.approx(away, rel=1e-6)
-    assert (there["residual"], there["place"]) == (0.2, "1 of 3")
+    assert (there["residual"], there["place"]) == (0.2, "of 3")
     assert back["low"] == back["high"] == NORMAL[1].tolist()  # the original is no state
     assert back["normal"] == NORMAL[1].tolist()
 

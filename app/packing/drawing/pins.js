@@ -2,6 +2,7 @@
 // numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
 
 import { arrow, circle } from "../../browser/canvas_paths.js"
+import { markSelected } from "./marks.js"
 import { plain } from "../../browser/to_object.js"
 
 const PIN = 17 // px, its height
@@ -43,7 +44,7 @@ export class Pins {
     const { geometry, ratio, palette, scale } = scene, { replay, pushed } = this.player
     const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
     const first = geometry.contact.indexOf(contact), arrow_px = ARROW_PX + GROWN_PX * pushed.part
-    if (scene.selected === null) scene.drawSelected(contact)
+    if (scene.selected === null) markSelected(context, scene, contact)
     context.save()
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     context.lineCap = context.lineJoin = "round"

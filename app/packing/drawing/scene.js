@@ -2,19 +2,15 @@
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
 import { made } from "../../browser/dom.js"
-import { arrow, circle, line } from "../../browser/canvas_paths.js"
+import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
+import { highlight, markExtremes, markForces, markSelected } from "./marks.js"
 import { listen } from "../hand/pointing.js"
 import { PIXELS, Sheet } from "./svg_context.js"
 
-export const LEAST = 0.1 // px; thinner chains are not drawn
 const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
-const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
-const ARROW = 1.3 // of the largest force on a disk, in largest radii
-const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
 const ZOOM_HINT = "Ctrl + wheel zooms; after a click here the wheel alone does."
-const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
   constructor(onSelect) {
@@ -199,11 +195,17 @@ export class Scene {
     this.counts = { segments: contact.length, drawn, outside, thin }
     this.begin(chains)
     chains.globalAlpha = style.alpha
-    if (drawn <= FEW || chains instanceof Sheet) this.strokeEach(order, drawn, style.colours)
-    else this.strokeByClass(order, drawn, style.colours)
+    this.stroke(order.slice(0, drawn), style.colours)
     chains.globalAlpha = 1
     this.drawMarks(style)
     if (!this.painted++) performance.mark("packing painted") // how long opening took
+  }
+
+  /** Stroke these rows of the geometry. */
+  stroke(rows, colours) {
+    const { chains, width, bin, scale } = this, lines = { rows, width, bin, colours, ends: (k) => this.ends(k) }
+    if (rows.length <= FEW || chains instanceof Sheet) strokeEach(chains, lines)
+    else strokeByClass(chains, lines, scale)
   }
 
   ends(k) {
@@ -224,116 +226,16 @@ export class Scene {
     }
   }
 
-  strokeEach(order, count, colours) {
-    const { chains, width, bin } = this
-    chains.lineCap = "round"
-    for (let n = 0; n < count; n++) {
-      const k = order[n], [xa, ya, xb, yb] = this.ends(k)
-      chains.strokeStyle = colours[bin[k]]
-      chains.lineWidth = width[k]
-      chains.beginPath()
-      chains.moveTo(xa, ya)
-      chains.lineTo(xb, yb)
-      chains.stroke()
-    }
-  }
-
-  /** Many chains: one stroke for all of about the same colour and width, in half the time. */
-  strokeByClass(order, count, colours) {
-    const { chains, width, bin, scale } = this, classes = new Map()
-    const { x0, y0, x1, y1 } = this.geometry
-    for (let n = 0; n < count; n++) {
-      const k = order[n]
-      const thickness = Math.round(2 * Math.log2((width[k] * scale) / LEAST)) // half octaves
-      const colour = colours.length > FINE ? bin[k] - (bin[k] % 2) : bin[k]
-      const key = 64 * colour + thickness
-      let path = classes.get(key)
-      if (!path) classes.set(key, (path = new Path2D()))
-      if (this.offset) {
-        const [xa, ya, xb, yb] = this.ends(k)
-        path.moveTo(xa, ya)
-        path.lineTo(xb, yb)
-      } else {
-        path.moveTo(x0[k], y0[k])
-        path.lineTo(x1[k], y1[k])
-      }
-    }
-    chains.lineCap = "butt"
-    for (const [key, path] of classes) {
-      chains.strokeStyle = colours[key >> 6]
-      chains.lineWidth = (LEAST * 2 ** ((key & 63) / 2)) / scale
-      chains.stroke(path)
-    }
-  }
-
   /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
   drawMarks(style) {
-    const { marks, scale, palette } = this
+    const { marks, palette } = this
     this.begin(marks)
-    const radius = Math.max(MARK, 2 / scale)
-    if (style.strong) {
-      for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
-        marks.beginPath()
-        for (const { middle: [x, y] } of this.segments((contact) => chosen[contact])) {
-          marks.moveTo(x + radius * size, y)
-          marks.arc(x, y, radius * size, 0, 2 * Math.PI)
-        }
-        marks.fillStyle = palette.strong
-        marks.strokeStyle = palette.loose
-        marks.lineWidth = Math.max(0.09, 1.2 / scale)
-        if (filled) marks.fill()
-        else marks.stroke()
-      }
-    }
-    if (this.selected !== null) this.drawSelected(this.selected)
-    this.pair.forEach((contact, k) => this.highlight(contact, k ? palette.up : palette.across))
-    if (this.pointed >= 0 && this.describe?.forces) this.drawForces(this.pointed)
+    if (style.strong) markExtremes(marks, this, style)
+    if (this.selected !== null) markSelected(marks, this, this.selected)
+    this.pair.forEach((contact, k) => highlight(marks, this, contact, k ? palette.up : palette.across))
+    if (this.pointed >= 0 && this.describe?.forces) markForces(marks, this, this.pointed)
     if (marks instanceof Sheet) this.onSheet?.(marks, this)
     else this.onMarks?.(marks, this)
-  }
-
-  /** The forces that press on a disk, each an arrow that ends where it acts. */
-  drawForces(disk) {
-    const { marks, scale, palette, geometry } = this, { x, y, r, grain, radius } = geometry
-    const forces = this.describe.forces(grain[disk])
-    const most = Math.max(...forces.map(({ fx, fy }) => Math.hypot(fx, fy)))
-    const long = ARROW * Math.max(...radius), head = Math.max(0.16, 6 / scale)
-    marks.lineWidth = Math.max(0.07, 2 / scale)
-    marks.strokeStyle = palette.strong
-    marks.lineCap = "round"
-    marks.beginPath()
-    for (const { nx, ny, fx, fy } of forces) {
-      if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
-      const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
-      arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
-    }
-    marks.stroke()
-  }
-
-  /** A line in the colour of its axis of force space. */
-  highlight(chosen, colour) {
-    const { marks, scale, palette } = this
-    marks.lineCap = "round"
-    for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
-      marks.lineWidth = Math.max(Math.min(AXIS[0], AXIS[1] / scale), 5 / scale) + more
-      marks.strokeStyle = paint
-      for (const { a, b } of this.segments((contact) => contact === chosen)) line(marks, a, b)
-    }
-  }
-
-  drawSelected(selected) {
-    const { marks, scale, palette, geometry } = this
-    marks.strokeStyle = palette.selected
-    marks.lineCap = "round"
-    for (const { k, a, b } of this.segments((contact) => contact === selected)) {
-      marks.lineWidth = 2 / scale
-      for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
-        circle(marks, at, geometry.radius[grain])
-        marks.stroke()
-      }
-      marks.lineWidth = Math.max(0.12, 3 / scale)
-      line(marks, a, b)
-    }
   }
 
   // Pointer

@@ -5,7 +5,7 @@ export function actions(player) {
   const loaded = (action) => (given) => { if (player.replay && !player.live.moves) action(player.replay, given) }
   const halted = (action) => loaded((replay, given) => {
     player.hand.free()
-    player.follows = false
+    player.playback.newest = false
     player.play(false)
     action(replay, given)
   })
@@ -17,12 +17,9 @@ export function actions(player) {
     hold: loaded((replay) => player.hold(replay)),
     undo: loaded((replay) => { if (replay.held) player.hand.tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
-    play: loaded((replay) => {
+    play: loaded(() => {
       player.hand.free()
-      player.follows = false
-      if (player.playing && player.resting === null) player.pause(replay)
-      else if (player.playing) { player.resting = null; player.buttons.tellPlaying(true) }
-      else player.play(true)
+      player.toggle()
     }),
     step: halted((replay) => player.show(Math.floor(replay.position + 1e-9) + step(replay))),
     back: halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - step(replay))),

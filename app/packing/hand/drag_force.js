@@ -56,7 +56,7 @@ export class Grab {
   begin() {
     const { player } = this
     if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
-    player.follows = false
+    player.playback.newest = false
     if (player.playing) player.play(false)
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()

@@ -36,4 +36,6 @@ def panel(state: AppState) -> Any:
         margin=(0, 10, 4, 10),
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
-    return folded_away(TITLE, inside)
+    fold = folded_away(TITLE, inside)
+    state.looks.keep_active(fold, "figure")
+    return fold

@@ -70,9 +70,11 @@ class View(TabView):
         """Figures under each other, each under its sentence; claims last."""
         first, fourth, sixth = self.figures
         pairs = [part for pair in zip(THIS, self.folded, strict=True) for part in pair]
+        folds = folded_away(*pairs)
+        self.looks.keep_active(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
             self.bar, self.first, first, self.scale, self.fourth, fourth, self.sixth, sixth,
-            folded_away(*pairs), self.told, **WIDE,
+            folds, self.told, **WIDE,
         )  # fmt: skip
 
     def update(self) -> None:

@@ -10,7 +10,9 @@ class Contacts(Scripted):
     """Number, disks, forces and their bounds of each contact; sorted, searched and filtered."""
 
     dark = param.Boolean()
+    open = param.Boolean()
 
     def __init__(self, looks: Looks) -> None:
         super().__init__(sizing_mode="stretch_width", dark=looks.dark)
         looks.param.watch(lambda event: self.param.update(dark=event.new), "dark")
+        looks.keep_open(self, "table")

@@ -65,13 +65,15 @@ class View(TabView):
     def panel(self) -> pn.Column:
         """Choices and bars; the table, and growth, to be opened."""
         wide = {"sizing_mode": "stretch_width"}
+        grows = folded_away(GROWS, plotted(self.growth.figure))
+        self.looks.keep_active(grows, "growth")
         return pn.Column(
             self.lead,
             plotted(self.drawing.figure),
             pn.FlexBox(*self.choices, self.exact, **wide),
             Known(self.state),
             Contacts(self.looks),
-            folded_away(GROWS, plotted(self.growth.figure)),
+            grows,
             **wide,
         )
 

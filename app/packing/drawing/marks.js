@@ -1,0 +1,71 @@
+// Marks over the chains of a Scene, which says where everything is: the selected contact, axes of force space,
+// forces on a disk, and the strong and undetermined contacts of the paper's Fig. 5.
+
+import { arrow, circle, line } from "../../browser/canvas_paths.js"
+
+const ARROW = 1.3 // of the largest force on a disk, in largest radii
+const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
+const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
+
+/** Strong contacts filled, undetermined ones open; style: `strong` and `loose`, by contact. */
+export function markExtremes(marks, scene, style) {
+  const { scale, palette } = scene
+  const radius = Math.max(MARK, 2 / scale)
+  for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
+    marks.beginPath()
+    for (const { middle: [x, y] } of scene.segments((contact) => chosen[contact])) {
+      marks.moveTo(x + radius * size, y)
+      marks.arc(x, y, radius * size, 0, 2 * Math.PI)
+    }
+    marks.fillStyle = palette.strong
+    marks.strokeStyle = palette.loose
+    marks.lineWidth = Math.max(0.09, 1.2 / scale)
+    if (filled) marks.fill()
+    else marks.stroke()
+  }
+}
+
+/** The forces that press on a disk, each an arrow that ends where it acts. */
+export function markForces(marks, scene, disk) {
+  const { scale, palette, geometry } = scene, { x, y, r, grain, radius } = geometry
+  const forces = scene.describe.forces(grain[disk])
+  const most = Math.max(...forces.map(({ fx, fy }) => Math.hypot(fx, fy)))
+  const long = ARROW * Math.max(...radius), head = Math.max(0.16, 6 / scale)
+  marks.lineWidth = Math.max(0.07, 2 / scale)
+  marks.strokeStyle = palette.strong
+  marks.lineCap = "round"
+  marks.beginPath()
+  for (const { nx, ny, fx, fy } of forces) {
+    if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
+    const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+    arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
+  }
+  marks.stroke()
+}
+
+/** A line in the colour of its axis of force space. */
+export function highlight(marks, scene, chosen, colour) {
+  const { scale, palette } = scene
+  marks.lineCap = "round"
+  for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
+    marks.lineWidth = Math.max(Math.min(AXIS[0], AXIS[1] / scale), 5 / scale) + more
+    marks.strokeStyle = paint
+    for (const { a, b } of scene.segments((contact) => contact === chosen)) line(marks, a, b)
+  }
+}
+
+/** The selected contact, and its two disks. */
+export function markSelected(marks, scene, selected) {
+  const { scale, palette, geometry } = scene
+  marks.strokeStyle = palette.selected
+  marks.lineCap = "round"
+  for (const { k, a, b } of scene.segments((contact) => contact === selected)) {
+    marks.lineWidth = 2 / scale
+    for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
+      circle(marks, at, geometry.radius[grain])
+      marks.stroke()
+    }
+    marks.lineWidth = Math.max(0.12, 3 / scale)
+    line(marks, a, b)
+  }
+}
