@@ -94,7 +94,7 @@ class Picture(NamedTuple):
     branch: Floats  # (N_c, 2) from centre to centre
     forces: Floats  # (N_c, 2) f_n, f_t
     mu: float
-    packing_fraction: float  # 0 in an open box
+    packing_fraction: float  # NaN in an open box
 
 
 def packing_svg(packing: Picture) -> str:

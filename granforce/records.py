@@ -105,8 +105,8 @@ class Packing(NamedTuple):
 
     @property
     def packing_fraction(self) -> float:
-        """φ = Σ π r² / V, rattlers included."""
-        return float(np.pi * np.sum(self.r**2) / self.volume)
+        """φ = Σ π r² / V, rattlers included; NaN where the box is open."""
+        return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan
 
     def _repr_svg_(self) -> str:
         """The packing as notebooks show it."""

@@ -277,3 +277,34 @@ def test_a_pile_of_own_disks_stands_on_its_floor_from_tables_and_from_arrays(cac
         assert capsys.readouterr().err.count("\n") == 1
     assert main(f"{words} floor --box 9 9".split()) == 2
     assert "leave out the box" in capsys.readouterr().err
+
+
+def test_what_is_not_defined_is_said_so_and_0_is_no_packing_fraction(cache, capsys):
+    packing = gf.from_disks(
+        [[1, 1], [3, 1], [2, 2.7320508]], np.ones(3), 0.6, walls="floor", gravity=1
+    )
+    gf.save_packing(packing, "pile.npz")
+    assert np.isnan(packing.packing_fraction)
+    for command in ("walk --states 4", "measure --states 4", "uniform --states 8"):
+        words = [*command.split(), "--packing", "pile.npz"]
+        assert report(capsys, *words)["packing_fraction"] is None
+        assert main(words) == 0
+        told = capsys.readouterr().out
+        assert "nan" not in told.split() and "undefined" in told
+
+
+def test_what_to_measure_next(cache, capsys):
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    words = "informative --packing p.npz --best 4 --check 2 --states 100 --out next.csv"
+    told = report(capsys, *words.split())
+    S = gf.ensemble(packed(30, 0.3))
+    best = gf.informative(S, 4, states=100, check=2)
+    assert told["contacts"] == best.contacts.tolist()
+    assert told["mean_interval_after [mean]"][0] < told["mean_interval_now [mean]"]
+    assert pd.read_csv("next.csv")["contact"].tolist() == told["contacts"]
+
+
+def test_the_store_says_where_it_is_and_makes_nothing(cache, capsys):
+    assert main(["cache", "path"]) == 0
+    assert capsys.readouterr().out == f"{cache / 'cache'}\n"
+    assert list(cache.iterdir()) == []

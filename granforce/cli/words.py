@@ -189,6 +189,28 @@ def add_infer(commands: Commands) -> None:
     )
 
 
+def add_informative(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "informative",
+        "rank contacts by how much a measurement of their normal force would narrow all others",
+        "granforce informative -n 400 --mu 0.1 --seed 1 --best 5 --known known.csv",
+    )
+    add_any_packing(command)
+    group = command.add_argument_group("the ranking")
+    group.add_argument("--best", type=int, default=10, help="contacts to list (default 10)")
+    group.add_argument(
+        "--check", type=int, default=10, help="contacts to check by exact bounds (default 10)"
+    )
+    group.add_argument("--states", type=int, default=400, help="uniform states (default 400)")
+    group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_out(group, "the result per contact")
+    add_conditions(command)
+    add_store(command)
+
+
 def add_measure(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -542,29 +564,36 @@ def add_cache(commands: Commands) -> None:
     command = subcommand(
         commands,
         "cache",
-        "list, size, clear or verify the store",
+        "list, size, clear or verify the store, or print its path",
         "granforce cache verify --cache scan.zarr",
     )
-    command.add_argument("action", choices=["list", "size", "clear", "verify"])
+    command.add_argument("action", choices=["list", "size", "clear", "verify", "path"])
     command.add_argument("--kind", type=str, help="only entries of this kind (packing, walk, …)")
     add_store(command)
+    command.leaves_out("with path", lambda asked: asked.action == "path", {"kind"})
 
 
 # In the order of the help.
 COMMANDS = (
-    *(add_pack, add_walk, add_uniform, add_volume, add_infer, add_measure, add_scan, add_intervals),
-    *(
-        add_limit_loads,
-        add_stress,
-        add_perturb,
-        add_study,
-        add_app,
-        add_docs,
-        add_completion,
-        add_import,
-        add_export,
-        add_bench,
-    ),
+    add_pack,
+    add_walk,
+    add_uniform,
+    add_volume,
+    add_infer,
+    add_informative,
+    add_measure,
+    add_scan,
+    add_intervals,
+    add_limit_loads,
+    add_stress,
+    add_perturb,
+    add_study,
+    add_app,
+    add_docs,
+    add_completion,
+    add_import,
+    add_export,
+    add_bench,
     add_cache,
 )
 

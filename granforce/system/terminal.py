@@ -44,6 +44,8 @@ def table(
 def text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "undefined"
     if isinstance(value, (list, tuple)):
         return " ".join(text(part) for part in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -33,6 +33,7 @@ LINES = {
         "--packing p.npz --measured m.csv --states 8",
         f"{FRAMES} --frames all --mu 0.3 --states 4 --workers 1 --strict",
     ],
+    "informative": [f"{MU} --states 8", "--packing p.npz --states 8"],
     "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
     "intervals": [MU, "--packing p.npz"],
     "limit-loads": [MU, "--packing p.npz"],
@@ -67,7 +68,7 @@ LINES = {
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "export": ["p.npz g.vtp c.vtp"],
     "bench": ["--quick"],
-    "cache": ["list", "size", "verify", "clear"],
+    "cache": ["list", "size", "verify", "clear", "path"],
 }
 
 

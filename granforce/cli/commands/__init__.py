@@ -1,7 +1,7 @@
 """The commands, by what they are about: each takes its arguments, and may return an exit code."""
 
 from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
-from granforce.cli.commands.inference import infer
+from granforce.cli.commands.inference import infer, informative
 from granforce.cli.commands.packings import export, import_, pack
 from granforce.cli.commands.service import app, bench, cache, completion, docs, study_
 from granforce.cli.commands.states import measure, scan, uniform, volume, walk
@@ -15,6 +15,7 @@ __all__ = [
     "export",
     "import_",
     "infer",
+    "informative",
     "intervals",
     "limit_loads",
     "measure",

@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from granforce.cli import frames
-from granforce.cli.asked import conditions, found, unit, write_csv
+from granforce.cli.asked import conditions, found, unit, write_columns, write_csv
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
@@ -17,6 +17,33 @@ INFERENCE_LINES = (
     *("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held"),
     *("setup_seconds", "sampling_seconds"),
 )
+
+
+def informative(arguments: argparse.Namespace) -> None:
+    """Contacts worth measuring, ranked or found; report them. Intervals are in ⟨f_n⟩."""
+    entry, _, dataset, ends = found(
+        *(arguments, kinds.INFORMATIVE, arguments.out),
+        k=arguments.best,
+        check=arguments.check,
+        states=arguments.states,
+        seed=arguments.sample_seed,
+        **conditions(arguments),
+    )
+    columns = {
+        "contact": dataset["backbone"].values,
+        "part_expected": dataset["part_expected"].values,
+        "mean_interval_after [mean]": dataset["mean_after"].values,
+    }
+    lines = {
+        "entry": entry,
+        "contacts": columns["contact"].tolist(),
+        "part_expected": columns["part_expected"].tolist(),
+        "mean_interval_now [mean]": dataset["mean_before"].item(),
+        "mean_interval_after [mean]": columns["mean_interval_after [mean]"].tolist(),
+    }
+    print_report(lines | ends, arguments.json)
+    if arguments.out is not None:
+        write_columns(arguments.out, columns)
 
 
 def infer(arguments: argparse.Namespace) -> int | None:

@@ -21,6 +21,7 @@ from granforce.cli.parsing import ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
 from granforce.system.files import make_folder
+from granforce.system.plain import json_text
 from granforce.system.terminal import print_list, print_report
 
 
@@ -140,6 +141,10 @@ def bench(arguments: argparse.Namespace) -> None:
 
 def cache(arguments: argparse.Namespace) -> int:
     """List, measure, clear or verify a store. Returns 1 if an entry is damaged."""
+    if arguments.action == "path":
+        path = str(open_store(arguments.cache).path)
+        print(json_text({"path": path}) if arguments.json else path)
+        return 0
     store = open_store(arguments.cache, readonly=True)  # which makes none where there is none
     if arguments.action == "clear":
         store = open_store(store.path)
