@@ -308,3 +308,16 @@ def test_the_store_says_where_it_is_and_makes_nothing(cache, capsys):
     assert main(["cache", "path"]) == 0
     assert capsys.readouterr().out == f"{cache / 'cache'}\n"
     assert list(cache.iterdir()) == []
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_the_library_logs_that_it_compiles_and_is_silent_by_default(asked):
+    code = (
+        "import logging\n"
+        f"if {asked}: logging.basicConfig(level=logging.INFO)\n"
+        "import granforce.numerics.lanes, numba\n"
+        "numba.njit(lambda x: x + 1)(1)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    said = "INFO:granforce:compiling kernels, once per machine\n"
+    assert run.stderr == (said if asked else "")

@@ -14,6 +14,7 @@ are slower: eight factors fit into the cache and sixteen do not).
 """
 
 import ctypes.util
+import logging
 import math
 import operator
 import os
@@ -26,12 +27,17 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from granforce.system.compiled import skip_unreadable_indices
+from granforce.system.compiled import skip_unreadable_indices, tell_when_compiling
 from granforce.types import Floats
 
 skip_unreadable_indices()
 
 LANES = 8
+# Heard by those who ask for it: logging.basicConfig(level=logging.INFO).
+_log = logging.getLogger("granforce")
+_log.addHandler(logging.NullHandler())
+tell_when_compiling(lambda: _log.info("compiling kernels, once per machine"))
+
 # Kernels that are called from Python, and those that are called by kernels only: without what the
 # former need to be called, a third of the time to compile is saved.
 # Where the compiler is off (NUMBA_DISABLE_JIT) they run as they are written, slowly, with the same
