@@ -20,11 +20,8 @@ SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATI
 class Player(Scripted, Seen):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
-    Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn
-    (scene.js, or sheet.js for a file), its buttons (buttons.js), the plots beside (plots.js, and
-    layer.js for what moves in them), and player.js, which plays; live.js shows what is still being
-    computed, grab.js pulls single contacts, point.js the point in force space; split.js shows two
-    networks, or two packings, and pins.js marks the contacts that are known.
+    Its script has parts: what is replayed and how it plays (replay/), where and how it is drawn
+    (drawing/), what takes forces into the hand (hand/), and the bar, keys and tools around it.
 
     The frames are shipped once, in `walk`. Plots beside it are found in the page by their names;
     any ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the
