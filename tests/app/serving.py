@@ -47,7 +47,7 @@ def serve(folder, *options, port=None, wait=True, **variables):
         yield f"http://localhost:{port}/app", server
     finally:
         server.terminate()
-        server.wait(20)
+        server.wait(60)  # it may be compiling
 
 
 def free_port():

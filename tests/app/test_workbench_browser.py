@@ -142,8 +142,8 @@ def test_walls_press_in_place_of_gravity(look):
     searched(page, "%7Cp1")
     page.get_by_role("slider", name="friction μ").fill("0.1")
     says(page, "the wall that presses give way")
-    page.get_by_role("button", name="Clear").click()
     page.get_by_role("radio", name="Gravity").click()
+    page.get_by_role("button", name="Clear").click()
     says(page, "Everything is determined")
 
 
