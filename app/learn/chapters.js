@@ -46,8 +46,8 @@ export const CHAPTERS = [
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The plot shows it over two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
     doing: "Drag the dot to the right as far as it goes. Where it was, it paints S.",
-    see: ({ high, weight }) => [
-      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: wedged between them, the disks are pulled down by friction as hard as it can.`,
+    see: ({ high, weight, mu }) => [
+      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: wedged between them, the disks are pulled down by friction. It ends where friction at the floor is at its limit, ${mu} × ${two(high)}: the lower disk is about to slip.`,
       `So the floor can carry more than the disks weigh. Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip.`,
     ],
     count: (facts) => counted(facts, false),
