@@ -72,7 +72,6 @@ class Seen(param.Parameterized):
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    fresh = param.Boolean(doc="whether no force was dragged yet in this browser")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )

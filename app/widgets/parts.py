@@ -19,7 +19,6 @@ NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 
 MOVES = ["moves"]  # tags of what the player draws itself while it plays
 
-
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
 # Small buttons: what one is here for, and what else can be done.
 PRIMARY = {"color": "primary", "size": "small"}
