@@ -163,6 +163,10 @@ CALLS = {
     "rest": lambda S, _: gf.rest(S, draws=1),
     "open_store": lambda S, folder: list(gf.open_store(folder / "store.zarr")),
     "measures": lambda S, _: measured(S),
+    "to_dataset": lambda S, _: gf.to_dataset(S.original, S),
+    "to_dataframe": lambda S, _: gf.to_dataframe(S.original, S),
+    "plot": lambda S, _: gf.plot(S.packing, backend="matplotlib"),
+    "from_disks": lambda S, _: gf.from_disks([[1, 1]], [1], 0.5, walls="floor", gravity=1),
 }
 # They check and name what they are given, and keep nothing.
 _RECORDS = {"make_contacts", "make_packing"}
