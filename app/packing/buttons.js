@@ -91,8 +91,9 @@ export class Buttons {
     }
     for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", all[name])
     this.part("legend").addEventListener("change", ({ target }) => {
-      const value = { checkbox: target.checked, number: target.value === "" ? null : target.valueAsNumber }[target.type] ?? target.value
-      if (target.validity.valid && (value !== null || target.placeholder)) look(target.name, value)
+      const empty = target.type === "number" && target.value === ""
+      const value = target.type === "checkbox" ? target.checked : empty ? null : target.type === "number" ? target.valueAsNumber : target.value
+      if (target.validity.valid && (!empty || target.placeholder)) look(target.name, value)
       else target.value = target.defaultValue
     })
     const extras = this.part("extras")
