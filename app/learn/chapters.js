@@ -32,10 +32,10 @@ export const CHAPTERS = [
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
     text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall presses on it with a normal force, and by friction holds it along the wall, with at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
-    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance.",
+    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; an arrow turns orange where its contact is about to slip.",
     see: ({ high, mu }) => [
       `Pressed this hard, the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}.`,
-      `So each wall can press harder than the disk weighs, and a picture of the disk does not show whether it does. The line is called S: each of its points is one set of forces that holds the disk.`,
+      `So each wall can press harder than the disk weighs, and a picture of the disk does not show whether it does. The bar is called S: each of its points is one set of forces that holds the disk.`,
     ],
     count: (facts) => counted(facts, false),
     x: { low: 0, high: 3, label: "normal force at the left wall (weight of the disk = 1)" }, y: null,
@@ -47,7 +47,7 @@ export const CHAPTERS = [
     ask: "How large can the floor’s normal force become?",
     doing: "Drag the dot to the right as far as it goes. Where it was, it paints S.",
     see: ({ high, weight, mu }) => [
-      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: wedged between them, the disks are pulled down by friction. It ends where friction at the floor is at its limit, ${mu} × ${two(high)}: the lower disk is about to slip.`,
+      `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: the disks are wedged between them, and friction there pulls them down. With more, the lower disk would slip on the floor, where friction is at its limit, ${mu} × ${two(high)}.`,
       `So the floor can carry more than the disks weigh. Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip.`,
     ],
     count: (facts) => counted(facts, false),
@@ -101,8 +101,9 @@ export const CHAPTERS = [
     doing: "Drag the dot along the axis. Each stop shows a packing made with that friction.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), last = rows.at(-1)
+      const first = rows[0]
       return [
-        `From the left, forces vary more as friction lets them lean further. Then contacts vanish, and free numbers with them: at μ = ${most.mu} there are ${most.free} in ${most.contacts} contacts, at μ = ${last.mu} only ${last.free} in ${last.contacts}.`,
+        `At smaller μ more numbers are free, but friction leaves each less room: at μ = ${first.mu}, ${first.free} are free and forces vary by ${percent(first.spread)}. At larger μ contacts vanish, and free numbers with them: ${most.free} at μ = ${most.mu}, ${last.free} at μ = ${last.mu}.`,
         `So more friction does not mean more freedom: with very much of it, hardly any number is free. The line is the mean over many packings.`,
       ]
     },
@@ -120,7 +121,7 @@ export const CHAPTERS = [
     doing: "Drag the dot to the right: the arrows grow.",
     see: ({ high, limit, opened, slid }) => [
       `Then ${opened} contacts open, ${slid} slip, and disks set off; their motion is drawn enlarged.`,
-      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: which forces it really has decides, and no picture of the disks shows them. That is why it matters how much they leave open.`,
+      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: which forces it really has decides, and no picture of the disks shows them. That is why it matters how much a picture leaves open.`,
     ],
     count: null,
     x: { low: 0, high: 6, label: "push (mean force = 1)" }, y: null,

@@ -77,7 +77,9 @@ class Lesson {
       return
     }
     if (turn !== this.asked) return experiment.stop()
-    const x = model.frictions.length && chapter.x.log ? { ...chapter.x, stops: [...model.frictions], ticks: [...model.frictions] } : chapter.x
+    parts.pictures.classList.remove("waiting")
+    const stops = [...model.frictions]
+    const x = stops.length && chapter.x.log ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.textContent = chapter.text(experiment.facts)
     parts.text.append(" ", made("strong", { textContent: chapter.ask }))
     const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
@@ -94,8 +96,8 @@ class Lesson {
   lay(chapter) {
     const { number } = this, last = number === CHAPTERS.length - 1
     const heading = made("h1", { textContent: chapter.heading, tabIndex: -1 }), text = made("p", { className: "text" })
-    const pictures = made("div", { className: "pictures" }), voice = made("div", { className: "voice", ariaLive: "polite" })
-    voice.textContent = "Loading …"
+    const pictures = made("div", { className: "pictures waiting" }), voice = made("div", { className: "voice", ariaLive: "polite" })
+    voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(made("figure", { className })))
     const row = made("div", { className: "row" }), turn = made("span", { className: "turn" })
     const move = (words, by) => button(words, () => this.go(number + by), { disabled: !CHAPTERS[number + by] })
@@ -105,7 +107,7 @@ class Lesson {
     const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with these disks</a>` : ""
     const after = made("p", { className: "after", innerHTML: onwards })
     this.main.replaceChildren(heading, text, pictures, voice, row, after)
-    return { text, picture, plot, voice, row }
+    return { text, pictures, picture, plot, voice, row }
   }
 
   /** The list of chapters, with those that are done. */
@@ -134,5 +136,8 @@ class Lesson {
     })
   }
 }
+
+/** Whether a friction is a power of ten: other ticks would show an answer. */
+const isDecade = (mu) => Math.abs(Math.log10(mu) - Math.round(Math.log10(mu))) < 1e-9
 
 export function render({ model, view }) { return new Lesson(model, view).root }

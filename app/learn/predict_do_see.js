@@ -3,7 +3,7 @@
 import { button, made } from "../browser/dom.js"
 import { QuantityPlot } from "./drawing/quantity_plot.js"
 
-const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks …"
+const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
 const STAGES = ["Predict", "Do", "See"]
 
 

@@ -128,7 +128,8 @@ export class QuantityPlot {
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
       const half = (words.length * PILL.letter) / 2
       this.reading.setAttribute("x", Math.min(0, this.wide - 4 - half - px) + Math.max(0, 4 + half - px))
-      this.reading.textContent = words
+      const covered = answer && Math.abs(this.x.px(answer.value) - px) < half // by the line of the answer
+      this.reading.textContent = covered ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
     }
