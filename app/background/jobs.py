@@ -117,7 +117,7 @@ class Pool:
 computing = Pool(
     LIMITS.computations,
     "granforce-compute",
-    extra=LIMITS.computations if LIMITS.shared else 0,
+    extra=LIMITS.computations,
     seconds=LIMITS.seconds,
 )
 # What only reads stores must not wait for a computation to end.

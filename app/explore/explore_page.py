@@ -24,7 +24,6 @@ from .controls import Controls
 from .page_address import Address
 from .results_line import Results
 from .status_line import StatusLine
-from .tabs.export import figure
 from .tabs.tabs import Tabs, pale_when_old
 from .volume import Volume
 
@@ -154,7 +153,7 @@ class _Around:
         yield
         yield from tabs.filling(state.looks.tab)
         yield from tabs.beside(self.space)
-        self.panels.extend([figure.panel(state), Address(state), Hints()])
+        self.panels.extend([Address(state), Hints()])
         explanation.follow(state, self.header)
         state.read_ahead()
 

@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 
 from ...state.app_state import AppState
 from ...widgets.parts import PLAIN
-from .export import export
+from .export import export, figure
 from .force_space import force_space
 from .friction import friction
 from .intervals import intervals
@@ -41,6 +41,7 @@ WIDE = {"sizing_mode": "stretch_width", "margin": 0}
 SPACE = f"<h2>{TABS['plane'][0]}</h2>"
 HEADING = "h2 { margin: 0; padding: 6px 2px; border-bottom: 1px solid var(--line); "
 HEADING += "font-size: 15px; font-weight: 600; line-height: 23px; }"
+PLOTTED = ("intervals", "plane", "statistics", "perturb")  # what can be saved with the packing
 GROWING = ("intervals", "plane")  # what shows a walk while it is computed
 
 
@@ -124,6 +125,8 @@ class Tabs:
                 self._space = view
             yield
             pieces = list(view.panel())
+            if name in PLOTTED:
+                pieces.append(figure.panel(self.state))
             # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
             for k in range(-1, len(pieces), 2):
                 if self._has_place(name):
