@@ -21,7 +21,7 @@ from .this_packing import Scatter, forces
 
 # Where it is wide enough, z is drawn within Figure 1, where no curve is; else below it.
 INSET = """
-:host { position: absolute; top: 30px; left: 70px; width: 40% !important; z-index: 1; }
+:host { position: absolute; top: 56px; left: 70px; width: 40% !important; z-index: 1; }
 @media (max-width: 599.95px) { :host { position: static; width: 100% !important; } }
 """
 CLAIMED = {

@@ -74,7 +74,8 @@ class Indeterminacy:
         return (
             f"<b>Forces are least determined at μ = {mu:g}: η₂ = {with_error(value, error)}.</b> "
             f"Friction widens what each contact can carry, but packings made with more of it have "
-            f"fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). Points: means "
+            f"fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). As in the "
+            "paper's Figure 1. Points: means "
             f"over {packings(walks)} packings of 400 disks, with standard errors; ring: the "
             "packing on screen. Click a point to open such a packing, or to compute it."
         )
@@ -124,7 +125,7 @@ def extents(own: list[Row], mu: float) -> tuple[Figure, str]:
         return fig, ""
     widest = max(means, key=lambda label: means[label])
     text = (
-        f"<b>How long are the intervals?</b> Of these, longest on average at {widest}: "
+        f"<b>How long are the intervals?</b> (Figure 4) Of these, longest on average at {widest}: "
         f"{means[widest]:.2f} mean forces. Beyond the median P falls like exp(−(λx)<sup>b</sup>); "
         f"b = 1 is exponential. {'; '.join(tails)}. Bars: standard errors over packings."
     )
@@ -175,7 +176,7 @@ class Correlations:
         values = [value for _, value, _ in points]
         mu, most, error = max(points, key=lambda point: point[1])
         return (
-            "<b>Are the strong contacts the undetermined ones?</b> The "
+            "<b>Are the strong contacts the undetermined ones?</b> (Figure 6) The "
             f"{term('correlation')} of fₙ as packed with ΔFₙ lies between {min(values):.2f} and "
             f"{max(values):.2f} for the walk; it is largest, {with_error(most, error)}, at "
             f"μ = {mu:g}. 1: the strongest contacts are the least determined; 0: unrelated."
