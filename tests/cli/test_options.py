@@ -23,9 +23,9 @@ FRAMES = "positions.txt adjacency.txt"
 # Command lines, one at least for each way of calling a command, as its parser knows them.
 LINES = {
     "pack": [MU, "--scene groove --mu 0.5"],
-    "walk": [f"{MU} --states 3", "--packing p.npz --states 3"],
+    "walk": [f"{MU} --states 3", "--packing p.npz --states 3 --out walk.csv"],
     "measure": [f"{MU} --states 3", "--packing p.npz --states 3"],
-    "uniform": [f"{MU} --states 8", "--packing p.npz --states 8"],
+    "uniform": [f"{MU} --states 8", "--packing p.npz --states 8 --out states.csv"],
     "volume": [f"{MU} --accuracy 0.5", "--packing p.npz --accuracy 0.5"],
     "infer": [
         f"{MU} --measured m.csv --states 8",
@@ -244,6 +244,7 @@ def test_no_output_is_an_input_or_another_output(alias, tmp_path, monkeypatch, c
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
     tried = 0
+    Path("nowhere").touch()  # an input that is there
     for command, out, other in _clashes():
         name, file = "data", Path("data")
         folder = parsing.Workplace in (out.type, other.type) or other.type is parsing.StorePath

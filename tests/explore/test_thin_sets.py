@@ -137,7 +137,7 @@ def test_bounds_of_two_contacts_that_leave_little_between_them(width):
 
 
 def test_commands_say_what_is_pinned(tmp_path, capsys):
-    """Bounds 9·10⁻⁹ ⟨f_n⟩ apart leave two dimensions, and bounds nearer than FLAT leave one."""
+    """Bounds 9·10⁻⁹ ⟨f_n⟩ apart leave all dimensions, and bounds nearer than FLAT take one."""
     packing = packed(8, 0.3, 2)
     S = gf.ensemble(packing)
     gf.save_packing(packing, tmp_path / "p.npz")
@@ -155,6 +155,6 @@ def test_commands_say_what_is_pinned(tmp_path, capsys):
             told[width, command] = json.loads(capsys.readouterr().out)
     for (width, _), lines in told.items():
         pinned = width < 1e-12
-        assert lines["dimension"] == 2 - pinned
+        assert lines["dimension"] == S.dimension - pinned
         assert lines.get("directions_taken_as_pinned", 0) == pinned
         assert lines.get("as_narrower_than") == (1e-12 if pinned else None)

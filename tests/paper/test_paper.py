@@ -499,12 +499,12 @@ def test_versions_are_not_mixed(done, table, tmp_path, capsys):
         (["--packings", "0"], "packings must be at least 1"),
         (["--parts", "everything"], "unknown part"),
         (["--workers", "0"], "--workers"),
-        (["--table", "nowhere.zarr"], "no store"),
+        (["--table", "nowhere.zarr"], "cannot be read"),
         (["--sizes", "many"], "--sizes"),
         (["--sizes", "9" * 400], "--sizes: a packing of 999"),
         (["--formats", "gif"], "--formats"),
         (["--paper", "--parts", "walk"], "--paper names the parts"),
-        (["--reduce", "nowhere.zarr"], "no store"),
+        (["--reduce", "nowhere.zarr"], "cannot be read"),
     ],
 )
 def test_bad_words_are_one_line(tmp_path, capsys, words, told):

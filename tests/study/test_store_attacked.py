@@ -58,7 +58,7 @@ def test_a_clock_that_goes_backwards_takes_nothing_from_writers(tmp_path):
     store = open_store(tmp_path / "store")
     host = re.sub(r"\W", "_", socket.gethostname())
     ours = store.path / f".tmp-{host}-{os.getpid()}-aa"
-    ours.mkdir()
+    ours.mkdir(parents=True)
     elsewhere = store.path / ".tmp-far_away-1-ee"
     elsewhere.mkdir()
     for made in (ours, elsewhere):
