@@ -233,7 +233,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
     for at in (page, visit(query)):
         until(at, f"scene.geometry.mu === 1 && {twin}.geometry?.mu === 0.1")
         captions = [at.locator(f".{name} .caption").inner_text() for name in ("twin", "scene")]
-        assert captions == ["μ = 0.1: as packed", "μ = 1"]
+        assert captions == ["μ = 0.1: network 0 of 30, as packed", "μ = 1"]
         assert scene(at, "scene.geometry.box[0]") != scene(at, f"{twin}.geometry.box[0]")
         before = widths(at, "scene"), widths(at, twin)
         at.locator("button.step").click()

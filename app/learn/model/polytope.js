@@ -300,20 +300,20 @@ export class Body {
   /** Go to the network nearest to u; whether there is one. */
   goTo(u, inverse = null) {
     let found = this.least(u) >= 0 ? u : this.nearest(u, inverse)
-    if (this.least(found) < -1e-7 && this.whole && !this.empty) found = this.inwards(found)
+    if (this.least(found) < -1e-7 && !this.empty) found = this.inwards(found, this.whole ? this.middle : this.u)
     if (this.least(found) < -1e-5 || this.empty) return false
     this.u = found
     return true
   }
 
-  /** What rounding left outside, on the straight line to the middle. */
-  inwards(u) {
+  /** What rounding left outside, on the straight line to a place inside. */
+  inwards(u, place) {
     let inside = 0
     for (const row of this.rows) {
-      const here = dot(row.slope, u) + row.rest, there = dot(row.slope, this.middle) + row.rest
+      const here = dot(row.slope, u) + row.rest, there = dot(row.slope, place) + row.rest
       if (here < 0 && there > here) inside = Math.max(inside, Math.min(1, -here / (there - here)))
     }
-    return u.map((v, k) => v + inside * (this.middle[k] - v))
+    return u.map((v, k) => v + inside * (place[k] - v))
   }
 
   /** Pull the force of a contact towards (f_n, f_t); everything else follows as little as it can. */

@@ -201,6 +201,8 @@ class View(TabView):
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
     def _outlined(self, replay: Replay, found: Outlined) -> None:
+        if replay is not self.state.seen:  # which another packing has replaced meanwhile
+            return
         self._show(replay, found.plane)
         self.found = found
         self.drawing.outline(found)
