@@ -18,7 +18,7 @@ import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while a force is pulled
-const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
+const OLD = 0.88 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // after which a view that was moved is taken into the link
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
