@@ -52,6 +52,7 @@ def test_no_tab_has_a_serious_finding(visit, dark):
         assert findings(page) == [], title
 
 
+@pytest.mark.slow
 def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     page = visit()
     scales(page).get_by_role("combobox", name="Colour").click()
