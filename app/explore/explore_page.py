@@ -8,12 +8,10 @@ from urllib.parse import parse_qsl
 import panel as pn
 from bokeh.document import Document
 
-from ..background import gc_pauses
 from ..browser.panel_patches import send_what_waits
 from ..packing.player import Player
 from ..packing.replay.stream import Stream
 from ..packing.view import PackingView
-from ..results.library import Library
 from ..state import visit
 from ..state.app_state import AppState
 from ..widgets.header import Header
@@ -97,8 +95,7 @@ GRID = {
 
 def explore_page(document: Document, query: str) -> Any:
     """The page of large packings, as a link's query asks; `embed=1`: the packing alone."""
-    library = pn.state.as_cached("library", _open_library)
-    state = AppState(library, visit.turns(document), query, visit.visitor(document))
+    state = AppState(visit.library(), visit.turns(document), query, visit.visitor(document))
     looks, work = state.looks, state.work
     work.message = work.message or " ".join(state.library.notes)
     packing = PackingView(state)
@@ -156,9 +153,3 @@ class _Around:
         self.panels.extend([Address(state), Hints()])
         explanation.follow(state, self.header)
         state.read_ahead()
-
-
-def _open_library() -> Library:
-    """The stores, once for all visitors."""
-    gc_pauses.settle()
-    return Library()

@@ -8,7 +8,6 @@ import panel as pn
 from bokeh.document import Document
 
 from ..background.jobs import Task, computing
-from ..results.library import Library
 from ..state import visit
 from ..widgets.header import Header
 from ..widgets.page_frame import framed
@@ -31,8 +30,7 @@ def learn_page(document: Document, query: str) -> Any:
     alone = given.get("embed") == ["1"]
     header = None if alone else Header(door="learn", dark=asked.dark, keys=KEYS)
     if "learn" in given:
-        library = pn.state.as_cached("library", Library)
-        packings = pn.state.as_cached("packings of the lesson", partial(Packings, library))
+        packings = pn.state.as_cached("packings of the lesson", partial(Packings, visit.library()))
         view: Any = Lesson(packings, wake, visitor, dark=asked.dark, alone=alone)
         visit.at_end(view.close)
     else:

@@ -11,11 +11,22 @@ from tornado.ioloop import IOLoop
 from ..background import gc_pauses
 from ..background.jobs import Visitor
 from ..browser.panel_patches import in_transit, together, unseen_ms
+from ..results.library import Library
 from .page_tasks import Work
 
 POLL_MS = 200  # how often the page asks running work how far it is
 # Without a browser, after which a page's work is ended; the page itself stays longer.
 GONE_MS = 3000
+
+
+def library() -> Library:
+    """The stores, opened once for all visitors."""
+    return pn.state.as_cached("library", _open_library)
+
+
+def _open_library() -> Library:
+    gc_pauses.settle()
+    return Library()
 
 
 def at_end(close: Callable[[], object]) -> None:
