@@ -4,7 +4,6 @@ import argparse
 import importlib
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from mkdocs.structure.pages import Page
 import granforce
 from granforce import glossary
 from granforce.cli.words import make_parser
+from granforce.paper.formatting import markdown_table
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "examples.md"
@@ -66,17 +66,11 @@ def bench_table(part: str) -> str:
     if isinstance(rows, dict):
         libraries = rows.pop("libraries")
         rows |= {name: version for name, version in libraries.items() if version}
-        return table(["", "value"], [[name, str(value)] for name, value in rows.items()])
+        return markdown_table(["", "value"], [[name, str(value)] for name, value in rows.items()])
     names = list(dict.fromkeys(name for row in rows for name in row))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
     heads = [name.replace("_", " ") for name in names]
-    return table(heads, [[cell(row.get(name)) for name in names] for row in rows])
-
-
-def table(heads: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(escaped(text) for text in line)} |\n" for line in lines)
+    return markdown_table(heads, [[cell(row.get(name)) for name in names] for row in rows])
 
 
 def cell(value: Any) -> str:
@@ -120,30 +114,15 @@ def examples() -> dict[str, str]:
 def command_line() -> str:
     """The help of every command."""
     text = "# Command line\n\nThe help of every command, as `granforce COMMAND --help` prints it.\n"
-    for name, parser in commands(make_parser()):
-        text += f"\n## granforce {name}\n\n```text\n{parser.format_help()}```\n"
-    return text
-
-
-def commands(
-    parser: argparse.ArgumentParser, prefix: str = ""
-) -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """(name, parser) of each command and subcommand."""
-    for action in parser._actions:
+    for action in make_parser().every_action():
         if isinstance(action, argparse._SubParsersAction):
-            for name, sub in action.choices.items():
-                yield f"{prefix}{name}", sub
-                yield from commands(sub, f"{prefix}{name} ")
+            for parser in dict.fromkeys(action.choices.values()):
+                text += f"\n## {parser.prog}\n\n```text\n{parser.format_help()}```\n"
+    return text
 
 
 def symbols() -> str:
     """The glossary as a table."""
-    rows = "".join(
-        f"| {escaped(term.symbol)} | {term.word} | {escaped(term.sentence)} |\n"
-        for term in sorted(glossary.TERMS.values(), key=lambda term: not term.symbol)
-    )
-    return f"# Symbols\n\n| symbol | name | meaning |\n|---|---|---|\n{rows}"
-
-
-def escaped(text: str) -> str:
-    return text.replace("|", "\\|")
+    terms = sorted(glossary.TERMS.values(), key=lambda term: not term.symbol)
+    rows = [[term.symbol, term.word, term.sentence] for term in terms]
+    return "# Symbols\n\n" + markdown_table(["symbol", "name", "meaning"], rows)

@@ -19,19 +19,17 @@ from granforce.measures import statistics
 from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
+from granforce.paper.formatting import NOTHING, RAISED, markdown_table, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
 from granforce.system.files import written
-from granforce.types import Floats, Rows
+from granforce.types import Rows
 
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
 _SWEPT_EXTENT = "sweeps 0.15 η3"
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on the main table says how far outside
-_NOTHING = 1e-9  # η below this is rounding
-_MOST_DIGITS = 6  # after the point; more are told as a power of ten
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 FIGURES = "../../../data/figures"  # from the page of results
 HEADLINES = 4  # highlights in the first document that people read
 # Findings that are too many for a table: `claims.json` has them.
@@ -118,7 +116,7 @@ def measures(table: StudyTable) -> str:
             if head == _SWEPT_EXTENT and mu in known and known[mu][0] > _FAR * known[mu][1]:
                 line[-1] += f", excess {_excess(*known[mu])}"
         lines.append(line)
-    return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
+    return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
 def beside(table: StudyTable) -> str:
@@ -154,7 +152,7 @@ def beside(table: StudyTable) -> str:
             for rows, (_, _, name, form) in zip(of_mu, columns, strict=True)
         ]
         lines.append([f"{mu:g}", str(most), *cells])
-    return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
+    return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
 def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
@@ -162,7 +160,7 @@ def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
     return [
         row | {"ratio": row[name] / other[name]}
         for row, other in statistics.paired(rows, others)
-        if name in row and other.get(name, 0) > _NOTHING
+        if name in row and other.get(name, 0) > NOTHING
     ]
 
 
@@ -178,7 +176,7 @@ def sweeps(table: StudyTable) -> str:
         ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
         for mu, rows in _by_friction(table.part(part)).items():
             cells = [
-                f"10{str(round(np.log10(residual))).translate(_RAISED)}",
+                f"10{str(round(np.log10(residual))).translate(RAISED)}",
                 f"{mu:g}",
                 str(len(rows)),
                 _cell(rows, "reached_part", 1.0, "{:.2f}", len(rows)),
@@ -196,13 +194,13 @@ def sweeps(table: StudyTable) -> str:
             )
             lines.append([*cells, *eta])
     heads = ("end at", "μ", "packings", "states reached", "sweeps per state", "excess")
-    return _markdown([*heads, "η2", "over nearest η2"], lines)
+    return markdown_table([*heads, "η2", "over nearest η2"], lines)
 
 
 def _excess(excess: float, length: float) -> str:
     """How far states reach beyond S, over its extent; all of it where S is one point."""
-    if length < _NOTHING:
-        return "all" if excess > _NOTHING else "0"
+    if length < NOTHING:
+        return "all" if excess > NOTHING else "0"
     part = excess / length
     return f"{part:.2g}" if part >= _NEAR else f"< {_NEAR:g}"
 
@@ -234,7 +232,7 @@ def preparation(table: StudyTable) -> str:
                     if row["mu"] == mu and row["seed"] in seeds and measure in row
                 ]
                 counted.add(len(rows))
-                text = _with_error(np.array([row[measure] for row in rows])) if rows else ""
+                text = with_error(np.array([row[measure] for row in rows])) if rows else ""
                 if name and rows:
                     apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
                     if np.isfinite(apart):
@@ -245,7 +243,7 @@ def preparation(table: StudyTable) -> str:
                 word = name.removeprefix("prepared_").replace("_", " ") or "default"
                 lines.append([f"{mu:g}", word, str(max(counted)), *cells])
     heads = ["μ", "made with", "packings", *(head for head, *_ in columns)]
-    text = _markdown(heads, lines)
+    text = markdown_table(heads, lines)
     if not differences:
         return text
     size = np.abs(differences)
@@ -296,8 +294,8 @@ def finding_table(findings: Rows) -> str:
             others.append([statement, number])
     words = [word for word, _ in RANGES]
     lines = [[name, *(found.get(word, "") for word in words)] for name, found in ranged.items()]
-    first = _markdown(["finding", *(f"{word} μ" for word in words)], lines) if lines else ""
-    second = _markdown(["finding", "number"], others) if others else ""
+    first = markdown_table(["finding", *(f"{word} μ" for word in words)], lines) if lines else ""
+    second = markdown_table(["finding", "number"], others) if others else ""
     return "\n".join(part for part in (first, second) if part)
 
 
@@ -325,7 +323,7 @@ def counts(table: StudyTable) -> str:
             versions = [_version(some, name) for name in ("version", "packing_version")]
             lines.append([part, str(n), str(len(made)), span, *versions])
     heads = ("part", "disks", "μ", "packings at each", "version", "version of packings")
-    return _markdown(heads, lines)
+    return markdown_table(heads, lines)
 
 
 def _version(rows: Rows, name: str) -> str:
@@ -351,25 +349,8 @@ def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -
     if not len(values):
         return ""
     mean = values.mean()
-    text = form.format(mean) if form else _with_error(values)
+    text = form.format(mean) if form else with_error(values)
     return text if len(values) == wanted else f"{text} ({len(values)})"
-
-
-def _with_error(values: Floats) -> str:
-    """Mean ± standard error, to two digits of the error."""
-    mean = float(values.mean())
-    if len(values) < 2 or abs(mean) < _NOTHING:
-        return _short(mean)
-    error = float(values.std(ddof=1) / np.sqrt(len(values)))
-    if error < _NOTHING:
-        return _short(mean)
-    digits = 1 - int(f"{error:.1e}".partition("e")[2])  # of the rounded error
-    if digits <= _MOST_DIGITS:
-        return f"{mean:.{max(0, digits)}f} ± {error:.{max(0, digits)}f}"
-    power = int(np.floor(np.log10(abs(mean))))
-    digits = max(0, power + digits)
-    scaled = f"({mean / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})"
-    return f"{scaled}·10{str(power).translate(_RAISED)}"
 
 
 def claim_table(claims: Rows) -> str:
@@ -383,7 +364,7 @@ def claim_table(claims: Rows) -> str:
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(found[name]) if name in found else "" for name in _HEADS]
         rows.append([statement, source, criterion, *cells])
-    return _markdown(["claim", "from", "criterion", *_HEADS.values()], rows)
+    return markdown_table(["claim", "from", "criterion", *_HEADS.values()], rows)
 
 
 def _verdict(claim: dict[str, Any]) -> str:
@@ -392,16 +373,3 @@ def _verdict(claim: dict[str, Any]) -> str:
         return claim["verdict"] + why
     ends = f" ({claim['low']:.3g} … {claim['high']:.3g})" if np.isfinite(claim["low"]) else ""
     return f"{claim['value']:.3g}{ends}: {claim['verdict']}{why}"
-
-
-def _short(value: float) -> str:
-    """Three decimals, or two digits of what is smaller."""
-    if abs(value) < _NOTHING:
-        return "< 10⁻⁹"
-    return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
-
-
-def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    rows = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)

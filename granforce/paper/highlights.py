@@ -7,6 +7,7 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper.claims.groups import SAMPLERS
+from granforce.paper.formatting import with_error
 from granforce.paper.tables import StudyTable
 from granforce.types import Rows
 
@@ -41,7 +42,7 @@ class _Numbers:
     def mean(self, sampler: str, name: str, mu: float, factor: float = 1.0) -> str:
         """Mean ± standard error over packings at one μ."""
         values = factor * statistics.grouped(self.table.part(SAMPLERS[sampler]), name)[mu]
-        return f"{values.mean():.3g} ± {values.std(ddof=1) / np.sqrt(len(values)):.1g}"
+        return with_error(values)
 
     def whole(self, sampler: str, name: str, mu: float) -> str:
         """Mean over packings at one μ, as a whole number."""

@@ -1,0 +1,42 @@
+"""Numbers with their errors, and tables, as text."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from granforce.types import Floats
+
+NOTHING = 1e-9  # η below this is rounding
+_MOST_DIGITS = 6  # after the point; smaller values are written with a power of ten
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def short(value: float) -> str:
+    """Three decimals, or two digits of what is smaller."""
+    if abs(value) < NOTHING:
+        return "< 10⁻⁹"
+    return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
+
+
+def with_error(values: Floats) -> str:
+    """Mean ± standard error, to two digits of the error."""
+    mean = float(values.mean())
+    if len(values) < 2 or abs(mean) < NOTHING:
+        return short(mean)
+    error = float(values.std(ddof=1) / np.sqrt(len(values)))
+    if error < NOTHING:
+        return short(mean)
+    digits = 1 - int(f"{error:.1e}".partition("e")[2])  # of the rounded error
+    if digits <= _MOST_DIGITS:
+        return f"{mean:.{max(0, digits)}f} ± {error:.{max(0, digits)}f}"
+    power = int(np.floor(np.log10(abs(mean))))
+    digits = max(0, power + digits)
+    scaled = f"({mean / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})"
+    return f"{scaled}·10{str(power).translate(RAISED)}"
+
+
+def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown, its cells escaped."""
+    rows = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
