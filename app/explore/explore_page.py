@@ -95,13 +95,15 @@ GRID = {
 
 def explore_page(document: Document, query: str) -> Any:
     """The page of large packings, as a link's query asks; `embed=1`: the packing alone."""
-    state = AppState(visit.library(), visit.turns(document), query, visit.visitor(document))
+    wake = visit.turns(document)
+    state = AppState(visit.library(), wake, query, visit.visitor(document))
     looks, work = state.looks, state.work
     work.message = work.message or " ".join(state.library.notes)
     packing = PackingView(state)
     Stream(state, packing.player, document)
     hears, state.hand.tell = packing.player.hears, packing.player.tell
-    hears["wide"] = lambda wide: looks.param.update(wide=wide)
+    # Told as the page comes, before it hears an answer.
+    hears["wide"] = lambda wide: wake(partial(looks.param.update, wide=wide))
     hears["keep"] = lambda keep: state.keep_all()
     hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
     side = pn.Column(packing.player, css_classes=["side"], **WIDE)

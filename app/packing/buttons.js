@@ -121,10 +121,11 @@ export class Buttons {
 
   /** What lines show, to be chosen; what was open, or has the focus, keeps it. */
   tellLegend(html) {
-    const legend = this.part("legend"), open = legend.querySelector("details")?.open
+    const legend = this.part("legend"), details = () => legend.querySelector("details")
+    if (details()) this.unfolded = details().open // there are none while a packing is made
     const { name } = legend.getRootNode().activeElement ?? {}
     legend.innerHTML = html
-    if (open) legend.querySelector("details").open = true
+    if (details()) details().open = this.unfolded ?? false
     if (name) legend.querySelector(`[name="${name}"]`)?.focus({ preventScroll: true })
   }
 

@@ -192,6 +192,7 @@ class Player {
 
   paintPlots(now = performance.now()) {
     const { model, plots, replay } = this
+    clearTimeout(this.late)
     this.playback.painted = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
@@ -228,8 +229,10 @@ class Player {
     this.replay.mix()
     this.paint()
     const now = performance.now()
-    if (now - this.playback.painted > PLOTS_MS) this.paintPlots(now)
-    else this.buttons.read(this.replay)
+    if (now - this.playback.painted > PLOTS_MS) return this.paintPlots(now)
+    this.buttons.read(this.replay)
+    clearTimeout(this.late)
+    this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the hand has come to rest
   }
 
   /** Whether a network is on screen that was pulled: the legend says so, too. */

@@ -256,7 +256,8 @@ class AppState(param.Parameterized):
     def _show(self, shown: Shown, view: View | None = None) -> None:
         cell, replay, exact = shown
         fresh = dict(UNSEEN)
-        if (self.replay is replay and view is None) or self._is_grown(replay):
+        # A walk that is wanted no more may have gone on to numbers that the replay does not have.
+        if (self.seen is replay and view is None) or self._is_grown(replay):
             fresh = {}
         with as_one(*self.parts, self.work, self):
             self.work.shown(cell.selection)

@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import at_rest, how_it_is_made, scales
+from serving import at_rest, how_it_is_made, scales, until
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -52,7 +52,6 @@ def test_no_tab_has_a_serious_finding(visit, dark):
         assert findings(page) == [], title
 
 
-@pytest.mark.slow
 def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     page = visit()
     scales(page).get_by_role("combobox", name="Colour").click()
@@ -61,7 +60,8 @@ def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     page.get_by_role("button", name="Cancel").filter(visible=True).first.wait_for()
     assert findings(page) == []
     page.get_by_role("button", name="Cancel").filter(visible=True).first.click()
-    page.get_by_text("random walk").first.wait_for()
+    until(page, "!scene.hand.player.model.asked")
+    assert page.get_by_label("Disks N").first.input_value() == "30"
 
 
 def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):

@@ -150,7 +150,6 @@ def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
     np.testing.assert_array_equal(normal(page), before)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""

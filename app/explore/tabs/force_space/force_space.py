@@ -201,7 +201,7 @@ class View(TabView):
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
     def _outlined(self, replay: Replay, found: Outlined) -> None:
-        if replay is not self.state.seen:  # which another packing has replaced meanwhile
+        if self.shown is not None and self.shown[0] is not replay:  # another came meanwhile
             return
         self._show(replay, found.plane)
         self.found = found
