@@ -148,8 +148,8 @@ TERMS = {
     ),
     "r_hat": Term(
         "mixing",
-        "Whether chains started far apart agree: 1 if they do; above 1.1 they have not mixed "
-        "and the sample is unreliable.",
+        "Whether parts of the sample agree, such as both halves of a walk: 1 if they do. Mixed "
+        "means R̂ ≤ 1.1 and enough independent states; otherwise the sample is unreliable.",
         "R̂",
     ),
     "ess": Term(

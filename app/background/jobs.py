@@ -68,6 +68,15 @@ class Pool:
                 self._waiting.append(job)
                 self._changed.notify_all()
 
+    def before(self, job: Job) -> int:
+        """How many jobs come before one that waits: those that run, and those that wait first."""
+        with self._changed:
+            waiting = [other for other in self._waiting if not other.ended]
+            if job not in waiting:
+                return 0
+            waiting.sort(key=self._under_way)
+            return len(self._running) + waiting.index(job)
+
     def _serve(self) -> None:
         while True:
             with self._changed:
@@ -177,6 +186,14 @@ class Job:
             turn.join(self)
         self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
         pool.submit(self)
+
+    @property
+    def doing(self) -> str:
+        """What it is doing, or its place in the queue, in words."""
+        count = self._pool.before(self) if self.stage == WAITING else 0
+        if not count:
+            return self.stage
+        return f"{WAITING}: {count} {'computation' if count == 1 else 'computations'} before it"
 
     def begin(self, stage: str) -> None:
         """Enter a stage; its time left is counted from here."""
@@ -330,7 +347,7 @@ class Task(param.Parameterized):
         on_end = None if self._wake is None else partial(self._wake, self.poll)
         self.job, self._done = Job(work, self._pool, on_end, self._visitor), done
         self.param.update(
-            running=True, stage=self.job.stage, fraction=None, seconds_left=None, keeps=False,
+            running=True, stage=self.job.doing, fraction=None, seconds_left=None, keeps=False,
             message="",
         )  # fmt: skip
 
@@ -339,23 +356,23 @@ class Task(param.Parameterized):
         job = self.job
         if job is None:
             return
-        if not job.ended and job.cancelled() and not job.unwanted():
-            self.job = self._done = None  # it goes on for others
+        if job.cancelled():  # it ends by itself, soon, or goes on for others
+            self.job = self._done = None
             self.param.update(running=False, message="")
             return
         if not job.ended:
             self.param.update(
-                stage="cancelling …" if job.cancelled() else job.stage,
+                stage=job.doing,
                 fraction=job.fraction,
                 seconds_left=job.seconds_left,
-                keeps=job.keeps and not job.cancelled(),
+                keeps=job.keeps,
             )
             return
         done, self.job, self._done = self._done, None, None
         # Told as one: at no moment is the work over and its result not yet there.
         with as_one(self):
             self.param.update(running=False, message=job.error)
-            if done is not None and not job.error and not job.cancelled():
+            if done is not None and not job.error:
                 try:
                     done(job.result)
                 except Exception as error:
@@ -370,6 +387,7 @@ class Task(param.Parameterized):
     def dismiss(self) -> None:
         """Cancel, as the visitor wishes; those who know what was there before bring it back."""
         self.cancel()
+        self.poll()
         self.dismissed = True
         self.dismissed = False
 

@@ -16,6 +16,7 @@ from granforce.measures.sampling import FEWEST, MIXED
 from ..results.replays import Replay
 from ..results.selection import KINDS, SOLVERS, Selection
 from ..state.app_state import AppState
+from ..widgets.hints import term
 
 LEAST_SIZE = 100  # effective size of a uniform sample below which its errors are large
 
@@ -36,11 +37,14 @@ class Sampling(NamedTuple):
 
     sampler: str  # "random walk, nearest admissible state"
     networks: str  # "1000 of 1000 attempts accepted, 50 kept"
-    mixing: str  # "R̂ 1.01, effective size at least 49"
+    verdict: str  # "mixed", "not mixed", or empty where that cannot be said
+    mixing: str  # why: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20"
     doubt: str  # why they cannot be relied on, "not mixed: …"; empty where they can
 
     def __str__(self) -> str:
-        return ", ".join(filter(None, (self.sampler, self.networks, self.mixing)))
+        mixed = f"<b>{term('r_hat', self.verdict)}</b>: {self.mixing}"
+        told = mixed if self.verdict else self.mixing
+        return ", ".join(filter(None, (self.sampler, self.networks, told)))
 
 
 def measures(state: AppState) -> list[Quantity]:
@@ -92,18 +96,30 @@ def sampling(state: AppState) -> Sampling | None:
     selection, replay = state.cell.selection, state.replay
     name, networks = sampler(selection), _networks(replay)
     if not replay.summary["dimension"]:
-        return Sampling(name, "", "one network: every force is determined", "")
+        return Sampling(name, "", "", "one network: every force is determined", "")
     if selection.kind == "uniform":
         r_hat, size = replay.summary["worst_r_hat"], replay.summary["least_bulk_size"]
-        words = f"worst R̂ {r_hat:.2f}, least effective size {size:.0f}"
-        return Sampling(name, networks, words, "; ".join(_doubts(r_hat, size, LEAST_SIZE)))
+        return _judged(name, networks, r_hat, size, LEAST_SIZE, ("worst ", "least ", ""))
     worth = replay.sampling
     if math.isnan(worth.r_hat):
         few = f"{worth.states} networks are too few to say whether the walk has mixed"
-        return Sampling(name, networks, "", few)
+        return Sampling(name, networks, "", "", few)
     bound = "at least " if replay.summary["kept"] < replay.summary["states"] else ""
-    words = f"R̂ {worth.r_hat:.2f}, effective size {bound}{worth.effective:.0f}"
-    return Sampling(name, networks, words, "; ".join(_doubts(worth.r_hat, worth.effective, FEWEST)))
+    return _judged(name, networks, worth.r_hat, worth.effective, FEWEST, ("", "", bound))
+
+
+def _judged(
+    name: str, networks: str, r_hat: float, size: float, least: float, words: tuple[str, str, str]
+) -> Sampling:
+    """Whether networks have mixed, with the criterion; words: before R̂, size, and its value."""
+    before, of_size, bound = words
+    agree, enough = "≤" if r_hat <= MIXED else ">", "≥" if size >= least else "<"
+    mixing = (
+        f"{before}R̂ {r_hat:.2f} {agree} {MIXED:g}, "
+        f"{of_size}effective size {bound}{size:.0f} {enough} {least:g}"
+    )
+    doubt = "; ".join(_doubts(r_hat, size, least))
+    return Sampling(name, networks, "not mixed" if doubt else "mixed", mixing, doubt)
 
 
 def sampler(selection: Selection) -> str:

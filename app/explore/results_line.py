@@ -43,12 +43,15 @@ def tables(state: AppState, volume: Volume) -> str:
     """All numbers as HTML, and what they leave out."""
     known = " under what is held" if state.knowledge.known else ""
     measures = result_values.measures(state)
-    rows = [[f"seen in {state.replay.summary['states']} networks", *_values(measures, "seen")]]
+    told = result_values.sampling(state)
+    seen = f"seen in {state.replay.summary['states']} networks"
+    if told and told.verdict:
+        seen += f", {term('r_hat', told.verdict)}"
+    rows = [[seen, *_values(measures, "seen")]]
     if any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume.found)
     values = [one.exact or (MEASURE if volume.offered else "–") for one in packing]
-    told = result_values.sampling(state)
     doubt = f'<p class="flag" role="note">⚠ {told.doubt}</p>' if told and told.doubt else ""
     left = f'<p class="left">{left_out(state.replay.summary)}</p>'
     return (

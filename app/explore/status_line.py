@@ -71,6 +71,7 @@ def facts(state: AppState) -> Iterator[str]:
     """What there is to know of the numbers on screen, as HTML."""
     cell, replay = state.cell, state.replay
     if cell is None or replay is None:
+        yield "opening the packing …"
         return
     if state.missing:
         yield f"<b>Of μ = {cell.mu:g}, {cell.series}, while others are asked for</b>"

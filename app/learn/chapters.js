@@ -120,7 +120,7 @@ export const CHAPTERS = [
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right: the arrows grow.",
     see: ({ high, limit, opened, slid }) => [
-      `Then ${opened} contacts open, ${slid} slip, and disks set off; their motion is drawn enlarged.`,
+      `Then ${opened} contacts open, ${slid} slip, and disks set off; their motion is drawn enlarged, the farthest by one mean radius.`,
       `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: which forces it really has decides, and no picture of the disks shows them. That is why it matters how much a picture leaves open.`,
     ],
     count: null,

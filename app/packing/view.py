@@ -222,16 +222,16 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"−{full:.3g}", diverging, f"+{full:.3g} ⟨fₙ⟩"
+    change = f"≤ −{full:.3g}", diverging, f"≥ +{full:.3g} ⟨fₙ⟩"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
-        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
-        "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
+        "deviation": (f"≥ {FULL_DEVIATION:g} σ less", diverging, f"≥ {FULL_DEVIATION:g} σ more"),
         "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
@@ -242,10 +242,16 @@ def colour_words(looks: Looks, pulled: bool) -> str:
     return "change by what was pulled" if pulled else COLOURS[looks.colour]
 
 
+def _full(looks: Looks, most: float) -> str:
+    """From where on ΔF_n has its full colour, and why there."""
+    why = "" if looks.full else f" ({SATURATION:g} quantile; larger are full colour)"
+    return f"≥ {most:.2f} ⟨fₙ⟩{why}"
+
+
 def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
-    return f"{full or loads.max(initial=0):.2f} ⟨fₙ⟩"
+    return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
 
 
 def legend(state: AppState, pulled: bool = False) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import xarray as xr
@@ -37,7 +38,7 @@ def found_or_made(
         with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
             job.begin(stage)
-            found, _ = study.get(library.own, kind, params, progress=job.tell, **options)
+            found, _ = study.get(library.own, kind, params, **{"progress": job.tell} | options)
     return found
 
 
@@ -70,16 +71,24 @@ def states(library: Library, selection: Selection) -> Work:
 
 def all_states(library: Library, cell: Cell) -> Work:
     """Work that computes all states of a cell of which only some were kept; a Shown."""
-    kind, params = SOURCES[cell.kind], cell.selection.parameters()
+    params = cell.selection.parameters()
 
     def work(job: Job) -> Shown:
-        found_or_made(library, job, f"all {cell.selection.states} networks", kind, params)
+        computed_anew(library, cell, params, job)
         whole = library.find(cell.kind, params)
         if whole is None:
             raise InputError("these states were removed from the cache; ask for them again")
         return library.shown(whole)
 
     return Work(work, wants=((cell.kind, params),))
+
+
+def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) -> xr.Dataset:
+    """The states of a cell with more of them kept, as these parameters say; counted."""
+    count = partial(_counted, job, begin=0.0)
+    return found_or_made(
+        library, job, "reading the packing", SOURCES[cell.kind], params, progress=count
+    )
 
 
 @contextmanager
@@ -186,6 +195,6 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
     study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)
 
 
-def _counted(job: Job, done: float, total: float | None) -> None:
+def _counted(job: Job, done: float, total: float | None, begin: float = PACKING_SHARE) -> None:
     job.stage = f"{done} of {total} states"
-    job.tell(done, total, part=(PACKING_SHARE, 1))
+    job.tell(done, total, part=(begin, 1))

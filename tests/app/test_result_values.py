@@ -39,11 +39,12 @@ def test_the_walk_says_how_it_was_sampled(ready):
     told = result_values.sampling(ready)
     assert str(told).startswith("paper's random walk, nearest admissible state, 1000 of 1000")
     assert "50 kept" in told.networks and "at least" in told.mixing and not told.doubt
+    assert told.verdict == "mixed" and "≤ 1.1" in told.mixing and ">mixed</span>" in str(told)
 
 
 def test_a_walk_that_is_short_is_not_said_to_have_mixed(state):
     told = result_values.sampling(state)
-    assert not told.mixing and "too few" in told.doubt
+    assert not told.verdict and "too few" in told.doubt
     assert "±" not in result_values.measures(state)[0].seen
 
 

@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from ...state.app_state import AppState
-from ...widgets.parts import PLAIN
+from ...widgets.parts import PLAIN, note
 from .export import export, figure
 from .force_space import force_space
 from .friction import friction
@@ -38,6 +38,7 @@ LOOK = {
 # The same without force space, which has a place of its own on a wide screen.
 WITHOUT_SPACE = LOOK | {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}}
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
+OPENING = "Opening …"  # until the view is there
 SPACE = f"<h2>{TABS['plane'][0]}</h2>"
 HEADING = "h2 { margin: 0; padding: 6px 2px; border-bottom: 1px solid var(--line); "
 HEADING += "font-size: 15px; font-weight: 600; line-height: 23px; }"
@@ -55,7 +56,7 @@ class Tabs:
         self._space: Any = None  # the view of force space, wherever it is
         self._apart = False  # whether that is in a place of its own, or on its way there
         self.pages = {
-            name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
+            name: pn.Column(note(OPENING), css_classes=[f"in-{name}"], sizing_mode="stretch_width")
             for name in self.names
         }
         if self.looks.tab not in self.names:
@@ -128,10 +129,12 @@ class Tabs:
             if name in PLOTTED:
                 pieces.append(figure.panel(self.state))
             # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
+            there = []
             for k in range(-1, len(pieces), 2):
                 if self._has_place(name):
                     return
-                self.pages[name].extend(pieces[max(k, 0) : k + 2])
+                there += pieces[max(k, 0) : k + 2]
+                self.pages[name][:] = there
                 yield
             self.looks.views += 1
 

@@ -1,4 +1,4 @@
-// A displacement field of the disks goes to and fro; the largest displacement is half a largest radius.
+// A displacement field of the disks goes to and fro; the largest displacement is one mean radius.
 
 const SWING = 2.2 // s, to and fro
 
@@ -10,7 +10,8 @@ export class Sway {
     const { scene } = this, was = scene.offset
     let most = 0
     for (let g = 0; g < (field?.length ?? 0); g += 2) most = Math.max(most, Math.hypot(field[g], field[g + 1]))
-    scene.offset = most > 0 ? { field, most: 0.5 / most, amplitude: 0 } : null
+    const radii = Array.from(scene.geometry?.radius ?? []).filter((r) => r > 0), mean = radii.reduce((sum, r) => sum + r, 0) / radii.length
+    scene.offset = most > 0 ? { field, most: mean / most, amplitude: 0 } : null
     if (scene.offset && !was) requestAnimationFrame((now) => this.swing(now))
     if (!scene.offset && scene.geometry) scene.changed()
   }

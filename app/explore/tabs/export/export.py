@@ -13,8 +13,8 @@ from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, origin, stem
 from ....packing.view import gone, measured, pins
 from ....results import planes
-from ....results.compute import found_or_made
-from ....results.library import SOURCES, Cell, Library
+from ....results.compute import computed_anew
+from ....results.library import Cell, Library
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
@@ -152,7 +152,7 @@ class View:
         """Buttons, and what they are for."""
         return pn.Column(
             self.buttons,
-            Progress(self.making),
+            Progress(self.making, self.task),
             self.told,
             note(HELP),
             sizing_mode="stretch_width",
@@ -185,5 +185,4 @@ def all_states(library: Library, cell: Cell, job: Job) -> xr.Dataset:
     """The dataset of a cell with all its states: those that were not kept are computed again."""
     if cell.params.get("keep") is None:
         return library.dataset(cell)
-    params = cell.params | {"keep": None}
-    return found_or_made(library, job, "all states", SOURCES[cell.kind], params)
+    return computed_anew(library, cell, cell.params | {"keep": None}, job)

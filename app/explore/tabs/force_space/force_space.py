@@ -64,7 +64,7 @@ class View(TabView):
             plotted(self.drawing.figure),
             pn.FlexBox(self.planes, *self.sweeps, **wide),
             self.finding,
-            Progress(self.task),
+            Progress(self.placing, self.task),
             self.told,
             self.others.switch,
             self.others.progress,

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import panel as pn
-import panel_material_ui as pmui
 
 from ....background.jobs import Job, reading
 from ....packing.view import exact_intervals
@@ -15,6 +14,7 @@ from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....state.view_settings import AXES
 from ....widgets.parts import TabView, choice, folded_away, linked, note, plotted
+from ....widgets.progress import Progress
 from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
 from .this_packing import Scatter, forces
@@ -54,7 +54,6 @@ class View(TabView):
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue", looks=["axis"])
         self.task = state.work.task(reading)
-        self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
         self.first, self.fourth, self.sixth, self.told = note(), note(), note(), note()
         self.figures = [pn.Column(**WIDE) for _ in range(3)]
@@ -62,7 +61,7 @@ class View(TabView):
         self.indeterminacy: Indeterminacy | None = None
         self.correlations: Correlations | None = None
         self.scatter: Scatter | None = None
-        self.task.param.watch(self._follow, ["running", "message"])
+        self.task.param.watch(self.failed, "message")
         self.looks.param.watch(self._mark, "contact")
         self.catch_up()
 
@@ -73,8 +72,8 @@ class View(TabView):
         folds = folded_away(*pairs)
         self.looks.keep_active(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
-            self.bar, self.first, first, self.scale, self.fourth, fourth, self.sixth, sixth,
-            folds, self.told, **WIDE,
+            Progress(self.task), self.first, first, self.scale, self.fourth, fourth, self.sixth,
+            sixth, folds, self.told, **WIDE,
         )  # fmt: skip
 
     def update(self) -> None:
@@ -139,11 +138,6 @@ class View(TabView):
         self.state.choose(mu=mu)
         if self.state.missing:
             self.state.compute()
-
-    def _follow(self, *events: Any) -> None:
-        self.bar.visible = self.task.running and self.indeterminacy is None
-        if self.task.message:
-            self.told.object = self.task.message
 
 
 def read(library: Library, cells: Sequence[Cell], cell: Cell) -> Callable[[Job], Rows]:

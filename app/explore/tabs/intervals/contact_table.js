@@ -56,7 +56,8 @@ export function render({ model, view }) {
     shown = found.slice(from, from + ROWS)
     part(".told").textContent = `${found.length} of ${all.length} contacts` +
       (found.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
-      `; forces in mean forces; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}`
+      `; forces in mean forces; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}; ` +
+      "a heading sorts the table, “Sort bars” the bars above"
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
       COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")

@@ -49,7 +49,7 @@ class View(TabView):
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.choices = [
             self.drawn,
-            question("Sort", SORTS, self.looks, "sort", **SMALL),
+            question("Sort bars", SORTS, self.looks, "sort", **SMALL),
             question("Unit", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)

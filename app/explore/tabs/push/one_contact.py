@@ -23,7 +23,8 @@ ASKED = (
 )
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open, {slid} slide and {kept} hold.</b> At the end "
-    "of the slider the packing shows how disks set off."
+    "of the slider the packing shows how disks set off, enlarged so that the farthest ({most:.3g} "
+    "times the rms motion) goes to and fro by one mean radius."
 )
 HELD = (
     " Held forces are not respected here: {} may change like all others, and the push begins with "
@@ -44,9 +45,16 @@ def sentence(replay: Replay, contact: int, pushed: Pushed | None, held: int) -> 
     if pushed is None:
         text += ASKED.format(now=replay.normal[0, contact])
     else:
-        text += FOUND.format(opened=pushed.opened, slid=pushed.slid, kept=pushed.kept)
+        text += FOUND.format(
+            opened=pushed.opened, slid=pushed.slid, kept=pushed.kept, most=_farthest(pushed)
+        )
     count = "the held one" if held == 1 else f"the {held} held ones"
     return text + (HELD.format(count) if held else "")
+
+
+def _farthest(pushed: Pushed) -> float:
+    """The largest displacement of the first motion, of which the root mean square is 1."""
+    return float(np.hypot(*pushed.displacement.T).max())
 
 
 def table(replay: Replay, contact: int, pushed: Pushed) -> str:
