@@ -7,6 +7,7 @@ import inspect
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,7 @@ from granforce.cli.parser import main
 
 HOUSE = granforce.__path__[0]
 EXAMPLES = f"{HOUSE}/docs/examples.md"
+PAGES = f"{HOUSE}/docs/pages"
 PUBLIC = {name: home for name, home in granforce._HOME.items() if home}
 # Arguments that mean the same wherever they are taken.
 COMMON = (
@@ -89,6 +91,14 @@ def test_the_site_builds_without_a_warning(tmp_path):
     for name in ("measures.eta3", "figures.save"):
         assert f'id="granforce.{name}"' in library
     assert "granforce intervals" in (site / "reference" / "cli.html").read_text()
+    gallery = (site / "gallery.html").read_text()
+    pictures = re.findall(r'src="(figures/gallery_\w+\.png)"', gallery)
+    source = Path(PAGES, "gallery.md").read_text()
+    sections = re.findall("^```python\n(.*?)^```", source, re.M | re.S)
+    assert 6 <= len(pictures) == len(set(pictures)) == len(sections)
+    assert all((site / picture).read_bytes().startswith(b"\x89PNG") for picture in pictures)
+    for code in sections:
+        assert len([line for line in code.splitlines() if line]) <= 10, code
     assert not re.search(r"bench: |study: ", (site / "accuracy.html").read_text())
 
 

@@ -1,9 +1,12 @@
-"""Pages of the documentation that are made from the code: library, command line and symbols."""
+"""Pages generated from code: library, command line and symbols; and the gallery's pictures."""
 
 import argparse
+import contextlib
 import importlib
 import json
 import re
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +21,12 @@ from granforce.paper.formatting import markdown_table
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "examples.md"
+GALLERY = HERE / "pages" / "gallery.md"
 DATA = next(  # inside an installed wheel, beside the package in a checkout
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as links of the sources are
+SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 BENCH = re.compile(r"<!-- bench: (\w+) -->")
 
 # Sections of the library reference, by the module that a name comes from.
@@ -48,6 +53,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, name, content=text))
     for path in (*sorted((DATA / "figures").glob("*.png")), DATA / "bench.png"):
         files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
+    for name, picture in gallery():
+        files.append(File.generated(config, f"figures/{name}.png", content=picture))
     return Files(list(files))
 
 
@@ -55,7 +62,31 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Fill in the tables of the benchmark, and link figures where the site has them."""
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
+    if page.file.src_uri == GALLERY.name:
+        markdown = SHOWN.sub(pictured, markdown)
     return BENCH.sub(lambda match: bench_table(match[1]), markdown)
+
+
+def gallery() -> Iterator[tuple[str, bytes]]:
+    """Name and PNG of every picture of the gallery, drawn by its own lines."""
+    with contextlib.chdir(DATA.parent), tempfile.TemporaryDirectory() as folder:
+        for heading, _, _, code in SHOWN.findall(GALLERY.read_text()):
+            names: dict[str, Any] = {}
+            exec(code, names)
+            path = Path(folder) / f"{picture_name(heading)}.png"
+            granforce.figures.save(names["figure"], path)
+            yield path.stem, path.read_bytes()
+
+
+def picture_name(heading: str) -> str:
+    return "gallery_" + "_".join(re.findall(r"\w+", heading.lower()))
+
+
+def pictured(match: re.Match[str]) -> str:
+    """A section of the gallery with its picture above the code."""
+    heading, text, block, _ = match.groups()
+    picture = f"![{heading}](figures/{picture_name(heading)}.png)"
+    return f"## {heading}\n{text}{picture}\n\n{block}"
 
 
 def bench_table(part: str) -> str:
