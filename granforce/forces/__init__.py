@@ -1,1 +1,2 @@
-"""S: its equations and judges, contact dynamics, and the networks nearest to given forces."""
+"""S and single networks: equations, residual and violation, and the networks nearest to given
+forces."""

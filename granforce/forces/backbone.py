@@ -1,16 +1,15 @@
-"""Which contacts of a packing carry: the backbone, found from networks and proved by duality.
+"""The backbone: contacts that carry force, found from networks and proved by duality.
 
-A contact belongs to the backbone where max f_n over S is above 0. That it does, one network shows;
-that it does not, only a proof can. So networks come first: whatever presses in one of them carries.
-The rest is idle so far, and its sum Σ f_n over S is asked for by one linear program after another:
-idle contacts that press in its solution carry, and are taken out of the sum, until the maximum is
-0. The multipliers v of the balance then prove it for all that are left at once: with A y = b and
-y ≥ 0,
+A contact belongs to the backbone if max f_n over S is positive. One network can show that it does;
+only a proof can show that it does not. Networks are therefore tried first: a contact that presses
+in any of them carries. The others are idle so far. Linear programs maximise their sum Σ f_n over S;
+contacts that press in a solution carry and leave the sum, until the maximum is 0. The multipliers v
+of the balance then prove this for all remaining contacts at once: with A y = b and y ≥ 0,
 
     Σ f_n = g·y = b·v + (g − Aᵀ v)·y ≤ b·v  where  Aᵀ v ≥ g,
 
-and b·v = 0 to what `certificates.proves_small` allows. As f_n ≥ 0, each of them is 0, in every
-network, whichever were known. What idle, dead, pressing and trusted mean: granforce/README.md.
+and b·v = 0 to the tolerance of `certificates.proves_small`. As f_n ≥ 0, each of them is 0 in every
+network. The words idle, dead, pressing and trusted are defined in granforce/README.md.
 """
 
 from __future__ import annotations
@@ -47,11 +46,11 @@ def without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:
 def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
     """Mask of contacts whose largest f_n over S is positive, exactly; and a network, or None.
 
-    What presses in a known state carries; known are the original network, or the one nearest to
-    equal f_n, and one that is pulled towards forces on the contacts without any. Contacts of grains
-    that cannot balance any force on them carry nothing. Only contacts that are neither are left to
-    a linear program over all of S. That a contact carries nothing is proved by duality, so that it
-    does not depend on which state is known.
+    Contacts that press in a known network carry. Known networks are the original one, or the one
+    nearest to equal f_n, and one that is pulled towards forces on contacts that had none. Contacts
+    of grains that cannot balance any force carry nothing. Linear programs over S decide the others.
+    The proof that a contact carries nothing is by duality and does not depend on the known
+    networks.
     """
     known = full.original
     if not full.admits(known):
@@ -70,7 +69,7 @@ def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
 
 
 def _raise_contradiction(full: Ensemble) -> None:
-    """NotJammedError with the statements that cannot hold together, where that can be proved."""
+    """Raise NotJammedError that names the conflicting conditions, if the conflict can be proved."""
     assert full.known is not None
     A, b, T = full.scaled_balance
     message = knowledge.contradiction(
@@ -81,9 +80,9 @@ def _raise_contradiction(full: Ensemble) -> None:
 
 
 def not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
-    """Those of the idle contacts that press in none of the networks that are pulled towards them.
+    """The idle contacts that press in none of the networks pulled towards them.
 
-    Every network is pulled towards forces on all that have not pressed before.
+    Each network is pulled towards forces on all contacts that have not pressed before.
     """
     while idle.any():
         target = known.copy()
@@ -99,7 +98,7 @@ def not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
 def cannot_balance(full: Ensemble, idle: Mask) -> Mask:
     """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
 
-    Grains whose contacts are all idle must be in balance; all others may answer any force.
+    Grains whose contacts are all idle must balance; all others may exert any force.
     """
     size = 1 + full.per_contact
     c = full.contacts
@@ -126,10 +125,11 @@ def cannot_balance(full: Ensemble, idle: Mask) -> Mask:
 def _never_pressing(
     model: highspy.Highs, A: sparse.csr_matrix, b: Floats, normal: sparse.csr_matrix, idle: Mask
 ) -> Mask | None:
-    """Those of the idle contacts that carry nothing in {y ≥ 0 : A y = b}; None where undecided.
+    """The idle contacts that carry nothing in {y ≥ 0 : A y = b}; None if undecided.
 
-    normal (contacts, n): f_n = normal · y. Contacts that press where Σ f_n is largest are taken
-    out, again and again; the multipliers of the last program prove that the others cannot.
+    normal (contacts, n): f_n = normal · y. Contacts that press in the solution with the largest Σ
+    f_n are removed repeatedly; the multipliers of the last program prove that the others cannot
+    press.
     """
     while idle.any():
         gains = normal.T @ idle.astype(float)
@@ -146,24 +146,24 @@ def _never_pressing(
             pressing = idle & (normal @ y > CARRYING)
         if pressing is None:
             return None
-        # Without a proof, and without a state that says so, nothing is called idle.
+        # Nothing is called idle without a proof.
         idle = idle & ~pressing if pressing.any() else np.zeros(len(idle), bool)
     return idle
 
 
 def proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
-    """Those of the idle contacts whose sum, and so each, can only be 0 over S.
+    """The idle contacts whose sum, and therefore each of them, is 0 everywhere in S.
 
     known (N_c, 2): a network of S, or None.
     """
     if not idle.any():
         return idle
     A, b, T = full.scaled_form
-    # Without any load or pressure, S is a cone: what carries in it carries in a bounded part too.
+    # Without load or pressure S is a cone: contacts that carry in it also carry in a bounded part.
     limits = [np.inf if b.any() else 1.0]
     if known is not None:
-        # So it does in an S without end, however near to a network of S: a part of the way to any
-        # other one is in S as well.
+        # The same holds in an unbounded S near any of its networks: part of the way to any other
+        # network is also in S.
         limits.append(1.0 + float(full.coordinates(known).max()))
     normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
     for limit in limits:
@@ -173,7 +173,7 @@ def proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
         if proved is not None:
             return proved
     if known is not None:
-        return idle  # feasible within BALANCED but not exactly: no more is known to carry
+        return idle  # feasible within BALANCED but not exactly: no more contacts are known to carry
     raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
 
 

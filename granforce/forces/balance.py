@@ -1,4 +1,4 @@
-"""The equations A x = b of a packing: every grain in balance, and what is prescribed of the whole.
+"""The equations A x = b of a packing: balance of every grain, and the prescribed stress.
 
 Grain g of a network is pushed by F = ±(f_n n + f_t t) at each of its contacts (+ where it is their
 second grain j, t = (−n_y, n_x)), and turned by −a f_t in either place, a its lever arm. With the
@@ -6,10 +6,10 @@ loads e on the grains that gives three rows each, the torque divided by r so tha
 
     Σ ±(f_n n + f_t t) = −(e_x, e_y),    −Σ a f_t / r = −e_τ / r.
 
-At μ = 0 there is no f_t, and no torque that it could balance: two rows a grain. Contacts that are
-frozen push with known forces, which go to the right.
+At μ = 0 there is no f_t, and no torque that it could balance: two rows a grain. Frozen contacts
+push with known forces, which move to the right-hand side.
 
-What is prescribed of the whole is its stress σ_ab = (1/V) Σ F_a ℓ_b over contacts, ℓ from centre to
+The prescribed quantity is the stress σ_ab = (1/V) Σ F_a ℓ_b over contacts, ℓ from centre to
 centre. Its trace is the pressure, Σ f_n ℓ = 2 P0 V, as f_t is across ℓ; divided by Σ ℓ the row
 reads as a mean normal force, which is the scale of all forces. The rows (σ_xx − σ_yy)/2 and σ_xy
 follow where the whole stress is prescribed.
@@ -36,16 +36,16 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
 
-# Rows up to which ranks are those of dense matrices, by eigenvalues relative to the largest.
+# Up to this many rows, ranks come from eigenvalues of dense matrices, relative to the largest.
 LARGEST_RANK, _LEAST_EIGENVALUE = 3000, 1e-12
 
 
 def prescribed_stress(
     packing: Packing, prescribed: str, stress: npt.ArrayLike | None, held: Mask
 ) -> Floats | None:
-    """(1,) the pressure, (3,) σ_xx, σ_yy, σ_xy, or None: what is prescribed, force per length.
+    """(1,) the pressure, (3,) σ_xx, σ_yy, σ_xy, or None: the prescribed values, force per length.
 
-    Raises InputError where that makes no sense here.
+    Raises InputError if this packing does not support that choice.
     """
     prescribed = choice(prescribed, ("pressure", "stress", "none"), "prescribed")
     if stress is not None and prescribed != "stress":
@@ -95,7 +95,7 @@ def stress_rows(contacts: Contacts) -> Floats:
 
 
 def left_open_in(packing: Packing) -> Mask:
-    """Mask (N,) of grains whose balance is left open: nothing is known of the load on them."""
+    """Mask (N,) of grains whose balance is not required, as the load on them is unknown."""
     return np.any(np.isnan(packing.load), axis=1)
 
 
@@ -125,7 +125,8 @@ def equations(
 def _balance(
     packing: Packing, contacts: Contacts, grains: Integers, held: Mask, mu: float
 ) -> tuple[sparse.csr_matrix, Floats]:
-    """Force and torque rows of the given grains; frozen contacts and loads go to the right."""
+    """Force and torque rows of the given grains; frozen contacts and loads are on the right-hand
+    side."""
     row_of = np.full(len(packing.r), -1)
     row_of[grains] = np.arange(len(grains))
     size = 3 if mu > 0 else 2
@@ -146,7 +147,7 @@ def _balance(
 def _conditions(
     packing: Packing, contacts: Contacts, mu: float, stress: Floats
 ) -> tuple[Any, Floats]:
-    """Rows (m, unknowns) and values (m,) of what is prescribed, as mean normal forces.
+    """Rows (m, unknowns) and values (m,) of the prescribed stress, as mean normal forces.
 
     The pressure comes first: Σ f_n ℓ / Σ ℓ = 2 P0 V / Σ ℓ. With the whole stress, (σ_xx − σ_yy)/2
     and σ_xy follow on the same scale.
@@ -187,8 +188,8 @@ def _force_matrix(
 def _without_rounding(A: sparse.csr_matrix, balance: int, contacts: Contacts) -> sparse.csr_matrix:
     """A without entries that are rounding of 0: n_y of contacts along x, n_x² − n_y² at 45°.
 
-    A row of nothing else would be a condition of its own once it is scaled. Entries of the
-    `balance` rows are of order 1, those of what is prescribed of order ℓ/Σℓ.
+    A row of nothing but rounding would become a condition once it is scaled. Entries of the
+    `balance` rows are of order 1, those of the stress rows of order ℓ/Σℓ.
     """
     unit = np.ones(A.shape[0])
     unit[balance:] = contacts.length.max() / contacts.length.sum()
@@ -199,10 +200,10 @@ def _without_rounding(A: sparse.csr_matrix, balance: int, contacts: Contacts) ->
 
 
 def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, tolerance: float) -> Floats:
-    """A x of the original network x, if that is balanced: b without what rounding left of it.
+    """A x of the original network x, if that is balanced: b without rounding errors.
 
-    Frozen surroundings determine most forces, and leave rows of A that follow from others times
-    10⁴: what frozen forces are out of balance by, 10⁻¹², would contradict itself there by 10⁻⁸.
+    Frozen surroundings determine most forces and make some rows of A follow from others times 10⁴.
+    An unbalance of 10⁻¹² in the frozen forces would become a contradiction of 10⁻⁸.
     """
     balanced = A @ original.ravel()
     return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b
@@ -222,7 +223,7 @@ def frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
 
 def left_free(rows: sparse.csr_matrix) -> int:
     """Unknowns less independent rows, of rows (k, unknowns) of order 1."""
-    if not all(rows.shape):  # all is pinned, or the balance of every grain is left open
+    if not all(rows.shape):  # everything is pinned, or no grain has to balance
         return rows.shape[1]
     square = cancelling.apart(np.linalg.eigvalsh, (rows @ rows.T).toarray())
     return rows.shape[1] - int(np.sum(square > _LEAST_EIGENVALUE * square[-1]))

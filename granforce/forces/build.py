@@ -1,7 +1,7 @@
 """Making an Ensemble: the balance, Coulomb's law and known forces of the contacts that carry.
 
-Contacts that carry nothing in any network are left out (see `backbone`), with the grains that have
-no others; what was left out is counted.
+Contacts that carry nothing in any network are left out (see `backbone`), with grains that have no
+other contacts; both are counted.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from granforce.records import InputError, NotJammedError, Packing, friction, tak
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Floats, Integers, Mask
 
-# What is prescribed, by its number of values.
+# The prescribed quantity, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}
 
 
@@ -46,8 +46,7 @@ def ensemble(
     nothing in any state of S. Grains whose load is NaN need not balance.
 
     Raises NotJammedError where S is empty, naming the grains with the largest unbalanced load, or
-    the statements of what is known that cannot hold together; InputError for conditions that make
-    no sense together.
+    the known forces that conflict; InputError for conditions that exclude each other.
     """
     mu = packing.mu if mu is None else friction(mu)
     count = len(packing.contacts.i)
@@ -77,7 +76,7 @@ def ensemble(
 
 
 class _Conditions(NamedTuple):
-    """What the networks of an ensemble have to obey."""
+    """The conditions on the networks of an ensemble."""
 
     mu: float
     held: Mask  # (contacts,) bool, frozen
@@ -88,8 +87,9 @@ class _Conditions(NamedTuple):
 def _pruned(full: Ensemble, conditions: _Conditions) -> Ensemble:
     """The same without contacts that carry nothing.
 
-    Up to CARRYING counts as nothing, but others may rest on it (where forces are frozen at that):
-    where no network balances without, what presses in the one at hand is kept.
+    Forces up to CARRYING count as nothing, but others may depend on them (if forces are frozen at
+    such values): if no network balances without them, contacts that press in the known network
+    stay.
     """
     carrying, found = backbone.carrying(full)
     S = _picked(full, conditions, carrying, found)
@@ -122,7 +122,7 @@ def _check_frozen_and_known(
 
 
 def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
-    """Contacts that carry nothing may not be known to carry."""
+    """Refuse known forces on contacts that carry nothing."""
     if bounds is None:
         return
     out = np.setdiff1d(np.arange(len(bounds)), np.append(S.index, S.frozen))

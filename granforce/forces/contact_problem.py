@@ -1,4 +1,5 @@
-"""S as a contact program: from an ensemble's balance and cones to what `numerics` works on."""
+"""S as a contact program: converts an ensemble's balance and cones to the form used by
+`numerics`."""
 
 from __future__ import annotations
 
@@ -27,13 +28,13 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
 
-# Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
-# slows no step, only bounds them.
+# Added to A K Aᵀ at w = 1, relative to the diagonal of A Aᵀ, because translations cost nothing. It
+# bounds steps without slowing them.
 SHIFT = 1e-11
-# Rows whose pivot is below this, relative to the largest, follow from others; of so many rows at
-# most that is asked of dense matrices.
+# Rows whose pivot is below this, relative to the largest, depend on others. Dense matrices are used
+# up to this number of rows.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
-# How often `in_balance` restores a balance.
+# Number of corrections in `in_balance`.
 _RESTORED = 3
 
 
@@ -43,8 +44,8 @@ def balance_of(
     """(Network, b, b of the global rows, idle, place) of an ensemble, forces in ⟨f_n⟩.
 
     unit: of the tangential forces. place: where the ensemble's rows are among those of the network
-    and the global ones; idle (rows,): 1 for rows that the ensemble does not have: torques at μ = 0,
-    and all of grains whose balance is left open.
+    and the global ones; idle (rows,): 1 for rows that the ensemble lacks: torques at μ = 0, and all
+    rows of grains that need not balance.
     """
     contacts, size = ensemble.contacts, 1 + ensemble.per_contact
     grains = np.union1d(ensemble.grains, np.union1d(contacts.i, contacts.j))
@@ -85,7 +86,7 @@ def make_problem(ensemble: Ensemble) -> tuple[Problem, Floats]:
 
 
 def _with_known(problem: Problem, ensemble: Ensemble, known: Polygons) -> Problem:
-    """The Problem with what is known; contacts known altogether stay at y = (1, 1) in it."""
+    """The Problem with known forces; fully known contacts stay at y = (1, 1) in it."""
     mu = ensemble.mu
     first = knowledge.first_forces(known, mu)
     rows = np.zeros(len(problem.b) + len(problem.b_border))
@@ -106,7 +107,7 @@ def _with_known(problem: Problem, ensemble: Ensemble, known: Polygons) -> Proble
 
 
 def _instead(ensemble: Ensemble, known: Polygons) -> Floats:
-    """A (f° − f) for contacts known altogether: f their force, f° = (1, 0) what stands for it."""
+    """A (f° − f) for fully known contacts: f their force, f° = (1, 0) its stand-in."""
     wholly = known.wholly[:, None]
     instead = np.where(wholly, np.array([1.0, 0.0]) - known.value, 0.0)
     return ensemble.A @ ensemble.to_vector(instead)
@@ -122,7 +123,7 @@ def forces_of(ensemble: Ensemble, y: Floats) -> Floats:
 
 @dataclass
 class _Shared:
-    """What the programs of one ensemble share; what is None is made on first use."""
+    """Data shared by the programs of one ensemble; None until first use."""
 
     problem: Problem
     idle: Floats  # (rows,) 1 for rows that the ensemble does not have
@@ -131,7 +132,7 @@ class _Shared:
     system: certified_values.System | None = None
 
 
-# As long as the ensembles live; a field of theirs would go with them to other processes.
+# Lives as long as the ensembles; a field of theirs would be sent to other processes with them.
 _shared: weakref.WeakKeyDictionary[Ensemble, _Shared] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
@@ -145,7 +146,7 @@ def _shared_of(ensemble: Ensemble) -> _Shared:
 
 
 def problem_of(ensemble: Ensemble) -> Problem:
-    """The Problem for networks nearest to others: all rows, those that others imply shifted."""
+    """The Problem for nearest networks: all rows, with redundant rows shifted."""
     return _shared_of(ensemble).problem
 
 
@@ -164,10 +165,11 @@ def independent_problem_of(ensemble: Ensemble) -> Problem:
 
 
 def _dependent_rows(ensemble: Ensemble) -> Mask:
-    """Mask of rows of A that follow from others, none of which it is many times.
+    """Mask of rows of A that depend on others, with moderate factors.
 
-    Frozen surroundings determine most forces: rows without a pivot may be others times 2·10⁵ there,
-    and rounding may pass for a pivot. QR with pivoting (Golub, Numer. Math. 7, 206 (1965)) tells.
+    Frozen surroundings determine most forces: rows without a pivot may be others times 2·10⁵, and
+    rounding may look like a pivot. QR with pivoting (Golub, Numer. Math. 7, 206 (1965))
+    distinguishes them.
     """
     decompose = partial(linalg.qr, mode="r", pivoting=True)
     R, order = cancelling.apart(decompose, ensemble.free_columns.toarray().T)
@@ -188,8 +190,8 @@ def centre_of(ensemble: Ensemble) -> Centre:
 def make_system(ensemble: Ensemble) -> certified_values.System:
     """The certified_values.System of an ensemble, in the cone coordinates of its Problem.
 
-    It is made on first use and kept as long as the ensemble. Cancelled where that was asked for;
-    errors as those of `certified_values.make_system`.
+    It is built on first use and cached with the ensemble. Raises Cancelled on request, and the
+    errors of `certified_values.make_system`.
     """
     cancelling.check()
     shared = _shared_of(ensemble)
@@ -212,8 +214,8 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
     if ensemble.reference is not None:
-        # Multipliers of rows that follow from others may be large: what the own unbalance of a
-        # network, up to BALANCED, contradicts there would pass for a bound.
+        # Multipliers of redundant rows may be large: a network's residual, up to BALANCED, would
+        # give a false bound there.
         given = A @ _coordinates(ensemble, ensemble.reference)
         off = np.abs(given - b)
         off[sides] = 0.0
@@ -235,7 +237,7 @@ def _coordinates(ensemble: Ensemble, forces: Floats) -> Floats:
 
 
 def cone_costs(ensemble: Ensemble, forces: Floats) -> Floats:
-    """Costs (…, 2 N_c) of y for costs (…, N_c, 2) of the forces f_n, f_t that are not known."""
+    """Costs (…, 2 N_c) of y for costs (…, N_c, 2) of the unknown forces f_n, f_t."""
     if ensemble.known is not None:
         forces = np.where(ensemble.known.wholly[:, None], 0.0, forces)
     normal, tangential = forces[..., 0], ensemble.mu * forces[..., 1]
@@ -244,7 +246,8 @@ def cone_costs(ensemble: Ensemble, forces: Floats) -> Floats:
 
 
 def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
-    """What contacts known altogether add to the projections (…,) of forces on axes (…, N_c, 2)."""
+    """The contribution of fully known contacts to the projections (…,) of forces on axes (…, N_c,
+    2)."""
     if ensemble.known is None:
         return np.zeros(axes.shape[:-2])
     value = np.where(ensemble.known.wholly[:, None], ensemble.known.value, 0.0)
@@ -252,7 +255,7 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
 
 
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
-    """y (n,), what it lacks of A y = b added by the least change in proportion to y + away."""
+    """y (n,), corrected to A y = b by the least change relative to y + away."""
     dense = A.toarray()
     for _ in range(_RESTORED):
         size = np.abs(y) + away

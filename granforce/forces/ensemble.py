@@ -1,12 +1,12 @@
-"""S: the admissible force networks of a packing, and the two judges of any network.
+"""S: the admissible force networks of a packing, and the two criteria for membership.
 
 S is convex: the plane A x = b of the `balance` of all grains, cut by one Coulomb cone per contact
-of the `backbone` and by what is known of single forces (`knowledge`). Unknowns are x = (f_n1, f_t1,
+of the `backbone` and by known forces (`knowledge`). Unknowns are x = (f_n1, f_t1,
 f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t. A cone is spanned by its two
 edges, so that x = T y with y ≥ 0 and S = {T y : A T y = b, y ≥ 0}, as linear programs want it.
 
-Whether a network is in S is up to two numbers, both in ⟨f_n⟩: by how much it fails the plane
-(`Ensemble.residual`), and by how much the cones (`Ensemble.violation`).
+Two numbers, both in ⟨f_n⟩, decide whether a network is in S: its distance from the plane
+(`Ensemble.residual`) and from the cones (`Ensemble.violation`).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Hull(NamedTuple):
     held: Mask  # (n,) bool
     dimension: int
     b: Floats  # (rows,) A inner, A that of `Ensemble.scaled_form`
-    resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no held wall is farther from any point of S
+    resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no point of S is farther from a held wall
 
 
 @notebook.brief
@@ -57,16 +57,16 @@ class Ensemble:
     index: Integers  # (N_c,) the unknown contacts, as positions in packing.contacts
     contacts: Contacts  # their geometry
     grains: Integers  # (M,) grains of the backbone, as positions in packing.x
-    A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then what is prescribed
+    A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then stress
     b: Floats  # (rows,) force
     force_scale: float  # ⟨f_n⟩ weighted with ℓ: 2 P0 V / Σ ℓ where the pressure is prescribed
     original: Floats  # (N_c, 2) the packing's own network on these contacts
     frozen: Integers  # contacts held at their original forces, as positions in packing.contacts
-    skipped: dict[str, int]  # what was left out: rattlers, unloaded contacts, tangential unknowns
+    skipped: dict[str, int]  # counts left out: rattlers, unloaded contacts, tangential unknowns
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
-    find_hull: Callable[[Ensemble], Hull]  # how `hull` is found, by programs that rest on this file
-    found: Floats | None = None  # (N_c, 2) a network met while these contacts were sorted out
+    find_hull: Callable[[Ensemble], Hull]  # computes `hull`, by programs that import this file
+    found: Floats | None = None  # (N_c, 2) a network found while the backbone was determined
 
     @property
     def per_contact(self) -> int:
@@ -93,12 +93,12 @@ class Ensemble:
 
     @property
     def dimension(self) -> int:
-        """Dimension h of S: what the balance, all that is pinned and the held walls leave free.
+        """Dimension h of S: free after balance, pinned components and held walls.
 
         2N_c − (3M − 1) in a disordered packing with prescribed pressure (N_c − (2M − 1) at μ = 0),
-        more in crystals, whose rows depend on each other, two less where the whole stress is
-        prescribed, and 2 N_c (N_c at μ = 0) without equations, where the balance of all grains is
-        left open. Directions in which S is narrower than FLAT do not count (`flat_directions`).
+        more in crystals, whose rows depend on each other; two less if the whole stress is
+        prescribed; and 2 N_c (N_c at μ = 0) if no grain has to balance. Directions in which S is
+        narrower than FLAT do not count (`flat_directions`).
         """
         return self.hull.dimension
 
@@ -107,7 +107,7 @@ class Ensemble:
         """Directions in which forces could balance but S is too narrow to be resolved: not in h.
 
         No wall is farther than `hull.resolution` from any point of S there. Components with equal
-        bounds do not count, as their one value is given.
+        bounds do not count, as they are prescribed.
         """
         exactly = self.known is not None and self.to_vector(self.known.low == self.known.high)
         columns = self.A.tocsc()[:, ~np.broadcast_to(exactly, self.free.shape).astype(np.bool_)]
@@ -164,19 +164,19 @@ class Ensemble:
 
     @cached_property
     def member(self) -> Floats | None:
-        """A network (N_c, 2) of S that is at hand, force; None without one.
+        """A known network (N_c, 2) of S, force; None without one.
 
-        It is a certificate that S is not empty, which no program can contradict.
+        It certifies that S is not empty, whatever a solver reports.
         """
         at_hand = (forces for forces in (self.original, self.found) if forces is not None)
         return next((forces for forces in at_hand if self.admits(forces)), None)
 
     @cached_property
     def reference(self) -> Floats | None:
-        """The `member` by which rows that follow from others are made to agree; None without one.
+        """The `member` that makes redundant rows consistent; None without one.
 
-        Up to LARGEST_RANK rows it is balanced to rounding, if that leaves it in S: its own
-        unbalance, up to BALANCED, may be more than a thin S is wide, and far ends magnify it.
+        Up to LARGEST_RANK rows it is balanced to rounding, if that leaves it in S: its residual, up
+        to BALANCED, may exceed the width of a thin S, and distant ends magnify it.
         """
         if self.member is None or self.A.shape[0] > LARGEST_RANK:
             return self.member
@@ -189,12 +189,12 @@ class Ensemble:
 
     @cached_property
     def scaled_form(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
-        """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}; where forces are known, with slacks.
+        """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}; with slacks for known forces.
 
         The largest entry of each row of the balance is 1: torque rows are as small (or large) as μ
-        otherwise, which costs solvers their last digits. Where a network is at hand, b is what it
-        gives: its own unbalance, up to BALANCED, would be magnified by that scale, and rows that
-        follow from others would contradict them.
+        otherwise, which costs solvers their last digits. If a network is known, b is A y of that
+        network: its residual, up to BALANCED, would be magnified by that scale, and redundant rows
+        would contradict the others.
         """
         A, b, T = self.scaled_balance
         if self.known is not None:
@@ -206,7 +206,7 @@ class Ensemble:
 
     @cached_property
     def slack(self) -> Floats:
-        """(rows,) of `scaled_form`: up to what it may differ from b in forces that are admitted."""
+        """(rows,) of `scaled_form`: how much admitted forces may differ from b."""
         scale = self._row_scale
         if self.known is None:
             return BALANCED * scale
@@ -231,19 +231,19 @@ class Ensemble:
 
     @cached_property
     def _row_scale(self) -> Floats:
-        """(rows,) what makes the largest entry of each row of `cone_form` 1."""
+        """(rows,) factors that make the largest entry of each row of `cone_form` 1."""
         largest = abs(self.cone_form[0]).max(axis=1).toarray().ravel()
         return 1 / np.where(largest > 0, largest, 1.0)
 
     @cached_property
     def scaled_balance(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
-        """(A, b, T) of `scaled_form` without what is known."""
+        """(A, b, T) of `scaled_form` without known forces."""
         scale = self._row_scale
         A, T = self.cone_form
         return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
 
     def _repr_html_(self) -> str:
-        """The ensemble as notebooks show it."""
+        """HTML for notebooks."""
         lines = {
             "disks of the backbone M": len(self.grains),
             "contacts that carry N_c": len(self.index),
@@ -263,20 +263,20 @@ class Ensemble:
 
     @property
     def bounds(self) -> Floats:
-        """What is known, as bounds (N_c, 2, 2) [contact, component, low or high], force."""
+        """Known forces, as bounds (N_c, 2, 2) [contact, component, low or high], force."""
         if self.known is None:
             return np.tile([-np.inf, np.inf], (len(self.index), 2, 1))
         return self.force_scale * np.stack([self.known.low, self.known.high], axis=-1)
 
     def with_bounds(self, bounds: Floats, found: Floats) -> Ensemble:
-        """The same where other `bounds` are known; found (N_c, 2): a network at hand, as before."""
+        """The same with other `bounds`; found (N_c, 2): a network of S, force."""
         known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
         return replace(self, known=known, found=found)
 
     def with_normal(self, position: int, found: Floats) -> Ensemble:
-        """The same where f_n of the contact at `position` is known, too.
+        """The same with f_n of the contact at `position` known as well.
 
-        found (N_c, 2): a network of S with that f_n, which is then at hand.
+        found (N_c, 2): a network of S with that f_n, which becomes its `member`.
         """
         bounds = self.bounds
         bounds[position, 0] = found[position, 0]
@@ -314,7 +314,7 @@ class Ensemble:
     def network(self, forces: npt.ArrayLike, name: str) -> Floats:
         """One network (N_c, 2) to begin with, not so large that its squares overflow.
 
-        NaN is left to whoever asks: nothing converges from there.
+        NaN is not refused: no solver converges from it.
         """
         found = real_array(forces, name)
         if found.shape != (len(self.index), 2):
@@ -326,9 +326,8 @@ class Ensemble:
     def refuse_foreign(self, forces: Any, residual: Any, name: str) -> None:
         """InputError unless networks (…, N_c, 2) of a result belong to this ensemble.
 
-        They have to balance here, or nearly as well as they did where they were found (residual
-        (…,)), and to respect its cones: of another packing, or at another μ, they would give wrong
-        numbers in silence.
+        They must balance here nearly as well as in their own ensemble (residual (…,)) and respect
+        its cones: networks of another packing, or at another μ, would silently give wrong numbers.
         """
         forces = self.networks(forces, name)
         balanced = np.all(self.residual(forces) <= np.maximum(AT_REST, 2 * np.asarray(residual)))

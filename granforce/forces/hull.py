@@ -1,8 +1,8 @@
-"""The affine hull of S: in which directions S extends, decided once for everything that asks.
+"""The affine hull of S: the directions in which S extends, decided once for all callers.
 
 Each wall of S is a coordinate y ≥ 0 of `Ensemble.scaled_form`: the distance from a side of a
 Coulomb cone, or from a known bound. A wall whose distance stays below FLAT in all of S is *held*:
-doubles cannot resolve what lies between it and the wall opposite. S counts as flat across held
+doubles cannot resolve the space between it and the opposite wall. S counts as flat across held
 walls, and its dimension is that of the networks that balance and keep the held walls.
 """
 
@@ -26,7 +26,7 @@ from granforce.records import NotJammedError, UndecidedError
 from granforce.tolerances import BALANCED, FLAT
 from granforce.types import Floats, Integers, Mask
 
-# Least distance of a wall from an analytic centre that certainly is one, in ⟨f_n⟩.
+# Least distance from a wall to a reliable analytic centre, in ⟨f_n⟩.
 _WELL_INSIDE = 1e-5
 # Unbalance of a centre, rows of order 1, above which its balance is restored.
 _UNBALANCED = 1e-9
@@ -35,7 +35,7 @@ _UNBALANCED = 1e-9
 def hull_of(ensemble: Ensemble) -> Hull:
     """The Hull of an ensemble.
 
-    Raises NotJammedError where S is empty, UndecidedError where no solver could tell.
+    Raises NotJammedError if S is empty, UndecidedError if no solver could decide.
     """
     A, b, _ = ensemble.scaled_form
     if ensemble.member is not None and ensemble.is_determined:
@@ -50,7 +50,7 @@ def hull_of(ensemble: Ensemble) -> Hull:
         b = _with_own_limits(ensemble)
         y, held, resolution = inner_point(A, b)
     except (NotJammedError, UndecidedError):
-        # Bounds may contradict each other by as little as the judges admit.
+        # Bounds may contradict each other within the tolerances of residual and violation.
         b = ensemble.scaled_form[1]
         y, held, resolution = inner_point(A, b)
     held = _with_opposite(ensemble, held)
@@ -58,7 +58,7 @@ def hull_of(ensemble: Ensemble) -> Hull:
 
 
 def _with_own_limits(ensemble: Ensemble) -> Floats:
-    """b (rows,) with known bounds as they are, however far the network at hand exceeds them."""
+    """b (rows,) with the known bounds, even if the known network exceeds them."""
     known, b = ensemble.known, ensemble.scaled_form[1]
     if known is None:
         return b
@@ -81,8 +81,8 @@ def _with_opposite(ensemble: Ensemble, held: Mask) -> Mask:
 def _centre(ensemble: Ensemble) -> Floats | None:
     """The analytic centre y (n,) of S, None where S has none, or is thin.
 
-    S has none where some contact's force is fixed at the wall of its cone. Rows that are scaled up,
-    or all but follow from others, magnify the unbalance of the centre: that is removed first.
+    S has none if some contact's force is fixed at the wall of its cone. Scaled or nearly redundant
+    rows magnify the residual of the centre, so that is removed first.
     """
     middle = centre_of(ensemble)
     y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
@@ -102,7 +102,8 @@ def _centre(ensemble: Ensemble) -> Floats | None:
 
 
 def normals(ensemble: Ensemble) -> tuple[Integers, Floats]:
-    """(contact (n,), normal (n, 2)) of each wall: what unit f_n, f_t/μ add to its distance."""
+    """(contact (n,), normal (n, 2)) of each wall: the change of its distance per unit f_n,
+    f_t/μ."""
     contacts, known = len(ensemble.index), ensemble.known
     contact = np.repeat(np.arange(contacts), ensemble.per_contact)
     normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if ensemble.mu > 0 else [[1.0, 0.0]], (contacts, 1))
@@ -117,7 +118,7 @@ def conductances(
 ) -> tuple[Floats, Floats, Integers]:
     """`wall_matrix.conductances` of a curvature (n,) along the walls and a stiffness (N_c, 2).
 
-    held (n,): walls along which nothing moves.
+    held (n,): walls that are held.
     """
     contact, normal = normals(ensemble)
     cones = ensemble.per_contact * len(ensemble.index)
@@ -161,7 +162,7 @@ def constraints(ensemble: Ensemble, held: Mask) -> sparse.csr_matrix:
 
 
 def distances(ensemble: Ensemble) -> sparse.csr_matrix:
-    """(n, unknowns) what each unknown adds to the distance y of each wall."""
+    """(n, unknowns) the contribution of each unknown to the distance y of each wall."""
     contact, normal = normals(ensemble)
     size, unit = ensemble.per_contact, knowledge.units(ensemble.mu)
     rows, columns = np.arange(len(contact))[:, None], size * contact[:, None] + np.arange(size)

@@ -1,4 +1,4 @@
-"""What is known of single contact forces, beside balance and Coulomb's law.
+"""Known bounds on single contact forces, in addition to balance and Coulomb's law.
 
 Bounds on f_n and f_t of a contact cut its cone down to a small convex polygon. A component whose
 bounds coincide is *pinned*; every other bound is a *side*.
@@ -17,7 +17,7 @@ from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
 from granforce.types import Floats, Integers, Mask
 
 _NAMES = "f_n", "f_t"
-# Multipliers of statements that take part in a contradiction, relative to the largest.
+# Least multiplier of a condition that takes part in a conflict, relative to the largest.
 _WEIGHTY = 1e-6
 
 
@@ -31,12 +31,12 @@ class Known(NamedTuple):
 
 
 class Polygons(NamedTuple):
-    """What is known of the N_c contacts of an ensemble, in ⟨f_n⟩."""
+    """Known forces of the N_c contacts of an ensemble, in ⟨f_n⟩."""
 
-    low: Floats  # (N_c, 2) as given, for the judge
+    low: Floats  # (N_c, 2) as given, for `violation`
     high: Floats  # (N_c, 2)
     pinned: Mask  # (N_c, 2) bool
-    value: Floats  # (N_c, 2) of what is pinned, 0 elsewhere
+    value: Floats  # (N_c, 2) pinned values, 0 elsewhere
     contact: Integers  # (sides,) contact of each side
     component: Integers  # (sides,) 0 for f_n, 1 for f_t
     sign: Floats  # (sides,) 1 for a bound from above, −1 from below
@@ -44,23 +44,23 @@ class Polygons(NamedTuple):
 
     @property
     def informed(self) -> Mask:
-        """(N_c,) bool: contacts of which something is known."""
+        """(N_c,) bool: contacts with a known bound."""
         return np.any(np.isfinite(self.low) | np.isfinite(self.high), axis=1)
 
     @property
     def wholly(self) -> Mask:
-        """(N_c,) bool: contacts whose force is known altogether."""
+        """(N_c,) bool: contacts with both components pinned."""
         return np.all(self.pinned, axis=1)
 
 
 def bounds_of(known: Known | None, count: int) -> Floats:
     """Bounds (count, 2, 2) [contact, component, low or high] of all contacts, force.
 
-    known: a Known. What is said of a contact more than once holds together. Raises InputError for
+    known: a Known. Several bounds on one contact are combined. Raises InputError for
     contacts that do not exist, bounds of another shape or NaN, and low > high.
     """
     try:
-        contacts, low, high = known  # type: ignore[misc]  # anything else is refused below
+        contacts, low, high = known  # type: ignore[misc]  # other types are refused below
         contacts = np.atleast_1d(np.asarray(contacts, dtype=np.float64))
         low, high = (
             np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
@@ -92,17 +92,17 @@ def bounds_of(known: Known | None, count: int) -> Floats:
 
 
 def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygons | None:
-    """The Polygons of bounds (N_c, 2, 2), force; None where they say nothing.
+    """The Polygons of bounds (N_c, 2, 2), force; None if there are no bounds.
 
-    scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for messages. Raises NotJammedError where
-    what is known of one contact cannot hold together with Coulomb's law.
+    scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for messages. Raises NotJammedError if the
+    bounds on one contact conflict with Coulomb's law.
     """
     if not np.isfinite(bounds).any():
         return None
     low, high = bounds[..., 0] / scale, bounds[..., 1] / scale
     least, most = low.copy(), high.copy()
     least[:, 0] = np.maximum(least[:, 0], 0.0)
-    # What Coulomb's law makes of a contact's bounds: the smallest |f_t| needs its f_n.
+    # Coulomb's law tightens a contact's bounds: the smallest |f_t| requires its f_n.
     smallest = np.maximum(0.0, np.maximum(least[:, 1], -most[:, 1]))
     needed = np.where(smallest > 0, smallest / mu if mu > 0 else np.inf, 0.0)
     least[:, 0] = np.maximum(least[:, 0], needed)
@@ -149,8 +149,8 @@ def _beyond_coulomb(contact: int, bounds: Floats, mu: float, needed: float, shor
 def first_forces(known: Polygons, mu: float) -> Floats:
     """Forces (N_c, 2) to start programs from, f_t in units of μ ⟨f_n⟩.
 
-    Pinned components are where they are to stay, inside the cone; contacts that are known
-    altogether stay at (1, 0) instead, as their own force may lie on the cone.
+    Pinned components are at their values, inside the cone; fully known contacts stay at (1, 0)
+    instead, as their force may lie on the cone.
     """
     unit = units(mu)
     low, high, value = known.low / unit, known.high / unit, known.value / unit
@@ -176,10 +176,10 @@ def units(mu: float) -> Floats:
 def extended(
     A: sparse.csr_matrix, b: Floats, T: sparse.csc_matrix, known: Polygons, mu: float, value: Floats
 ) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
-    """A y = b with rows and slacks of what is known: (A, b, T) in y and the slacks of the sides.
+    """A y = b with rows and slacks of known bounds: (A, b, T) in y and the slacks of the sides.
 
-    A (rows, n) and T (unknowns, n) in cone coordinates y, T y being forces in ⟨f_n⟩; value (N_c, 2)
-    of what is pinned. Rows of sides and then of pinned components, in units of the programs.
+    A (rows, n) and T (unknowns, n) in cone coordinates y, T y being forces in ⟨f_n⟩; value (N_c,
+    2): pinned components. Rows of sides and then of pinned components, in units of the programs.
     """
     parts, T, unit = T.shape[0] // len(known.pinned), sparse.csr_matrix(T), units(mu)
     at, size = parts * known.contact + known.component, unit[known.component]
@@ -202,7 +202,7 @@ def extended(
 
 
 def pins(known: Polygons, mu: float) -> tuple[Integers, Integers]:
-    """Contact and component of each pinned unknown; without friction f_t is none."""
+    """Contact and component of each pinned unknown; without friction, f_t is not an unknown."""
     contact, component = np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
     return contact, component
 
@@ -217,16 +217,16 @@ def contradiction(
     scale: float,
     slack: Floats,
 ) -> str | None:
-    """The message that names what cannot hold together, with proof; None where none was found.
+    """The message that names the conflicting conditions, with proof; None if no conflict was found.
 
     A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩; slack:
-    `Ensemble.slack`. The statements are those
-    with a multiplier in the program that lets them give as little as possible in sum.
+    `Ensemble.slack`. The conditions named are those with a multiplier in the program that minimises
+    the total relaxation.
     """
     whole, right, _ = extended(A, b, T, known, mu, known.value)
     (rows, n), sides = A.shape, len(known.contact)
     count = len(right) - rows
-    # Sides give way upwards, pinned components both ways.
+    # Sides are relaxed upwards, pinned components both ways.
     give = sparse.vstack([sparse.csr_matrix((rows, count)), sparse.identity(count)], format="csc")
     relaxed = sparse.hstack([whole, -give, give[:, sides:]], format="csc")
     cost = np.append(np.zeros(n + sides), np.ones(relaxed.shape[1] - n - sides))
@@ -248,7 +248,7 @@ def contradiction(
 def _statements(
     known: Polygons, mu: float, index: Integers, scale: float, multiplier: Floats, given: Floats
 ) -> str:
-    """The statements with a multiplier, heaviest first, and by how much they would have to give."""
+    """The conditions with a multiplier, largest first, and the necessary relaxation."""
     contact, component = pins(known, mu)
     contact = np.append(known.contact, contact)
     component = np.append(known.component, component)

@@ -1,7 +1,7 @@
-"""The likeliest admissible network of a measurement: forces m with standard errors σ.
+"""The most likely admissible network given measured forces m with standard errors σ.
 
-It has the least χ² = Σ ((f − m)/σ)² over S, and is found as a contact program whose weights are
-1/σ² of each component (`contact_program`).
+It minimises χ² = Σ ((f − m)/σ)² over S, as a contact program with weights 1/σ² for each component
+(`contact_program`).
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ERRORS, MEASURED
 from granforce.types import Floats
 
-# What was not measured counts as 0 with a standard error of so many ⟨f_n⟩, if not told otherwise:
-# among networks that the measurement cannot tell apart, the one with the least forces is taken.
+# Default standard error, in ⟨f_n⟩, with which unmeasured components count as 0: among networks that
+# the measurement cannot distinguish, it selects the one with the smallest forces.
 UNMEASURED = 1e3
 _PARTS = "f_n", "f_t"
 # Steps of the contact program; it ends balanced, with a mean product of forces and multipliers
-# (in ⟨f_n⟩², the largest weight 1) by which forces are known to the root of it. Bounds on single
-# forces leave fewer digits: beyond, rounding drives the multipliers away.
+# (in ⟨f_n⟩², the largest weight 1) which gives forces to its square root. Bounds on single forces
+# leave fewer digits: beyond, rounding makes the multipliers diverge.
 _MOST_STEPS, _BALANCE, _CLOSED, _CLOSED_BETWEEN_BOUNDS = 150, BALANCED / 4, 1e-24, 1e-11
 # Coordinates y (in ⟨f_n⟩) up to this lie on the wall of their cone.
 _ON_THE_WALL = 1e-6
-# What the last digits of balance may move a force by, in ⟨f_n⟩.
+# Largest change of a force by the final correction of balance, in ⟨f_n⟩.
 _NEAR = 1e-6
-# Added to a diagonal of 1: more than rounding, and less than what is not.
+# Added to a diagonal of 1: above rounding, and below any significant entry.
 _SHIFTS = 1e-12, 1e-10
 
 
@@ -47,7 +47,7 @@ class Likeliest(NamedTuple):
 
     forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
-    freedom: int  # degrees of freedom: what was measured less what the network could adapt to
+    freedom: int  # degrees of freedom: measured components minus those the network can fit exactly
     deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
 
 
@@ -159,7 +159,7 @@ def fitted_many(
 def _otherwise(
     ensemble: Ensemble, forces: Floats, m: Floats, s: Floats, unmeasured: float
 ) -> Floats:
-    """The likeliest network where rounding left the steps just outside S, or they ended nowhere."""
+    """The most likely network if the steps ended just outside S, or did not converge."""
     found = nearest(ensemble, forces) if np.isfinite(forces).all() else None
     if found is not None and found.converged and found.residual <= BALANCED:
         if np.abs(found.forces - forces).max() <= _NEAR * ensemble.force_scale:
@@ -176,8 +176,8 @@ def _otherwise(
 def _adapted(ensemble: Ensemble, m: Floats, forces: Floats) -> int:
     """Dimensions in which the measured part of a network could follow the measurement.
 
-    With the cone coordinates that are 0 there held, the rank of what is measured on the null space
-    of the balance.
+    The rank of the measured components on the null space of the balance, with cone coordinates held
+    that are 0 there.
     """
     free = np.flatnonzero(ensemble.coordinates(forces) > _ON_THE_WALL)
     A, _, T = ensemble.scaled_form

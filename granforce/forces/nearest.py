@@ -8,8 +8,8 @@ Laplacian of the contact graph, A K Aᵀ, with one 2×2 conductance K per contac
 1. A barrier keeps forces inside their cones, so that K (between 0 and 1) changes smoothly, and is
    lowered step by step (`contact_program`, w = 1).
 2. Once the barrier is low enough to tell which contacts stick, slide and open, Newton's method
-   without a barrier ends in the exact optimum after one to three steps. Tried too early it leaves
-   the neighbourhood at once; then the first phase goes on.
+   without a barrier ends in the exact optimum after one to three steps. Started too early it leaves
+   the neighbourhood at once; the first phase then continues.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ INSIDE = 1.0
 # each time it has fallen by LOWER since; it may take so many steps, and is given up where the
 # unbalance (in ⟨f_n⟩) exceeds LOST.
 ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
-# Steps after which no network will be reached: usual are 10 to 40.
+# Steps after which no network will be reached; 10 to 40 are usual.
 MOST_STEPS = 100
 # Steps shorter than this, so many in a row, mean that no network will be reached.
 SHORT, SHORT_IN_A_ROW = 1e-4, 8
@@ -79,7 +79,7 @@ def nearest_of_many(
     max_iterations: int = MOST_STEPS,
     cancel: Cancel | None = None,
 ) -> list[Relaxation]:
-    """`nearest` of each of the starts, a few of them side by side: the same results, bit for bit.
+    """`nearest` of each of the starts, vectorised: bit-identical results.
 
     starts: arrays (N_c, 2), force. Other arguments as of `nearest`.
     """
@@ -117,7 +117,8 @@ def _batch(
     forces = ensemble.pin(search.forces() * ensemble.force_scale)
     converged = [search.ended[k] for k in range(len(starts))]
     if ensemble.member is not None and max_iterations >= MOST_STEPS:
-        # S is not empty, and the steps were not cut short: at μ ≳ 10³ they may lead nowhere.
+        # S is not empty, and the step limit was not reached: at μ ≳ 10³ the steps may fail to
+        # converge.
         for k in np.flatnonzero(~np.array(converged)).tolist():
             if np.isfinite(starts[k]).all():
                 forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
@@ -138,9 +139,9 @@ def _batch(
 
 
 def starting_network(ensemble: Ensemble) -> Floats:
-    """The packing's own network (N_c, 2), or another one that is admitted if that left S.
+    """The packing's own network (N_c, 2), or another admitted one if that is outside S.
 
-    Raises NotJammedError where S is empty, UndecidedError where neither could be shown.
+    Raises NotJammedError if S is empty, UndecidedError if this could not be decided.
     """
     if ensemble.admits(ensemble.original):
         return ensemble.original
@@ -158,11 +159,11 @@ def starting_network(ensemble: Ensemble) -> Floats:
 
 
 def some_network(ensemble: Ensemble, start: Floats) -> Floats:
-    """A network (N_c, 2) of S, the one nearest to start where that is reached.
+    """A network (N_c, 2) of S, the one nearest to start if the steps converge.
 
-    Where it is not, others are asked: PIQP, then HiGHS, whose vertices are exact to rounding. What
-    none of them reaches is the network at hand where it is the only one, or else the last iterate,
-    which is not admitted.
+    Otherwise PIQP is tried, then HiGHS, whose vertices are exact to rounding. If all fail, the
+    result is the known network if it is the only one, or else the last iterate, which is not
+    admitted.
     """
     found = nearest(ensemble, start).forces
     if ensemble.admits(found):
@@ -180,7 +181,7 @@ def some_network(ensemble: Ensemble, start: Floats) -> Floats:
 
 
 class Search:
-    """Up to LANES searches under way, each at its own step."""
+    """Up to LANES searches at once, each at its own step."""
 
     def __init__(self, problem: Problem, targets: Floats, start: Floats | None = None) -> None:
         """targets (N_c, 2, W) in ⟨f_n⟩; those of lanes that are not used are 0.
@@ -192,7 +193,8 @@ class Search:
         self.at = contact_program.make_iterate(problem, width)
         self.work = contact_program.make_workspace(problem, width)
         self.count = max(1, len(targets))
-        # Starts far outside need room in proportion: a third of the steps from 10⁴ ⟨f_n⟩ away.
+        # Distant starts need proportional room: from 10⁴ ⟨f_n⟩ away this takes a third of the
+        # steps.
         square = [np.sum(np.ascontiguousarray(targets[..., k]) ** 2) for k in range(width)]
         self.size = np.maximum(1.0, np.sqrt(np.array(square) / self.count))
         self._begin(targets, start)
@@ -222,7 +224,7 @@ class Search:
         at.y[slacks], at.z[slacks] = problem.start[slacks, None], 1.0
 
     def run(self, tolerance: float, most: int, used: int) -> None:
-        """Step until every one of the lanes in use has ended, or will not end."""
+        """Step until every lane in use has converged or failed."""
         near = [NEAREST * size for size in self.size.tolist()]
         # Between sides, `project` does not know the nearest point.
         attempt = [0.0 if len(self.problem.side) else ATTEMPT * self.count] * len(near)
@@ -246,7 +248,7 @@ class Search:
                 else:
                     going.append(k)
             active = ready + going
-            # Those that are ready wait for the others, who share the factorisation.
+            # Lanes that are ready wait for the others, which share the factorisation.
             if going:
                 self._step(going)
             elif ready:
@@ -285,9 +287,9 @@ class Search:
             self.short[k] = self.short[k] + 1 if length < SHORT else 0
 
     def _finish(self, ready: Sequence[int], tolerance: float, most: int) -> list[int]:
-        """Newton's method without barrier, from the iterate's v; who did not end by it.
+        """Newton's method without barrier, from the iterate's v; which lanes did not converge.
 
-        Those are put back to where they were, and go on.
+        Those return to their previous iterate and continue.
         """
         at, trying = self.at, ready
         kept = at.y.copy(), at.v.copy(), at.v_border.copy()

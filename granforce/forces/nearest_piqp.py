@@ -1,6 +1,6 @@
-"""The admissible network nearest to given forces by PIQP: an independent witness of `nearest`.
+"""The admissible network nearest to given forces by PIQP: an independent check of `nearest`.
 
-And what takes over where the project's own method, of nearest or likeliest networks, reached none.
+It also takes over if `nearest` or `likeliest` does not converge.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Floats
 
-# Coordinates y (in ⟨f_n⟩) far below this hardly change where balance is restored.
+# Coordinates y (in ⟨f_n⟩) far below this hardly change when balance is restored.
 _AWAY = 1e-6
 
 
@@ -34,9 +34,9 @@ def nearest_piqp(
     max_iterations: of interior points. Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n −
     f_t/μ), in units of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
 
-    Every call sets up its own solver: one kept for the ensemble and updated with each start would
-    save a tenth to a fifth of the time, but carries rounding over (1e-9 ⟨f_n⟩) from what it
-    solved before, and the same start would no longer give the same forces.
+    Every call sets up its own solver. A cached solver, updated with each start, would save a tenth
+    to a fifth of the time, but its rounding (1e-9 ⟨f_n⟩) depends on earlier calls, and the same
+    start would no longer give the same forces.
     """
     begin = time.perf_counter()
     tolerance = positive(tolerance, "tolerance", or_zero=True)
@@ -59,8 +59,8 @@ def nearest_piqp(
 def likeliest_piqp(ensemble: Ensemble, weights: Floats, target: Floats) -> Floats:
     """The forces (N_c, 2) of S with the least Σ (weights (f − target))², balanced to rounding.
 
-    weights (N_c, 2), 1/force; target (N_c, 2), force, NaN counts as 0. Whether they are admitted is
-    for the judges.
+    weights (N_c, 2), 1/force; target (N_c, 2), force, NaN counts as 0. The caller checks whether
+    they are admitted.
     """
     target = np.nan_to_num(target)
     weigh = ensemble.to_vector(weights) * ensemble.force_scale
@@ -73,7 +73,7 @@ def likeliest_piqp(ensemble: Ensemble, weights: Floats, target: Floats) -> Float
 def restored(ensemble: Ensemble, y: Floats) -> Floats:
     """Forces (N_c, 2) of y ≥ 0 (n,) of `Ensemble.scaled_form`, balanced to rounding.
 
-    A program ends at its tolerance: what is left is taken off by the least change in proportion.
+    A program ends at its tolerance; the remaining residual is removed by the least relative change.
     """
     A, b, T = ensemble.scaled_form
     if A.shape[0] <= MOST_DENSE:
@@ -87,7 +87,7 @@ def _least(
     """y ≥ 0 (n,) of S with the least |W y − target/⟨f_n⟩|², PIQP's verdict and its iterations.
 
     The interior-point iterate may be negative by its tolerance: y ≥ 0 is set exactly, so that only
-    the residual has to be judged.
+    the residual remains to be checked.
     """
     A, b, _ = ensemble.scaled_form
     solver = programs.quadratic_solver(max_iterations)
