@@ -100,7 +100,7 @@ TO_BROWSER = {
         {"error": str},
         {"fall": [float, ...]},  # motion (3 N) of the disks; empty where nothing falls
         {"file": str},  # base64
-        {"measured": {"endless": True}, **MEASURED},
+        {"measured": {"most": float, "outline": list}, **MEASURED},
         {"measured": {"bounds": list, "outline": list}, **MEASURED},
     ),
 }

@@ -14,6 +14,7 @@ from granforce.explore import bodies, stress_outline
 from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
+from granforce.forces.knowledge import Known
 from granforce.numerics import certificates
 from granforce.records import InputError, Packing, are_whole
 from granforce.types import Floats, Integers
@@ -66,19 +67,25 @@ def bounds(packing: Packing) -> Floats | None:
     return both
 
 
-def outline(packing: Packing, plane: Sequence[Any]) -> Floats:
+def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -> Floats:
     """Corners (k, 2) of the outline of S on two force components, in force; none without an area.
 
     plane: two numbers, 2 c for f_n and 2 c + 1 for f_t of contact c of the packing. Its certified
-    outer polygon is _OUTLINED of the extent away at most.
+    outer polygon is _OUTLINED of the extent away at most. most: largest f_n of every contact, for
+    an S without an end.
 
     Raises InputError for other components, and where S is not bounded.
     """
-    S = ensemble(packing)
+    count = len(packing.contacts.i)
+    limit = np.array([np.inf if most is None else most, np.inf])
+    S = ensemble(
+        packing,
+        known=Known(np.arange(count), np.full((count, 2), -np.inf), np.tile(limit, (count, 1))),
+    )
     chosen = np.array(plane)
-    if chosen.shape != (2,) or not are_whole(chosen, 2 * len(packing.contacts.i) - 1).all():
+    if chosen.shape != (2,) or not are_whole(chosen, 2 * count - 1).all():
         raise InputError("a plane has two force components: 2 c for f_n, 2 c + 1 for f_t")
-    axes = np.zeros((2, len(packing.contacts.i), 2))
+    axes = np.zeros((2, count, 2))
     axes.reshape(2, -1)[[0, 1], chosen] = 1.0
     carrying = axes[:, S.index]
     if chosen[0] == chosen[1] or not carrying.any(axis=(1, 2)).all():

@@ -125,10 +125,11 @@ def test_a_column_has_an_exact_outline():
     assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((low, high), rel=1e-3)
 
 
-def test_what_has_no_end_has_neither_ends_nor_outline():
-    assert small_scenes.measured(small_scenes.packing_of("column", 2.0), None, [0, 2]) == {
-        "endless": True
-    }
+def test_what_has_no_end_has_no_bounds_and_is_drawn_up_to_a_force():
+    found = small_scenes.measured(small_scenes.packing_of("column", 2.0), None, [0, 2])
+    corners = np.reshape(found["outline"], (-1, 2))
+    assert found.keys() == {"most", "outline"} and len(corners) > 2
+    assert corners.max() == pytest.approx(found["most"], rel=1e-3)
 
 
 @pytest.mark.parametrize("plane", [[0], [0, 40], [0, 0.5], ["a", 1], None])
@@ -142,6 +143,9 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
     assert motion[2, 1] < 0 and np.abs(motion[:2]).max() < 1e-9
     alone = small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
     assert alone[0, 1] < 0
+    beside_a_wall = small_scenes.falling(small_scenes.own("1,3,1|0,0,4,0;0,0,0,5", 0.5))
+    for falls in (motion[2], alone[0], beside_a_wall):
+        np.testing.assert_allclose(falls, [0, -1, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -112,6 +112,7 @@ export class Arrows {
     if (F) drawValues(this, F)
     if (body.scene.r.length > 1) this.drawNumbers()
     else if (F && body.count <= NAMED) drawNames(this, F)
+    if (look.carried) this.drawCarried(look.carried)
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
@@ -134,6 +135,15 @@ export class Arrows {
     const [left, top] = this.px(0, box[1])
     g.strokeRect(left, top, box[0] * this.unit, box[1] * this.unit)
     g.setLineDash([])
+  }
+
+  /** Where the disk in the hand is, before its scene is there. */
+  drawCarried([x, y, r]) {
+    const { context: g, look } = this
+    circle(g, this.px(x, y), r * this.unit)
+    g.strokeStyle = look.hand
+    g.lineWidth = 2
+    g.stroke()
   }
 
   /** Where the keyboard's hand is. */

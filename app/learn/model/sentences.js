@@ -67,22 +67,22 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
   if (empty && !scene.idle) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
     const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
-    return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
+    return `<b>${2 * count} unknown force components; ${sum}: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
   const free = h === 1 ? "number" : "numbers"
   const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point}</b>`
-  return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
+  return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}: ${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}: ${why})</span>`
 }
 
 /** The sum that gives the number of equations, and what its parts are. */
 function equationsOf({ grains, r, pressing, box, equations }) {
-  const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
+  const disks = box[0] ? [...(grains ?? [])].filter((grain) => grain < r.length).length : r.length, walls = 2 * pressing.length // loose disks of a box have no load
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
   const said = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
-  if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two that follow from the others, plus one for the pressure`]
-  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations`, `three for each disk, less two that follow from the others, plus one for the pressure`]
+  const rank = whole === equations ? "" : `, of which ${equations} are independent`
+  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations${rank}`, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
 /** What the bars below show; empty where there are none. */
@@ -105,7 +105,7 @@ export function pictured(body, { filled: dotted }) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
+  return h > 3 ? `shadow (projection) of S onto two of the forces${body.most ? `; S has no end: drawn where no normal force is above ${number(body.most)}` : ""}${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 
@@ -155,7 +155,7 @@ function falling({ scene: { r, box, pressing, load: own }, load }, mu, { fall, e
   const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
   const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
   const loads = pressing.length ? "the press does" : box[0] ? `the pressure${pushed} does` : `the weights${pushed} do`
-  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and no contact force that friction allows can stop it.` : ""
+  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and the contacts cannot balance them.` : ""
   const mended = enough ? ` With friction of at least μ = ${enough} it would hold.` : ""
   return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${mended}${why}`
 }

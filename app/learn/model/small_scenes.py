@@ -19,6 +19,7 @@ MOST_DISKS, MOST_WALLS = 30, 12
 LONGEST = 4000  # characters of a built scene in a link
 BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # what a visitor begins to build with
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: which walls press
+DRAWN = 6.0  # of all loads: up to which f_n an S without an end is drawn
 SNAP = 1e-6  # of the largest radius: what a visitor's hand left open is closed up to here
 
 
@@ -141,7 +142,22 @@ def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
     except NotJammedError:  # nothing touches: everything falls
         motion = np.where(np.isnan(packing.load), 0.0, packing.load)
         motion /= np.abs(motion).max() or 1.0
-    return np.zeros(0) if motion is None else motion[:count].ravel()
+    return np.zeros(0) if motion is None else _straight(packing, motion)[:count].ravel()
+
+
+def _straight(packing: Packing, motion: Floats) -> Floats:
+    """The same motion, but of what moves, what presses on nothing falls straight along its load."""
+    contacts, straight = packing.contacts, motion.copy()
+    loads = np.nan_to_num(packing.load)
+    loads /= np.abs(loads).max() or 1.0
+    for grain in np.flatnonzero(np.abs(motion).max(axis=1) > SNAP):
+        trial = straight.copy()
+        trial[grain] = loads[grain]
+        touched = (contacts.i == grain) | (contacts.j == grain)
+        apart = trial[contacts.j[touched], :2] - trial[contacts.i[touched], :2]
+        if np.all(np.sum(apart * contacts.normal[touched], axis=1) > -SNAP):
+            straight = trial
+    return straight
 
 
 def measured(
@@ -151,12 +167,14 @@ def measured(
 
     plane: two force components, 2 c for f_n and 2 c + 1 for f_t of contact c. bounds: [least,
     largest f_n] of every contact, None where not certified. outline: corners, flat, empty where
-    there is no area. Both are left out where S has no end.
+    there is no area. Where S has no end there are no bounds, and the outline is that of the part
+    in which no f_n is above `most`.
     """
     packing = _loaded(packing, load)
     found = hulls.bounds(packing)
     if found is None:
-        return {"endless": True}
+        most = DRAWN * float(np.nansum(np.hypot(*packing.load[:, :2].T)))
+        return {"most": most, "outline": hulls.outline(packing, plane, most).ravel().tolist()}
     bounds = [None if np.isnan(low) else [float(low), float(high)] for low, high in found]
     return {"bounds": bounds, "outline": hulls.outline(packing, plane).ravel().tolist()}
 

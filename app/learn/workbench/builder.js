@@ -160,6 +160,7 @@ export class Builder {
     }
     const [, , r] = this.disks[held.disk], put = this.snapped(at, r, held.disk)
     if (!put) return
+    if (put.every((v, k) => v === this.disks[held.disk][k])) return
     this.disks[held.disk] = [...put, r]
     this.publish()
   }

@@ -22,13 +22,13 @@ const FEW = 12 // contacts up to which all their intervals are seen at once
 
 class Workbench {
   constructor(model, view) {
-    Object.assign(this, { model, view, hand: null, filled: false, chosenMu: false, frame: 0, resting: 0, painted: 0, written: {}, parts: {} })
+    Object.assign(this, { model, view, hand: null, next: null, asked: false, filled: false, chosenMu: false, frame: 0, resting: 0, painted: 0, written: {}, parts: {} })
     const root = this.root = document.createElement("div")
     root.className = "bench"
     root.innerHTML = layout(MOST_MU)
     this.gone = goneBanner(view, "What is in the page still moves.")
     root.prepend(this.gone)
-    this.builder = new Builder(this.part("own"), (built) => ask(model, view, { built, mu: this.hand.mu }))
+    this.builder = new Builder(this.part("own"), (built) => this.build(built))
     this.arrows = new Arrows(this.part("packing"), (what, given) => this.heard(what, given))
     this.space = new Space(this.part("space"), (what, given) => this.heard(what, given))
     this.bars = new Bars(this.part("bars"))
@@ -81,8 +81,8 @@ class Workbench {
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = this.builds && root.getRootNode().activeElement === canvas ? builder.cursor : null
     const axes = new Map(space.axed.map((force, k) => [force, [colours.across, colours.up][k]]))
-    const { disk, contact, side, fall, enough, lit } = hand
-    const look = { ...colours, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
+    const { disk, contact, side, fall, enough, lit } = hand, carried = builder.disks[builder.held?.disk]
+    const look = { ...colours, carried, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== canvas.clientWidth) {
       arrows.fit(body, own && arrows.own === canvas.clientWidth)
       arrows.own = own ? canvas.clientWidth : 0
@@ -127,7 +127,7 @@ class Workbench {
     this.pushes(false)
     this.hand = new SceneInHand(scene, () => this.changed())
     const { body } = this.hand
-    if (own && builder.read(scene.built, scene.begins)) this.arrows.own = 0
+    if (own && this.built() && builder.read(scene.built, scene.begins)) this.arrows.own = 0
     Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
     space.shadow = this.axes.show(body, (force) => forceName(scene, force))
     if (this.filled) space.fill()
@@ -148,6 +148,26 @@ class Workbench {
     Object.assign(this.space, { shadow, outline: { points: [], stale: true }, sceneDrawn: null })
     this.changed()
     this.measure()
+  }
+
+  /** A scene that was built by hand: one at a time is asked for, of those built meanwhile the last one. */
+  build(built) {
+    this.next = built
+    if (!this.asked) this.askNext()
+  }
+
+  askNext() {
+    const { model, view, next: built } = this
+    Object.assign(this, { asked: true, next: null })
+    ask(model, view, { built, mu: this.hand.mu })
+  }
+
+  /** The scene asked for has come, or cannot be; whether the hand is not ahead of it. */
+  built() {
+    this.asked = false
+    const last = this.next === null
+    if (!last) this.askNext()
+    return last
   }
 
   // Friction
@@ -211,11 +231,11 @@ class Workbench {
       this.changed()
     }
     if (news.measured && news.scene === hand.scene.name && news.mu === hand.mu && !hand.body.whole) {
-      const { bounds, outline, endless } = news.measured
+      const { bounds = null, outline, most = null } = news.measured
       hand.bounds = bounds
-      hand.body.bounded = !endless
-      if (endless) space.dots = []
-      if (news.plane.join() === space.shadow.join()) space.outline = { points: outline ?? [], stale: false }
+      Object.assign(hand.body, { bounded: most === null, most })
+      if (most !== null) space.dots = []
+      if (news.plane.join() === space.shadow.join()) space.outline = { points: outline, stale: false }
       this.changed()
     }
   }
@@ -223,6 +243,7 @@ class Workbench {
   refused(error) {
     if (!this.hand) return this.write("says", error)
     this.address.returning = false
+    this.built()
     this.part("name").value = this.hand.scene.name
     this.say(error)
   }
