@@ -119,8 +119,8 @@ def add_wall_contacts(command: Parser) -> None:
     command.add_argument(
         "--walls",
         choices=("held", "pressing"),
-        help="treat walls as grains: held (they take any force) or pressing (each carries "
-        "the force that it has in the simulation); default: forces of walls are loads on grains",
+        help="treat walls as grains: held (any force) or pressing (each exerts its force from "
+        "the simulation); default: forces of walls are loads on grains",
     )
 
 
@@ -157,13 +157,15 @@ def add_packing(command: Parser, several: bool = False) -> None:
     )
     group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
     group.add_argument(
-        "--sweeps", type=int, help="most sweeps per step (default 600; 150 from μ = 0.2 on)"
+        "--sweeps",
+        type=int,
+        help="largest number of sweeps per step (default 600; 150 from μ = 0.2 on)",
     )
     group.add_argument(
         "--step-accuracy",
         type=float,
         default=0.01,
-        help="breach of the contact laws that ends a step, relative to the fastest grain "
+        help="violation of the contact laws at which a step ends, relative to the fastest grain "
         "(default 0.01)",
     )
     group.add_argument(
@@ -177,7 +179,7 @@ def add_packing(command: Parser, several: bool = False) -> None:
 
 def add_any_packing(command: Parser) -> None:
     command.add_argument(
-        "--packing", type=Input, metavar="FILE.npz", help="take this packing, make none"
+        "--packing", type=Input, metavar="FILE.npz", help="use this packing instead of making one"
     )
     others = set(command.options)
     add_packing(command)
@@ -187,7 +189,7 @@ def add_any_packing(command: Parser) -> None:
 
 def add_conditions(command: Parser, known: bool = True) -> None:
     group = command.add_argument_group(
-        "what the forces have to satisfy, beside balance and friction"
+        "condition on the forces, in addition to balance and friction"
     )
     group.add_argument(
         "--prescribe",
@@ -199,7 +201,7 @@ def add_conditions(command: Parser, known: bool = True) -> None:
         "--stress",
         type=str,
         metavar="XX,YY,XY",
-        help="the stress that --prescribe stress asks for (default: that of the packing's forces)",
+        help="the stress for --prescribe stress (default: that of the packing's forces)",
     )
     if known:
         add_known(group)
@@ -210,8 +212,8 @@ def add_known(group: argparse._ArgumentGroup) -> None:
         "--known",
         type=Input,
         metavar="FILE.csv",
-        help="forces that are known, in the packing's unit: columns contact, and f_n, f_t "
-        "(exactly) or f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
+        help="known forces, in the packing's unit: columns contact, and f_n, f_t (exactly) or "
+        "f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
     )
 
 
@@ -228,13 +230,18 @@ def add_walk_options(command: Parser) -> None:
     group = command.add_argument_group("the random walk")
     group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument(
         "--relax",
         choices=list(RELAXATIONS),
         default="nearest",
-        help="the nearest admissible network, by our own solver (default) or by PIQP, or the "
-        "paper's contact dynamics with an exact finish or (slower, to 1e-6) without",
+        help="how a state is relaxed: to the nearest admissible network (nearest, default; "
+        "nearest_piqp: by PIQP), or by the paper's contact dynamics with an exact finish or "
+        "(slower, to 1e-6) without",
     )
     group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
@@ -252,8 +259,8 @@ def add_unit(command: argparse._ActionsContainer) -> None:
         "--unit",
         choices=["packing", "mean"],
         default="packing",
-        help="unit of forces in reports and tables, whose names carry it: the packing's own "
-        "(default), or the mean normal force ⟨f_n⟩",
+        help="unit of forces in reports and tables: the packing's (default), or the mean normal "
+        "force ⟨f_n⟩; names include the unit",
     )
 
 
@@ -290,15 +297,19 @@ def add_scheduler(command: argparse._ActionsContainer) -> None:
         "--scheduler",
         type=str,
         metavar="ADDRESS",
-        help="run on the workers of this dask scheduler, such as tcp://head:8786, which see the "
-        "same store, in place of processes on this machine",
+        help="run on the workers of this dask scheduler, such as tcp://head:8786, instead of "
+        "local processes; workers must see the same store",
     )
 
 
 def add_exact(command: Parser) -> None:
     add_any_packing(command)
     group = command.add_argument_group("the ensemble")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument(
         "--contacts", type=str, help="only these contacts, numbers separated by commas"
     )
@@ -320,8 +331,7 @@ def add_reading(group: argparse._ActionsContainer) -> None:
         "--reach",
         type=float,
         default=0.5,
-        help="largest gap of contacts that may have been missed, in mean radii (default 0.5; 0: "
-        "none are added)",
+        help="largest gap of candidate contacts, in mean radii (default 0.5; 0: none are added)",
     )
     group.add_argument("--scale", type=float, default=1.0, help="factor on the radii (default 1)")
     group.add_argument(
@@ -338,24 +348,25 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
     group.add_argument(
         "--flag",
         choices=["ignore"],
-        help="ignore the flags of the grains: those at the boundary of the frame are at walls "
-        "(default: flagged ones, unless nearly all are)",
+        help="ignore the flags of the grains: grains at the boundary of the frame count as "
+        "grains at walls (default: flagged grains, unless nearly all are flagged)",
     )
     group.add_argument(
         "--repair",
         type=float,
         metavar="PART",
-        help="mend up to this part of the data (default 0.1); what was mended is told",
+        help="repair up to this fraction of the data (default 0.1); the report lists every repair",
     )
-    group.add_argument("--strict", action="store_true", help="mend nothing: the first flaw ends it")
+    group.add_argument(
+        "--strict", action="store_true", help="repair nothing; stop at the first error"
+    )
     group.add_argument(
         "--walls",
         type=str,
         metavar="SHAPE",
-        help="walls that count: box, annulus, circle or auto (which fits), found from the grains "
-        "at them or with numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: "
-        "left open "
-        "(default: where a *_solved.mat has the directions of their contacts)",
+        help="walls of the frame: box, annulus, circle or auto (the best fit), found from the "
+        "grains at them or given (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); "
+        "open: no walls (default for a *_solved.mat with the directions of wall contacts)",
     )
     group.add_argument(
         "--wall-force",
@@ -363,7 +374,7 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         metavar="'WALL: FX FY SIGMA'",
         action="append",
         default=[],
-        help="force of the grains on a wall of a box (left, right, bottom, top: by x and y), as a "
-        "load cell measured it; may be given several times",
+        help="measured force of the grains on a wall of a box (left, right, bottom, top), such "
+        "as from a load cell; may be given several times",
     )
     command.leaves_out("with --strict", lambda asked: asked.strict, {"repair"})

@@ -112,7 +112,7 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
 
 
 def _told_interrupted() -> int:
-    print("granforce: interrupted; finished entries are kept", file=sys.stderr)
+    print("granforce: interrupted; finished entries are saved", file=sys.stderr)
     return 130
 
 

@@ -37,7 +37,7 @@ def add_pack(commands: Commands) -> None:
     command = subcommand(
         commands,
         "pack",
-        "make a jammed packing, or find it in the store",
+        "make a jammed packing, or load it from the store",
         "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz\n"
         "  granforce pack --scene groove --mu 0.5",
     )
@@ -45,8 +45,8 @@ def add_pack(commands: Commands) -> None:
         "--scene",
         type=str,
         metavar="NAME",
-        help="a small scene in place of a packing made from a gas: groove, box, pyramid, press, "
-        "leaning, six, solid, column, thirteen or many; of the other options, it takes --mu alone",
+        help="a small scene instead of a compressed packing: groove, box, pyramid, press, "
+        "leaning, six, solid, column, thirteen or many; only --mu applies to it",
     )
     add_packing(command)
     add_store(command)
@@ -62,7 +62,7 @@ def add_walk(commands: Commands) -> None:
     command = subcommand(
         commands,
         "walk",
-        "walk at random through the force networks of a packing",
+        "random walk through the force networks of a packing",
         "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000 --out states.zarr",
     )
     add_source(command)
@@ -73,17 +73,21 @@ def add_uniform(commands: Commands) -> None:
     command = subcommand(
         commands,
         "uniform",
-        "draw force networks of a packing uniformly, and tell how well that went",
+        "draw force networks of a packing uniformly, with convergence diagnostics",
         "granforce uniform -n 400 --mu 0.1 --seed 1 --states 1000 --effective 500",
     )
     add_any_packing(command)
     group = command.add_argument_group("the sample")
-    group.add_argument("--states", type=int, default=1000, help="at least so many (default 1000)")
+    group.add_argument("--states", type=int, default=1000, help="at least this many (default 1000)")
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument(
-        "--effective", type=float, help="draw on until worth so many independent states"
+        "--effective", type=float, help="continue until the effective sample size is at least this"
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
@@ -104,10 +108,14 @@ def add_volume(commands: Commands) -> None:
         "--accuracy",
         type=float,
         default=0.05,
-        help="standard error of ln V that is wanted (default 0.05)",
+        help="standard error of ln V (default 0.05)",
     )
     group.add_argument("--volume-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
     add_store(command)
@@ -117,7 +125,7 @@ def add_infer(commands: Commands) -> None:
     command = subcommand(
         commands,
         "infer",
-        "find the admissible network that measured forces speak for, with error bars",
+        "find the most likely admissible network given measured forces, with error bars",
         "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
     )
@@ -139,14 +147,16 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--unmeasured",
         type=float,
-        help="what was not measured counts as 0 with an error of so many ⟨f_n⟩ (default 1000: any "
-        "force; with --again 2, with --frames 1: a frame without a pressure wants about 1)",
+        help="standard error, in ⟨f_n⟩, with which unmeasured forces count as 0 (default 1000, "
+        "any force; 2 with --again; 1 with --frames; use about 1 for a frame without a "
+        "pressure)",
     )
     group.add_argument(
         "--again",
         action="store_true",
-        help="error bars for forces that came about by dynamics: the likeliest network is measured "
-        "again and again (without: all networks are alike before the measurement)",
+        help="error bars for networks made by dynamics: repeat simulated measurements of the "
+        "most likely network (default: all networks are equally likely before the "
+        "measurement)",
     )
     group.add_argument(
         "--states", type=int, help="draws for error bars (default 1000, with --frames 200; 0: none)"
@@ -154,10 +164,15 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--certain",
         action="store_true",
-        help="also find which unmeasured contacts carry in every network within 3 σ, exactly",
+        help="also find the unmeasured contacts that carry force in every network within 3 σ, by "
+        "exact bounds",
     )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     group.add_argument(
@@ -204,7 +219,11 @@ def add_informative(commands: Commands) -> None:
     )
     group.add_argument("--states", type=int, default=400, help="uniform states (default 400)")
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
     add_conditions(command)
@@ -215,7 +234,7 @@ def add_measure(commands: Commands) -> None:
     command = subcommand(
         commands,
         "measure",
-        "measure the indeterminacy of a walk, contact by contact if wanted",
+        "measure the indeterminacy of a walk, optionally for each contact",
         "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --contacts contacts.csv",
     )
     add_source(command)
@@ -229,7 +248,7 @@ def add_scan(commands: Commands) -> None:
     command = subcommand(
         commands,
         "scan",
-        "packings and walks for many μ and seeds, over processes, resumable",
+        "packings and walks for many μ and seeds, in parallel and resumable",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
     )
     command.add_argument(
@@ -240,7 +259,7 @@ def add_scan(commands: Commands) -> None:
     add_walk_options(command)
     command.add_argument("--out", type=StorePath, metavar="STORE", help="store for the results")
     add_store(command)
-    command.add_argument("--keep", type=int, help="store only so many states, evenly spaced")
+    command.add_argument("--keep", type=int, help="store only this many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
     add_scheduler(command)
     command.leaves_out("with --out", lambda asked: asked.out is not None, {"cache"})
@@ -258,7 +277,9 @@ def add_study(commands: Commands) -> None:
         "--out", type=Workplace, metavar="FOLDER", default="study", help="(default study)"
     )
     command.add_argument(
-        "--paper", action="store_true", help="compute what the paper did, with its own relaxation"
+        "--paper",
+        action="store_true",
+        help="compute only the paper's study, with the paper's relaxation",
     )
     command.add_argument(
         "--parts", type=str, help="compute only these parts, names separated by commas"
@@ -266,30 +287,30 @@ def add_study(commands: Commands) -> None:
     command.add_argument(
         "--minutes",
         type=float,
-        help="begin no cell after so many minutes; the same command goes on where it was",
+        help="start no new cell after this many minutes; run the same command again to resume",
     )
     command.add_argument(
         "--status",
         action="store_true",
-        help="compute nothing: tell what of the parts is done, and about how long the rest takes",
+        help="compute nothing: show which parts are done and how long the rest takes",
     )
     command.add_argument(
         "--table",
         type=Input,
         metavar="STORE",
-        help="compute nothing: take this reduced study, as data/study.zarr",
+        help="compute nothing: use this reduced study, such as data/study.zarr",
     )
     command.add_argument(
         "--reduce",
         type=Input,
         metavar="STORE",
-        help="compute nothing: reduce the cells of this store, and take what it lacks from --table",
+        help="compute nothing: reduce the cells of this store, with missing ones from --table",
     )
     command.add_argument(
         "--documents",
         type=Edited,
         metavar="FILES",
-        help="renew what stands between <!-- study: NAME --> and <!-- end --> in these files, "
+        help="update the text between <!-- study: NAME --> and <!-- end --> in these files, "
         "names separated by commas",
     )
     others = set(command.options)
@@ -338,7 +359,7 @@ def add_limit_loads(commands: Commands) -> None:
     command = subcommand(
         commands,
         "limit-loads",
-        "compute the largest force pair each contact can be pushed apart with",
+        "compute the largest force pair that can push the grains of each contact apart",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
     )
     add_exact(command)
@@ -348,16 +369,23 @@ def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
         "stress",
-        "compute which stresses the contacts can carry at their pressure, and the largest shear",
+        "compute the stresses that the contacts can carry at the packing's pressure, and the "
+        "largest shear",
         "granforce stress -n 400 --mu 0.1 --seed 1 --out outline.csv",
     )
     add_any_packing(command)
     group = command.add_argument_group("the outline")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
-    group.add_argument("--angles", type=int, default=64, help="directions told (default 64)")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the cones, if it differs from that of the packing",
+    )
+    group.add_argument(
+        "--angles", type=int, default=64, help="number of directions in the table (default 64)"
+    )
     add_known(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    add_out(group, "the largest stress by direction")
+    add_out(group, "write the largest stress for each direction")
     add_store(command)
 
 
@@ -365,17 +393,22 @@ def add_perturb(commands: Commands) -> None:
     command = subcommand(
         commands,
         "perturb",
-        "push the grains of single contacts apart until they set off: critical force and motion",
+        "push the grains of single contacts apart until the packing moves: critical force and "
+        "first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
     )
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")
     which = group.add_mutually_exclusive_group()
-    which.add_argument("--random", type=int, default=50, help="so many contacts (default 50)")
+    which.add_argument("--random", type=int, default=50, help="this many contacts (default 50)")
     which.add_argument("--contacts", type=str, help="these contacts, numbers separated by commas")
-    which.add_argument("--all", action="store_true", help="all contacts that carry")
+    which.add_argument("--all", action="store_true", help="all contacts that carry force")
     group.add_argument("--draw-seed", type=int, default=0, help="seed of --random (default 0)")
-    group.add_argument("--ensemble-mu", type=float, help="friction of the contacts, if not --mu")
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction of the contacts, if it differs from that of the packing",
+    )
     group.add_argument(
         "--precision", type=float, default=0.01, help="of F_crit, in ⟨f_n⟩ (default 0.01)"
     )
@@ -393,7 +426,7 @@ def add_app(commands: Commands) -> None:
     command = subcommand(
         commands,
         "app",
-        "open the page that shows packings and their force networks live, in a browser",
+        "open the app in a browser: packings and their force networks, live",
         "granforce app\n  granforce app --port 8080 --no-show",
         reports=False,
     )
@@ -410,17 +443,19 @@ def add_app(commands: Commands) -> None:
         metavar="HOST[:PORT]",
         action="append",
         default=[],
-        help="name under which other machines reach the page; may be given several times",
+        help="host name at which other machines open the app; may be given several times",
     )
     command.add_argument("--no-show", action="store_true", help="open no browser")
-    command.add_argument("--warm", action="store_true", help="be ready before the first visitor")
+    command.add_argument(
+        "--warm", action="store_true", help="load everything before the first visitor arrives"
+    )
 
 
 def add_docs(commands: Commands) -> None:
     command = subcommand(
         commands,
         "docs",
-        "build the documentation and serve it to a browser, until interrupted",
+        "build the documentation and open it in a browser, until interrupted",
         "granforce docs\n  granforce docs --out site",
         reports=False,
     )
@@ -446,7 +481,7 @@ def add_import(commands: Commands) -> None:
     command = subcommand(
         commands,
         "import",
-        "read a packing from elsewhere, check it and keep it",
+        "read a packing from another program, check it and save it",
         "granforce import lammps particles.dump contacts.dump --mu 0.3 --out packing.npz\n"
         "  granforce import lammps particles.dump contacts.dump --mu 0.3 --frames all "
         "--out series.zarr\n"
@@ -500,25 +535,26 @@ def add_import(commands: Commands) -> None:
         "--walls",
         type=walls,
         metavar="floor|box|X,Y,X,Y",
-        help="held walls around the disks: a floor, a box open at the top, or segments "
-        "X,Y,X,Y separated by blanks",
+        help="fixed walls around the disks: a floor, a box open at the top, or segments X,Y,X,Y "
+        "separated by blanks",
     )
     table.add_argument(
         "--gravity",
         type=float,
-        help="acceleration times mass density, downwards: a disk of radius r weighs π r² times it",
+        help="gravitational acceleration times mass density, downwards: a disk of radius r "
+        "weighs π r² times this",
     )
     table.add_argument(
         "--tolerance",
         type=float,
-        help="gap or overlap, in largest radii, of disks that touch (default 1e-6)",
+        help="largest gap of disks that count as touching, in largest radii (default 1e-6)",
     )
     table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"
     )
     pegs = import_format(
-        *(formats, "pegs", "read a photoelastic frame: what PeGS writes"),
+        *(formats, "pegs", "read a photoelastic frame of PeGS"),
         *("positions.txt adjacency.txt", "positions, or a *_solved.mat of PeGS 2", "adjacency"),
         contacts_needed=False,
     )

@@ -364,7 +364,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_command(command, monkeypa
     monkeypatch.setattr(commands, "pack", command)
     assert main(["pack"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == (
-        "granforce: interrupted; finished entries are kept"
+        "granforce: interrupted; finished entries are saved"
     )
     assert not interrupts.interrupted()  # the next command begins anew
 
@@ -398,4 +398,7 @@ def test_a_call_that_is_left_behind_does_not_abort_the_process():
     until_it_computes(running)  # within the solver
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
-    assert (running.returncode, err) == (130, "granforce: interrupted; finished entries are kept\n")
+    assert (running.returncode, err) == (
+        130,
+        "granforce: interrupted; finished entries are saved\n",
+    )

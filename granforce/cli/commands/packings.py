@@ -89,7 +89,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
         return frames.import_frames(arguments, opened)
     packing = READERS[arguments.format](arguments.grains, arguments.contacts, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
-        raise InputError("--pressure is of a table without forces or loads: leave it out")
+        raise InputError("--pressure applies only to a table without forces or loads: leave it out")
     for note in packing.info.get("notes", []):
         print(f"granforce: {note}", file=sys.stderr)
     named = ("timestep", "time", "contacts_skipped", "disks", "walls")

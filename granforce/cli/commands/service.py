@@ -58,7 +58,7 @@ def _page() -> Path:
     for folder in (package / "app", package.parent / "app"):
         if (folder / "main.py").is_file():
             return folder
-    raise InputError(f"the page is not installed: {package} has no folder app; install the wheel")
+    raise InputError(f"the app is not installed: {package} has no folder app; install the wheel")
 
 
 def _check_address(address: str, port: int) -> None:
