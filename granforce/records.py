@@ -18,7 +18,13 @@ import numpy.typing as npt
 
 from granforce import notebook
 from granforce.cell import Cell
-from granforce.tolerances import LARGEST_FRICTION, LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
+from granforce.tolerances import (
+    LARGEST_FRICTION,
+    LARGEST_TILT,
+    LARGEST_UNIT,
+    MU_DIGITS,
+    RIGID_OVERLAP,
+)
 from granforce.types import Floats, Integers, Mask
 
 # Whole numbers up to here are exact in kernels, in JSON and in floats alike.
@@ -243,7 +249,7 @@ def brief(value: Any) -> str:
 def friction(mu: Any) -> float:
     """μ as a float on the storage grid (15 digits).
 
-    Raises InputError unless it lies between 0 and LARGEST_FRICTION.
+    Raises InputError unless it is 0 or lies between 1/LARGEST_UNIT and LARGEST_FRICTION.
     """
     try:
         value = float(mu)
@@ -256,11 +262,17 @@ def friction(mu: Any) -> float:
             f"friction coefficient {value:g} is too large for the balance of forces in double "
             f"precision; take at most {LARGEST_FRICTION:g}"
         )
-    return float(f"{value:.{MU_DIGITS}g}")
+    if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would leave the doubles
+        raise InputError(
+            f"friction coefficient {value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
+        )
+    return float(f"{abs(value):.{MU_DIGITS}g}")  # of −0, too
 
 
-def positive(value: Any, name: str, *, or_zero: bool = False, least: float = 0.0) -> float:
-    """The value as a finite float > 0 (or_zero: ≥ 0) and ≥ least; InputError otherwise."""
+def positive(
+    value: Any, name: str, *, or_zero: bool = False, least: float = 0.0, most: float = np.inf
+) -> float:
+    """The value as a finite float > 0 (or_zero: ≥ 0) from least to most; InputError otherwise."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -269,6 +281,8 @@ def positive(value: Any, name: str, *, or_zero: bool = False, least: float = 0.0
         raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
     if number < least:
         raise InputError(f"{name} must be at least {least:g}, got {number:g}")
+    if number > most:
+        raise InputError(f"{name} must be at most {most:g}, got {number:g}")
     return number
 
 
@@ -421,6 +435,11 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
         raise InputError(
             f"a cell tilted by {tilt:g} must be periodic in both directions, got sides {box}; "
             "leave out the tilt, or give both sides"
+        )
+    if abs(tilt) > LARGEST_TILT * box[0]:
+        raise InputError(
+            f"the tilt {tilt:g} is more than {LARGEST_TILT:g} times the side {box[0]:g}; take away "
+            "whole sides"
         )
     return Cell(box, float(tilt - box[0] * np.round(tilt / box[0])) if tilt else 0.0)
 

@@ -58,6 +58,9 @@ PROGRAM = 1e-10
 # reaches BALANCED, and no network can be certified.
 LARGEST_FRICTION = 1e4
 
+# Largest tilt of a cell, in sides: whole sides are taken off, and beyond what is left is rounding.
+LARGEST_TILT = 1e6
+
 # Pressures and radii lie within this factor of 1: squares and products of forces stay finite.
 LARGEST_UNIT = 1e60
 

@@ -9,7 +9,7 @@ from packings import packed
 
 import granforce as gf
 from granforce.records import InputError, friction
-from granforce.tolerances import LARGEST_FRICTION
+from granforce.tolerances import LARGEST_FRICTION, LARGEST_UNIT
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,8 @@ def test_what_arrays_hide_is_no_packing(S):
 
 def test_one_rule_for_friction(S):
     assert friction(LARGEST_FRICTION) == LARGEST_FRICTION
-    for mu in (1.1 * LARGEST_FRICTION, 1e300, np.inf, np.nan, -1e-300, "much", None, 1j):
+    assert friction(1 / LARGEST_UNIT) > 0 and not np.signbit(friction(-0.0))
+    for mu in (1e-320, 1e-300, 1.1 * LARGEST_FRICTION, 1e300, np.inf, np.nan, -1e-300, "much", 1j):
         with pytest.raises(InputError, match="friction"):
             friction(mu)
     for call in (
@@ -139,6 +140,8 @@ def test_one_rule_for_friction(S):
     ):
         with pytest.raises(InputError, match="too large"):
             call()
+    with pytest.raises(InputError, match="too small"):
+        gf.ensemble(S.packing, 1e-320)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "a", np.nan, None])

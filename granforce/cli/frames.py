@@ -66,9 +66,9 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     states = whole(arguments.states, "--states", 0)
     worker_count(arguments.workers, "--workers")
     numbers = _chosen(snapshots.numbers, arguments.frames)
-    check_outputs(arguments.csv)
-    if arguments.out is not None:
-        series.check_folder(arguments.out)
+    if arguments.out is not None and not arguments.out.endswith(".zarr"):
+        raise InputError(f"--out {arguments.out}: with --frames the name must end with .zarr")
+    check_outputs(arguments.csv, arguments.out)
     store = open_store(arguments.cache)
     store.make()
     if snapshots.lost:

@@ -553,6 +553,11 @@ def add_import(commands: Commands) -> None:
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"
     )
+    table.leaves_out(
+        "with a table of contacts and no walls",
+        lambda asked: asked.contacts is not None and asked.walls is None,
+        {"tolerance"},
+    )
     pegs = import_format(
         *(formats, "pegs", "read a photoelastic frame of PeGS"),
         *("positions.txt adjacency.txt", "positions, or a *_solved.mat of PeGS 2", "adjacency"),

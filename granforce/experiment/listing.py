@@ -196,6 +196,8 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
             raise InputError(
                 f"no column is called {word[:40]!r} here: frame, id, x, y, r, flag, i, j, ft, fn"
             )
+        if name in given:
+            raise InputError(f"the column {name} is given twice; give each name once")
         given[name] = theirs
     return given
 
@@ -325,6 +327,10 @@ def _given(
             raise InputError(
                 f"{file}: no column {theirs[:40]!r} for {name} among {width} ({there}); give a "
                 "header, or a number from 1"
+            )
+        if named[column] in given:
+            raise InputError(
+                f"{file}: column {theirs[:40]!r} is given two names, {named[column]} and {name}"
             )
         named[column] = name
     missing = sorted(_needed(wanted) - set(named))

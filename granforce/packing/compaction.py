@@ -69,6 +69,8 @@ WORK = (
 # Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
 # balance.
 DISK_BYTES = 2000
+# Coarsest accuracy of a step: as fast as the fastest grain, nothing has been solved.
+COARSEST = 1.0
 # Steps between two looks of whoever watches.
 WATCH_EVERY = 5
 
@@ -136,7 +138,7 @@ def pack(
     n, seed = number_of_disks(n), random_seed(seed)
     dt, sweeps = default_steps(mu, dt, sweeps)
     dt, box_mass = moderate(dt, "dt"), moderate(box_mass, "box_mass")
-    accuracy = positive(accuracy, "accuracy")
+    accuracy = positive(accuracy, "accuracy", most=COARSEST)
     sweeps, max_steps = whole(sweeps, "sweeps", 1), whole(max_steps, "max_steps", 1)
     check_box(box)
     rng = np.random.default_rng(seed)

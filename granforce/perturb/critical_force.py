@@ -54,8 +54,9 @@ MOST_STEPS = 150
 # steps spent on that.
 STEADY, STEADY_STEPS = 1e-3, 500
 
-# Smallest precision of F_crit, ⟨f_n⟩: limit loads are certified to this.
-LEAST_PRECISION = INTERVAL_GAP
+# Finest precision of F_crit, ⟨f_n⟩: limit loads are certified to this; and the coarsest: beyond, a
+# bracket says nothing of a force.
+LEAST_PRECISION, MOST_PRECISION = INTERVAL_GAP, 1.0
 
 # How loads ended, implicit steps of the flow, and linear systems solved for them.
 COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
@@ -155,7 +156,9 @@ def critical_forces(
     Raises UndecidedError where a limit load cannot be certified, or is given as NaN.
     """
     S, protocol = ensemble, Protocol(**protocol)
-    precision = positive(protocol.precision, "precision", least=LEAST_PRECISION)
+    precision = positive(
+        protocol.precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION
+    )
     rise = positive(protocol.rise, "rise")
     if rise > 1:
         raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
@@ -295,7 +298,7 @@ def response(
     Raises InputError where the grains come to rest under this load.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
-    precision = positive(precision, "precision", least=LEAST_PRECISION)
+    precision = positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
     position, scale = S.position(contact), S.force_scale
     if critical is None:
         critical = critical_force(S, contact, precision=precision)

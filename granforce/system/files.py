@@ -81,6 +81,9 @@ def check_apart(
     replaced: files, or whole folders, that will be replaced; folders: those that get files of their
     own; stores: those that get entries; read: files and folders that are read.
     """
+    for said, path in (*replaced, *folders):
+        if not str(path):
+            raise InputError(f"{said}: the name is empty; give one")
     every = [(said, path, _places(path)) for said, path in (*replaced, *folders, *stores, *read)]
     first_store, first_read = len(replaced) + len(folders), len(every) - len(read)
     for k, (said, path, places) in enumerate(every[:first_store]):

@@ -274,6 +274,9 @@ def test_cache_commands(run):
     assert run("cache", "verify")[0] == 0
     assert json.loads(run("cache", "clear", "--kind", "walk", "--json")[1])["removed"] == 1
     assert len(json.loads(run("cache", "list", "--json")[1])) == 1
+    for kind in ("wlk", "", "*"):
+        code, out, err = run("cache", "verify", "--kind", kind)
+        assert (code, out, err.count("\n")) == (2, "", 1) and "there are packing, walk" in err
 
 
 @pytest.mark.parametrize("action", ["list", "size", "verify", "clear"])

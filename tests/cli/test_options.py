@@ -64,7 +64,7 @@ LINES = {
         "run.data run.fstat --mu 0.5 --frames 0",
         "run.data run.fstat --mu 0.5 --frames 0 --states 2",
     ],
-    "import table": ["grains.csv --mu 0.3"],
+    "import table": ["grains.csv --mu 0.3", "grains.csv contacts.csv --mu 0.3"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "export": ["p.npz g.vtp c.vtp"],
     "bench": ["--quick"],
@@ -317,6 +317,23 @@ def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkey
     words = "import table /dev/null --mu 0.3 --out /dev/null"
     assert parser.main(words.split()) == 2
     assert "overwrite" not in capsys.readouterr().err
+
+
+def test_outputs_have_a_name_and_series_that_of_a_folder(here, capsys):
+    """Else an empty name is the folder one is in, and a folder stands under a file's name."""
+    before = sorted(here.rglob("*"))
+    for words, said in (
+        (("pack", "-n", "8", "--mu", "0.3", "--out="), "--out: the name is empty"),
+        (("export", "p.npz", "", "c.vtp"), "grains: the name is empty"),
+        (
+            "import lammps g.dump c.dump --mu 0.3 --frames all --out s.npz".split(),
+            "--frames the name must end with .zarr",
+        ),
+    ):
+        assert parser.main(["export", "p.npz", "g.dump", "c.dump"]) == 0
+        assert parser.main(words) == 2
+        assert said in capsys.readouterr().err
+    assert {*here.rglob("*")} - {*before} == {here / "g.dump", here / "c.dump"}
 
 
 def test_frames_replace_no_store(here, capsys):

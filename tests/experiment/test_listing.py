@@ -214,6 +214,8 @@ def test_columns_are_named_by_header_or_number(made, taken):
         ({"q": "1"}, "no column is called 'q' here: frame, id, x"),
         ({"r": "radius", "x": "2", "y": "3"}, "no column 'radius' for radius among 5 .size"),
         ({"x": "2"}, "columns for radius, y are to be given"),
+        (names | {"flag": "size"}, "column 'size' is given two names, radius and flag"),
+        (names | {"radius": "edge"}, "the column radius is given twice"),
         (names | {"fn": "9"}, "no column '9' for normal among 5 .they have no names"),
         ({name: names[name] for name in ("r", "x", "y", "fn")}, "columns for id1, id2, tangential"),
     ):

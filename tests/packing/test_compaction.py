@@ -162,6 +162,7 @@ def test_radii_are_drawn_as_asked(rng):
         ({"mu": 1e6}, "take at most 10000"),
         ({"dt": -1}, "dt"),
         ({"sweeps": 0}, "sweeps"),
+        ({"accuracy": 1e300}, "accuracy"),
     ],
 )
 def test_bad_input_is_told_in_one_line(options, what):

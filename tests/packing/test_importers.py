@@ -18,6 +18,7 @@ from granforce.packing.compaction import pack
 from granforce.packing.importers import (
     lammps,
     load_packing,
+    read_known,
     read_lammps,
     read_table,
     report,
@@ -675,6 +676,15 @@ def test_networks_scale_with_the_loads():
     np.testing.assert_allclose(found[2], found[0], atol=1e-6)
 
 
+def test_known_bounds_have_the_names_of_earlier_versions_too():
+    now = io.StringIO("contact,f_n_low,f_n_high,f_t_high\n3,1,2,\n0,,5,0.5\n")
+    before = io.StringIO("contact,f_n_min,f_n_max [packing],f_t_max\n3,1,2,\n0,,5,0.5\n")
+    for one, other in zip(read_known(now), read_known(before), strict=True):
+        np.testing.assert_array_equal(one, other)
+    with pytest.raises(InputError, match="column f_n_low is there twice"):
+        read_known(io.StringIO("contact,f_n_min,f_n_low\n3,1,2\n"))
+
+
 GRAINS = "id,x,y,r\n7,0,0,1\n8,2,0,1\n9,4,0,1\n"
 LINKS = "i,j,fn,ft\n7,8,1,0\n8,9,1,0\n"
 
@@ -720,6 +730,10 @@ LINKS = "i,j,fn,ft\n7,8,1,0\n8,9,1,0\n"
         (GRAINS, "i,j,nx,ny,length\n7,8,1,0,2\n8,9,0,1,2\n", {}, "line 3: normal and length lead"),
         (GRAINS, "i,j,nx,ny,length\n7,8,2,0,2\n", {}, "line 2: the normal must have length 1"),
         (GRAINS, "i,j,nx\n7,8,1\n", {}, "no column ny"),
+        (GRAINS, LINKS, {"columns": {"x": "x", "y": "X"}}, "one column is given two names"),
+        (GRAINS, LINKS, {"box": (10, 10), "tilt": 1e300}, "tilt 1e.300 is more than"),
+        (GRAINS, None, {"gravity": 1e300, "walls": "floor"}, "gravity must be at most"),
+        (GRAINS, "i,j\n7,8\n", {"tolerance": 3, "walls": "floor"}, "tolerance is in largest"),
         (GRAINS, "i,j\n7,8\n8,9\n", {}, "open set needs loads .* or forces"),
         (GRAINS, "i,j\n7,8\n8,9\n", {"forces": True}, "no column fn"),
         (GRAINS, None, {"forces": True}, "forces need a table of contacts"),

@@ -1,6 +1,7 @@
 """The study, the page, the documentation, the benchmark and the store."""
 
 import argparse
+import glob
 import http.server
 import importlib.util
 import json
@@ -19,7 +20,8 @@ import platformdirs
 
 from granforce.cli.parsing import ROLES, Input, Output
 from granforce.records import InputError, whole
-from granforce.study.store import open_store
+from granforce.study import kinds
+from granforce.study.store import Store, open_store
 from granforce.system.files import make_folder
 from granforce.system.plain import json_text
 from granforce.system.terminal import print_list, print_report
@@ -146,6 +148,8 @@ def cache(arguments: argparse.Namespace) -> int:
         print(json_text({"path": path}) if arguments.json else path)
         return 0
     store = open_store(arguments.cache, readonly=True)  # which makes none where there is none
+    if arguments.kind is not None:
+        _check_kind(store, arguments.kind)
     if arguments.action == "clear":
         store = open_store(store.path)
         lines = {"removed": store.clear(arguments.kind), "temporaries": store.clean()}
@@ -160,7 +164,7 @@ def cache(arguments: argparse.Namespace) -> int:
         verdicts = [
             v._asdict()
             for v in store.verify()
-            if not arguments.kind or v.name.startswith(f"{arguments.kind}-")
+            if arguments.kind is None or v.name.startswith(f"{arguments.kind}-")
         ]
         print_list(verdicts, ("name", "ok", "reason"), arguments.json)
         return 0 if all(verdict["ok"] for verdict in verdicts) else 1
@@ -171,3 +175,11 @@ def cache(arguments: argparse.Namespace) -> int:
         ]
         print_list(entries, ("name", "bytes", "created", "params"), arguments.json)
     return 0
+
+
+def _check_kind(store: Store, kind: str) -> None:
+    """InputError for what is no kind of result, nor begins the name of an entry of others."""
+    if kind not in kinds.KINDS and not any(store.path.glob(f"{glob.escape(kind)}-*")):
+        raise InputError(
+            f"no kind of results is called {kind[:40]!r}; there are {', '.join(kinds.KINDS)}"
+        )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.geometry import check_disks, touching
+from granforce.packing.importers.geometry import check_disks, largest_gap, touching
 from granforce.packing.importers.network import find
 from granforce.packing.scenes import places_behind
 from granforce.records import (
@@ -19,7 +19,7 @@ from granforce.records import (
     make_packing,
     positive,
 )
-from granforce.tolerances import LISTED_TOUCHING
+from granforce.tolerances import LARGEST_UNIT, LISTED_TOUCHING
 from granforce.types import Floats
 
 WALLS = ("floor", "box")
@@ -79,7 +79,7 @@ def enclosed(
 
     Raises InputError in a periodic box, and where no disk touches a wall.
     """
-    gravity = positive(gravity, "gravity", or_zero=True)
+    gravity = positive(gravity, "gravity", or_zero=True, most=LARGEST_UNIT)
     if walls is None and not gravity:
         return packing
     if np.isfinite(packing.box).any():
@@ -89,7 +89,7 @@ def enclosed(
     if walls is None:
         return packing._replace(load=load)
     segments, count = _segments(packing, walls), len(packing.r)
-    behind = places_behind(packing.x, packing.r, segments, tolerance)
+    behind = places_behind(packing.x, packing.r, segments, largest_gap(tolerance))
     if not len(behind.disk):
         raise InputError("no disk touches a wall; correct the walls, or raise the tolerance")
     r = np.concatenate([packing.r, behind.r])

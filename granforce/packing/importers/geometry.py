@@ -33,12 +33,17 @@ OPEN = Cell(np.full(2, np.inf), 0.0)
 
 def touching(x: Floats, r: Floats, cell: Cell, tolerance: float) -> Contacts:
     """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
+    i, j, shift = find_pairs(x, r, cell, largest_gap(tolerance) * r.max())
+    normal, length, _ = separations(x, r, cell, i, j, shift)
+    return make_contacts(i, j, normal, length, r)
+
+
+def largest_gap(tolerance: float) -> float:
+    """The tolerance, in largest radii, as a float; InputError unless it is > 0 and at most 1."""
     tolerance = positive(tolerance, "tolerance")
     if tolerance > 1:
         raise InputError(f"tolerance is in largest radii and must not exceed 1, got {tolerance:g}")
-    i, j, shift = find_pairs(x, r, cell, tolerance * r.max())
-    normal, length, _ = separations(x, r, cell, i, j, shift)
-    return make_contacts(i, j, normal, length, r)
+    return tolerance
 
 
 def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, Floats]:

@@ -3,22 +3,24 @@
 import numpy as np
 
 from granforce.forces.knowledge import Known
-from granforce.packing.importers.text import Source, Table, read_csv
+from granforce.packing.importers.text import Source, Table, make_table, read_csv
 from granforce.records import InputError
 from granforce.types import Floats
 
 _COMPONENTS = "f_n", "f_t"
+_EARLIER = {"_min": "_low", "_max": "_high"}
 
 
 def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
     f_n, f_t: known exactly; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as `granforce intervals
-    --out` writes them. Forces are in the packing's unit, which names may end with: ``f_n
-    [packing]``. Empty fields and other columns are ignored. source: a path or an open file. Raises
-    InputError naming the line of what is wrong, and for a column in another unit.
+    --out` writes them (earlier versions: f_n_min, f_n_max, f_t_min, f_t_max). Forces are in the
+    packing's unit, which names may end with: ``f_n [packing]``. Empty fields and other columns are
+    ignored. source: a path or an open file. Raises InputError naming the line of what is wrong, and
+    for a column in another unit.
     """
-    table = read_csv(source).in_packing_unit()
+    table = _renamed(read_csv(source).in_packing_unit())
     contacts = table.whole("contact")
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
@@ -40,6 +42,17 @@ def read_known(source: Source) -> Known:
             "nothing would be known"
         )
     return Known(contacts, low, high)
+
+
+def _renamed(table: Table) -> Table:
+    """The table with earlier names of bounds replaced; InputError where both names are there."""
+    header = [
+        f"{name[:3]}{_EARLIER[name[3:]]}"
+        if name[:3] in _COMPONENTS and name[3:] in _EARLIER
+        else name
+        for name in table.header
+    ]
+    return make_table(table.name, header, table.rows, table.lines)
 
 
 def _numbers(table: Table, column: str) -> tuple[list[int], Floats]:

@@ -169,6 +169,8 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
     if not isinstance(columns, Mapping) or not all(isinstance(v, str) for v in columns.values()):
         raise InputError(f"columns must be {{name here: name in the files}}, got {columns!r:.60}")
     here = {theirs.lower(): name for name, theirs in columns.items()}
+    if len(here) < len(columns):
+        raise InputError("one column is given two names; give each its own")
     header = [one for table in tables for one in table.header]
     for name, theirs in columns.items():
         if name not in names:
@@ -194,7 +196,10 @@ def read_columns(text: str) -> dict[str, str]:
     pairs = [part.split("=", 1) for part in text.split(",")]
     if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
         raise InputError(f"--columns {text[:40]!r}: give them as x=…,y=…,r=…")
-    return {name.strip(): theirs.strip() for name, theirs in pairs}
+    names = [name.strip() for name, _ in pairs]
+    if len(set(names)) < len(names):
+        raise InputError(f"--columns {text[:40]!r}: give each name once")
+    return dict(zip(names, (theirs.strip() for _, theirs in pairs), strict=True))
 
 
 def check_grains(count: int, most: int | None, name: str) -> None:

@@ -10,6 +10,7 @@ import xarray as xr
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.packing.compaction import (
+    COARSEST,
     Glimpse,
     check_box,
     default_steps,
@@ -59,7 +60,7 @@ def _packing_parameters(
         "dt": moderate(dt, "dt"),
         "box_mass": moderate(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
-        "accuracy": positive(accuracy, "accuracy"),
+        "accuracy": positive(accuracy, "accuracy", most=COARSEST),
         "version": PACKING_VERSION,
         # Only where it is not square: keys of packings in square boxes stay what they were.
         **({} if check_box(box) == "square" else {"box": box}),

@@ -10,6 +10,7 @@ from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble
 from granforce.perturb.critical_force import (
     LEAST_PRECISION,
+    MOST_PRECISION,
     MOST_STEPS,
     RISE,
     CriticalForce,
@@ -65,7 +66,9 @@ def _perturbation_parameters(
 
 def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
     """What names how loads are raised; `rise` and `max_steps` only where they are not the usual."""
-    named = {"precision": positive(precision, "precision", least=LEAST_PRECISION)}
+    named = {
+        "precision": positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
+    }
     if rise != RISE:
         named["rise"] = positive(rise, "rise")
         if named["rise"] >= 1:
