@@ -71,7 +71,7 @@ export const CHAPTERS = [
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
     text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. Counted as before, ${free} numbers are free. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make its force while no disk moves?",
-    doing: "Drag the dot to the right, or the marked line upwards. Orange lines gain force, blue ones lose it.",
+    doing: "Drag the dot to the right, or the marked line upwards. The bluer a line, the more its force has changed.",
     see: ({ opened, sliding, changed }) => [
       `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the network can give no more.`,
       `To get here, ${changed} other forces changed by more than a tenth of the mean force, yet no disk moved. On a photograph of the packing you would see no difference.`,

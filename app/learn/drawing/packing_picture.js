@@ -1,10 +1,10 @@
-// A packing of 400 disks in a chapter: lines as thick as their forces, coloured by what changed, one of them marked.
+// A packing of 400 disks in a chapter: lines as thick as their forces, bluer the more these changed, one of them marked.
 
 import { Scene } from "../../packing/drawing/scene.js"
 import { arrow } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
-const FULL = 0.5 // change in mean forces at which the colour is full
+const FULL = 0.5 // change in mean forces at which the blue is full; orange is for contacts about to slip, as in the small scenes
 const REACH = 14 // px from the marked line within which the hand takes it
 
 export class PackingPicture {
@@ -35,13 +35,13 @@ export class PackingPicture {
     this.scene.changed()
   }
 
-  /** The network: normal forces, coloured by their change from `before`, or all alike without it. */
+  /** The network: normal forces, grey to blue by their change from `before`, or all grey without it. */
   draw(normal, before, palettes) {
     const { scene, style } = this, colours = palettes.change, middle = colours.length >> 1
     for (let c = 0; c < normal.length; c++) {
       style.width[c] = normal[c] > 1e-6 ? WIDTH * normal[c] : 0
-      const part = before ? Math.max(-1, Math.min(1, (normal[c] - before[c]) / FULL)) : 0
-      style.bin[c] = Math.round(middle * (1 + part))
+      const part = before ? Math.min(1, Math.abs(normal[c] - before[c]) / FULL) : 0
+      style.bin[c] = Math.round(middle * (1 - part))
     }
     style.colours = colours
     scene.palette = palettes.scene

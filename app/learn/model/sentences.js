@@ -81,7 +81,7 @@ function equationsOf({ grains, r, pressing, box, equations }) {
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
   const said = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
   if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations`, `three for each disk, less two that follow from the others, plus one for the pressure`]
-  const rank = whole === equations ? "" : `, of which ${equations} are independent`
+  const rank = (equations ?? whole) === whole ? "" : `, of which ${equations} are independent`
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations${rank}`, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
