@@ -225,7 +225,8 @@ def _step(motion, mu, pressure, pace, counters, stop):
     soften(free, problem)
     free = add_forces(problem, force, velocity, free)
     dilation = _swept(motion, problem, mu, pace, force, velocity, free, dt, counters, stop)
-    motion.force[:] = 0.0
+    for p in range(motion.force.shape[0]):
+        motion.force[p, 0] = motion.force[p, 1] = 0.0
     for c in range(count):
         motion.force[active[c], 0], motion.force[active[c], 1] = force[c, 0], force[c, 1]
     keep_rate(dilation, motion.dilation)
@@ -277,9 +278,19 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
             lasting = factor
     else:
         counters[UNFINISHED] += 1
-        force[:], velocity[:], dilation = best_force, best_velocity, best_dilation
+        dilation = best_dilation
+        _copy(force, best_force)
+        _copy(velocity, best_velocity)
     motion.pace[1] = min(COURAGE * lasting, MOST_RELAXATION)
     return dilation
+
+
+@within
+def _copy(values, given):
+    """values ← given, number by number: an array set as a whole takes seconds to compile."""
+    for k in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            values[k, a] = given[k, a]
 
 
 @within

@@ -28,6 +28,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from granforce.system.compiled import skip_unreadable_indices, tell_when_compiling
+from granforce.system.parts import PartCompiler
 from granforce.types import Floats
 
 skip_unreadable_indices()
@@ -48,7 +49,12 @@ compiled = (
     else njit(cache=True, nogil=True, error_model="numpy")
 )
 within = njit(
-    cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+    pipeline_class=PartCompiler,
 )
 # What must become part of those that call it: small ones, or their numbers pass through memory, and
 # whatever is called for each contact with a network, which is a hundred numbers to hand over (a
@@ -60,10 +66,12 @@ inline = njit(
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,
     forceinline=True,
+    pipeline_class=PartCompiler,
 )
 
 # What kernels take as their last argument: its length is known to the compiler.
-ONE, MANY = (0,), (0,) * LANES
+# Of numpy's numbers: kernels would be compiled once more for a constant that Python's numbers are.
+ONE, MANY = (np.int64(0),), (np.int64(0),) * LANES
 # So few problems are faster one after the other than beside idle lanes.
 _FEW = 2
 
