@@ -1,6 +1,7 @@
 """Results as xarray datasets and pandas tables, with labelled contacts and components."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -8,7 +9,7 @@ import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
 from granforce.records import InputError, Packing
-from granforce.types import Integers
+from granforce.types import Floats, Integers, Mask
 
 COMPONENTS = ["f_n", "f_t"]
 _SAMPLE = {
@@ -38,6 +39,21 @@ _DIMENSIONS = {
         "backbone": "contact",
     },
     "LimitLoads": {"load": "contact", "gap": "contact"},
+    "CriticalForce": {"forces": "contact component"},
+    "_CriticalForces": dict.fromkeys(
+        ("low", "high", "limit_load", "residual", "violation", "converged"), "contact"
+    ),
+    "Volume": {
+        "ladders": "ladder",
+        **dict.fromkeys(("log_volume", "error", "dimension", "per_grain", "reached"), ""),
+    },
+    "Body": {
+        "origin": "contact component",
+        "axes": "direction contact component",
+        "corners": "corner direction",
+        "rays": "ray direction",
+    },
+    "Outline": {"corners": "corner direction"},
     "Pull": {
         "states": "value contact component",
         **dict.fromkeys(("residual", "violation"), "value"),
@@ -64,30 +80,64 @@ _DIMENSIONS = {
 }
 _RENAMED = {"flat": "states", "x": "centre", "r": "radius"}
 # In the packing's unit of force; residuals, violations and duality gaps are in ⟨f_n⟩.
-_FORCES = ("states", "forces", "low", "high", "load", "least")
+_FORCES = ("states", "forces", "low", "high", "load", "limit_load", "least", "origin")
 _RELATIVE = ("residual", "violation", "gap")
+
+
+class _CriticalForces(NamedTuple):
+    """Several critical forces as one result; arrays (k,), forces in the packing's unit."""
+
+    contacts: Integers
+    low: Floats
+    high: Floats
+    limit_load: Floats
+    residual: Floats
+    violation: Floats
+    converged: Mask
+
+
+def _several(result: Any) -> Any:
+    """A list of critical forces as one result; others as they are."""
+    critical = isinstance(result, list) and result
+    if not critical or any(type(one).__name__ != "CriticalForce" for one in result):
+        return result
+    columns = {name: [getattr(one, name) for one in result] for name in _CriticalForces._fields[1:]}
+    contacts = np.array([one.contact for one in result])
+    return _CriticalForces(contacts, **{name: np.array(v) for name, v in columns.items()})
+
+
+def _arrays(result: Any, names: Sequence[str]) -> dict[str, Any]:
+    """The arrays of a result; those of an outline, inner and outer corners, as one."""
+    if type(result).__name__ == "Outline":
+        return {"corners": np.concatenate([result.inner, result.outer])}
+    return {name: getattr(result, name) for name in names}
 
 
 def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
 
-    result: a Packing, a record that `intervals`, `walk` and others return, or networks (N_c, 2) or
-    (S, N_c, 2). ensemble: of the result, not needed for a Packing. Coordinates: contact, its number
-    in the packing; i and j, its grains; x and y, the point of contact, length; component, "f_n" or
-    "f_t". Forces are in the packing's unit. Numbers and texts of the record become attributes.
+    result: a Packing, a record that `intervals`, `walk` and others return, the list of
+    `critical_forces`, networks (N_c, 2) or (S, N_c, 2), or a number per contact (N_c,), such as
+    limit loads of all of S. ensemble: of the result, not needed for a Packing, Volume or Outline.
+    Coordinates: contact, its number in the packing; i and j, its grains; x and y, the point of
+    contact, length; component, "f_n" or "f_t"; polygon, "inner" or "outer" of an outline's corners.
+    Forces are in the packing's unit. Numbers and texts of the record become attributes.
 
     Raises InputError for anything else, and where the ensemble is missing or another one's.
     """
-    if isinstance(result, np.ndarray) and result.ndim in (2, 3):
+    result = _several(result)
+    if isinstance(result, np.ndarray) and result.ndim == 1:
+        dimensions, arrays = {"value": "contact"}, {"value": result}
+    elif isinstance(result, np.ndarray) and result.ndim in (2, 3):
         words = ["state", "contact", "component"][-result.ndim :]
         dimensions, arrays = {"states": " ".join(words)}, {"states": result}
     else:
         dimensions = _DIMENSIONS.get(type(result).__name__, {})
-        arrays = {name: getattr(result, name) for name in dimensions}
+        arrays = _arrays(result, list(dimensions))
     if not dimensions:
-        known = ", ".join(_DIMENSIONS)
+        known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))
         raise InputError(f"a {type(result).__name__} has no labels; those have: {known}, networks")
-    packing, contacts = _contacts(result, ensemble)
+    used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
         variable = _RENAMED.get(name, name)
@@ -95,8 +145,9 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         attrs = {"units": unit} if variable in (*_FORCES, *_RELATIVE) else {}
         variables[variable] = (words.split(), arrays[name], attrs)
     try:
-        labels = _labels(result, packing, contacts)
-        used = {word for words in dimensions.values() for word in words.split()}
+        labels = _labels(result)
+        if used & {"contact", "grain"}:
+            labels |= _contact_labels(*_contacts(result, ensemble))
         labels = {name: label for name, label in labels.items() if _dimension(label, name) in used}
         return xr.Dataset(variables, labels, _attributes(result))
     except ValueError as error:
@@ -107,9 +158,13 @@ def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
     """The same as a pandas table: a row for each contact, or for each contact in each state.
 
     Columns: contact, i, j, x, y, then f_n and f_t of networks, and of others with their name:
-    low_f_n, high_f_t; forces in the packing's unit. Arguments and errors as for `to_dataset`.
+    low_f_n, high_f_t; forces in the packing's unit. Of a Volume there is a row for each ladder, of
+    an Outline for each corner, of a Body for each contact along each direction. Arguments and
+    errors as for `to_dataset`.
     """
     dataset = to_dataset(result, ensemble)
+    if "contact" not in dataset.sizes:
+        return _corners(dataset) if "corner" in dataset.sizes else dataset.to_dataframe()
     columns = {}
     for name, values in dataset.data_vars.items():
         if "contact" not in values.dims or "side" in values.dims[1:]:
@@ -120,7 +175,9 @@ def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
         for part in COMPONENTS:
             label = part if name in ("states", "forces") else f"{name}_{part}"
             columns[label] = values.sel(component=part, drop=True)
-    order = [name for name in ("state", "value", "load", "side") if name in dataset.sizes]
+    order = [
+        name for name in ("state", "value", "load", "side", "direction") if name in dataset.sizes
+    ]
     order = [name for name in order if any(name in values.dims for values in columns.values())]
     table = xr.Dataset(columns).to_dataframe([*order, "contact"]).reset_index()
     first = [*order, "contact", "i", "j", "x", "y"]
@@ -136,19 +193,35 @@ def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers
     return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
 
 
-def _labels(result: Any, packing: Packing, contacts: Integers) -> dict[str, Any]:
+def _corners(dataset: xr.Dataset) -> pd.DataFrame:
+    """A row for each corner of an outline: polygon, and its coordinates u1, u2."""
+    u = dataset["corners"].values
+    return pd.DataFrame({"polygon": dataset["polygon"].values, "u1": u[:, 0], "u2": u[:, 1]})
+
+
+def _contact_labels(packing: Packing, contacts: Integers) -> dict[str, Any]:
     every, at = packing.contacts, packing.contact_points[contacts]
-    labels: dict[str, Any] = {
+    return {
         "contact": contacts,
         "i": ("contact", every.i[contacts]),
         "j": ("contact", every.j[contacts]),
         "x": ("contact", at[:, 0], {"units": "length"}),
         "y": ("contact", at[:, 1], {"units": "length"}),
+    }
+
+
+def _labels(result: Any) -> dict[str, Any]:
+    """Labels of all dimensions but contacts."""
+    labels: dict[str, Any] = {
         "component": COMPONENTS,
         "side": ["low", "high"],
         "axis": ["x", "y"],
         "load_component": ["x", "y", "torque"],
+        "ladder": ["down", "up"],
     }
+    if type(result).__name__ == "Outline":
+        polygons = ["inner"] * len(result.inner) + ["outer"] * len(result.outer)
+        labels["polygon"] = ("corner", polygons)
     for dimension, name in (("value", "values"), ("load", "loads")):
         if isinstance(values := getattr(result, name, None), np.ndarray):
             labels[dimension] = values

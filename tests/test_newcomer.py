@@ -16,6 +16,7 @@ from packings import packed
 
 import granforce as gf
 from granforce.cli.parser import main
+from granforce.study.cells import scan_rows
 
 
 def test_tab_and_help_list_the_public_names_and_nothing_else():
@@ -203,6 +204,34 @@ def test_results_are_labelled_in_xarray_and_pandas():
         gf.to_dataset(walk, gf.ensemble(gf.scene("groove", 0.5)))
 
 
+def test_loads_volumes_and_shapes_are_labelled():
+    S = gf.ensemble(packed(30, 0.3))
+    first, second = (int(contact) for contact in S.index[[1, 4]])
+    critical = gf.critical_forces(S, [first, second])
+    table = gf.to_dataframe(critical, S).set_index("contact")
+    assert table.index.tolist() == [first, second]
+    assert table["low"].tolist() == [one.low for one in critical]
+    assert gf.to_dataset(critical[1], S).attrs["limit_load"] == critical[1].limit_load
+    loads = gf.limit_loads(S)
+    assert gf.to_dataframe(loads, S)["value"].tolist() == loads.tolist()
+    assert gf.to_dataframe(gf.limit_load_bounds(S, [first]), S)["contact"].tolist() == [first]
+    volume = gf.volume(S, accuracy=0.5)
+    assert gf.to_dataset(volume)["ladders"].sel(ladder="up") == volume.ladders[1]
+    assert gf.to_dataframe(volume)["log_volume"].tolist() == [volume.log_volume] * 2
+    small = gf.ensemble(gf.scene("groove", 0.5))
+    body = gf.body(small)
+    labelled = gf.to_dataset(body, small)
+    assert labelled["axes"].dims == ("direction", "contact", "component")
+    assert len(gf.to_dataframe(body, small)) == len(body.axes) * len(small.index)
+    axes = np.zeros((2, len(S.index), 2))
+    axes[0, 0, 0] = axes[1, 4, 0] = 1.0
+    outline = gf.outline(S, axes, tolerance=0.1)
+    corners = gf.to_dataframe(outline)
+    assert (corners["polygon"] == "inner").sum() == len(outline.inner)
+    for result in (*critical, volume, body, outline, gf.limit_load_bounds(S, [first])):
+        assert len(repr(result)) < 400 and "array(" not in repr(result)
+
+
 def test_a_result_is_printed_in_few_lines():
     S = gf.ensemble(packed(30, 0.3))
     sample = gf.sample_uniform(S, 8)
@@ -321,3 +350,18 @@ def test_the_library_logs_that_it_compiles_and_is_silent_by_default(asked):
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     said = "INFO:granforce:compiling kernels, once per machine\n"
     assert run.stderr == (said if asked else "")
+
+
+def test_figure_1_is_drawn_from_the_store_of_a_scan(tmp_path, capsys):
+    store, out = str(tmp_path / "scan.zarr"), str(tmp_path / "figure1")
+    scan = ["scan", "-n", "12", "--states", "3", "--workers", "1", "--out", store]
+    assert main([*scan, "--mu", "0.3,1"]) == 0
+    assert main(["figures", store, "--out", f"{out}.svg"]) in (0, None)
+    assert "</svg>" in Path(f"{out}.svg").read_text()
+    drawn = gf.figures.indeterminacy(gf.open_store(store), backend="matplotlib")
+    rows = scan_rows(gf.open_store(store))
+    assert [row["mu"] for row in rows] == [0.3, 1] and len(drawn) == 3
+    assert main(["scan", "-n", "14", *scan[3:], "--mu", "0.3"]) == 0
+    capsys.readouterr()
+    assert main(["figures", store, "--out", f"{out}.png"]) == 2
+    assert "differ in n;" in capsys.readouterr().err and not Path(f"{out}.png").exists()
