@@ -265,6 +265,20 @@ def add_scan(commands: Commands) -> None:
     command.leaves_out("with --out", lambda asked: asked.out is not None, {"cache"})
 
 
+def add_figures(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "figures",
+        "draw Figure 1 of the paper from the store of a scan",
+        "granforce figures scan.zarr --out figure1.pdf",
+        reports=False,
+    )
+    command.add_argument("scan", type=Input, metavar="STORE", help="as granforce scan makes it")
+    command.add_argument(
+        "--out", type=Output, required=True, metavar="FILE", help="FILE.png, .svg, .pdf or .html"
+    )
+
+
 def add_study(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -624,6 +638,7 @@ COMMANDS = (
     add_informative,
     add_measure,
     add_scan,
+    add_figures,
     add_intervals,
     add_limit_loads,
     add_stress,

@@ -8,6 +8,8 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.measures import statistics
+from granforce.study.cells import scan_rows
+from granforce.study.store import Store
 from granforce.types import Floats, Rows
 
 _MEASURES = (
@@ -17,7 +19,7 @@ _MEASURES = (
 
 
 def indeterminacy(
-    rows: Rows,
+    rows: Rows | Store,
     *,
     beside: Mapping[str, Rows] | None = None,
     outside: Rows = (),
@@ -26,11 +28,12 @@ def indeterminacy(
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
     rows: dicts with mu, eta1, eta2, eta3, extent (the width of S per free dimension, in ⟨f_n⟩), of
-    which what is there is drawn, and coordination (z). beside: {name: rows} of other
-    sources of the same measures, such as exact η3; what a row lacks is not drawn. outside: rows
-    whose states lie outside of S, so that what they span is no value of η: grey crosses.
+    which what is there is drawn, and coordination (z); or the store of a scan. beside: {name: rows}
+    of other sources of the same measures, such as exact η3; what a row lacks is not drawn. outside:
+    rows whose states lie outside of S, so that what they span is no value of η: grey crosses.
     """
     style.ready(backend)
+    rows = scan_rows(rows) if isinstance(rows, Store) else rows
     curves = []
     for k, (name, label, factor) in enumerate(_MEASURES):
         points = statistics.means(rows, name, factor=factor)

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from granforce.study.keys import Parameters
+from granforce.records import InputError
+from granforce.study.keys import Parameters, canonical
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 from granforce.types import Cancel, Progress
@@ -127,3 +128,37 @@ def row(parameters: Parameters, dataset: xr.Dataset, cached: bool) -> dict[str, 
         "residual": float(dataset["residual"].max()),
         "cached": cached,
     }
+
+
+def scan_rows(store: Store) -> list[dict[str, Any]]:
+    """The rows of a scan, by μ and seed: of every walk in a store.
+
+    Raises InputError for a store without walks, and for one whose walks differ in more than μ and
+    seed, as means over them would mean nothing.
+    """
+    entries = store.find("walk")
+    if not entries:
+        raise InputError(f"no walks in {store.path}; granforce scan --out STORE makes some")
+    settings = [_settings(entry.params) for entry in entries]
+    differing = sorted(
+        name
+        for name in set().union(*settings)
+        if len({canonical(each.get(name)) for each in settings}) > 1
+    )
+    if differing:
+        raise InputError(
+            f"the walks in {store.path} differ in {', '.join(differing)}; give a store that holds "
+            "one scan (granforce scan --out STORE)"
+        )
+    rows = [row(entry.params, store[entry.name], True) for entry in entries]
+    return sorted(rows, key=lambda line: (line["mu"], line["seed"] or 0))
+
+
+# What may differ among the walks of a scan: Δt and sweeps of a compaction follow μ.
+_SCANNED = ("mu", "seed", "dt", "sweeps")
+
+
+def _settings(parameters: Parameters) -> dict[str, Any]:
+    """Parameters of a walk and of its packing, but those that a scan varies."""
+    packing = {k: v for k, v in parameters["packing"].items() if k not in _SCANNED}
+    return packing | {k: v for k, v in parameters.items() if k not in ("packing", "mu")}

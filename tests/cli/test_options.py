@@ -44,6 +44,7 @@ LINES = {
         f"{MU} --all",
         f"{MU} --contacts 1",
     ],
+    "figures": ["done/cells.zarr --out figure1.pdf"],
     "study": [
         "--quick",
         "--quick --status --out done",
@@ -121,6 +122,8 @@ def here(place, monkeypatch):
     monkeypatch.setattr(commands.service.runpy, "run_module", lambda *args, **kwargs: None)
     monkeypatch.setattr("granforce.bench.main", lambda *args: None)
     monkeypatch.setattr(commands.states.scans, "scan", lambda *args, **kwargs: ([], []))
+    monkeypatch.setattr("granforce.figures.indeterminacy", lambda *args, **kwargs: None)
+    monkeypatch.setattr("granforce.figures.save", lambda *args: None)
     reduced = SimpleNamespace(skipped={"missing_cells": 0})
     for name, value in {
         "plans.compute": [],

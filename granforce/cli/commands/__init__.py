@@ -4,7 +4,7 @@ from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
 from granforce.cli.commands.inference import infer, informative
 from granforce.cli.commands.packings import export, import_, pack
 from granforce.cli.commands.service import app, bench, cache, completion, docs, study_
-from granforce.cli.commands.states import measure, scan, uniform, volume, walk
+from granforce.cli.commands.states import figures, measure, scan, uniform, volume, walk
 
 __all__ = [
     "app",
@@ -13,6 +13,7 @@ __all__ = [
     "completion",
     "docs",
     "export",
+    "figures",
     "import_",
     "infer",
     "informative",

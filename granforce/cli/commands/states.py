@@ -164,6 +164,15 @@ def scan(arguments: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def figures(arguments: argparse.Namespace) -> None:
+    """Figure 1 from the store of a scan."""
+    from granforce.figures import indeterminacy, save
+
+    backend = "bokeh" if arguments.out.endswith(".html") else "matplotlib"
+    store = open_store(arguments.scan, readonly=True)
+    save(indeterminacy(store, backend=backend), arguments.out)
+
+
 def _report_scan(rows: Rows, failed: Sequence[tuple[Parameters, str]], as_json: bool) -> None:
     found = sum(line["cached"] for line in rows)
     summary = {"cells": len(rows) + len(failed), "found": found, "failed": len(failed)}
