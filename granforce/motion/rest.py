@@ -20,6 +20,7 @@ from granforce.motion import flow
 from granforce.motion.flow import Outcome, Push
 from granforce.motion.inertia import make_step
 from granforce.motion.works import follow, relax
+from granforce.numerics.lanes import ONE
 from granforce.records import InputError, Packing, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask
@@ -77,7 +78,8 @@ def rest(
         for _ in range(draws)
     ]
     ends: dict[int, Outcome] = {}
-    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__)
+    # Side by side these few flows take as long, and a first packing another 15 s to compile.
+    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__, lanes=ONE)
     outcomes = [ends[k] for k in range(len(starts))]
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)

@@ -48,13 +48,18 @@ def relax(step: Step, asked: Push) -> Outcome:
 
 
 def follow(
-    step: Step, works: Sequence[Work], finished: Callable[[int, Any], object], workers: int = 1
+    step: Step,
+    works: Sequence[Work],
+    finished: Callable[[int, Any], object],
+    workers: int = 1,
+    lanes: Any = None,
 ) -> None:
     """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
     finished(number, value) is called, by one thread at a time, as a work returns its value; if it
-    raises, it is still called for what other threads have ended by then. No outcome depends on the
+    raises, it is still called for what other threads have ended by then. lanes: ONE or MANY, by
+    default as suits the number of works. No outcome depends on the
     number of threads, nor on what it is carried beside, bit for bit.
     """
     waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
@@ -65,7 +70,7 @@ def follow(
 
     def carry() -> None:
         try:
-            _carry(step, waiting, finish, failed)
+            _carry(step, waiting, finish, failed, lanes)
         except BaseException:
             failed.set()  # the other threads end as well
             raise
@@ -83,11 +88,12 @@ def _carry(
     waiting: deque[tuple[int, Work]],
     finished: Callable[[int, Any], object],
     failed: threading.Event,
+    lanes: Any,
 ) -> None:
     """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
     if not waiting:
         return
-    lanes = lanes_for(len(waiting))
+    lanes = lanes_for(len(waiting)) if lanes is None else lanes
     flows, stop = make_flows(step, len(lanes)), cancelling.flag()
     seconds = np.zeros(len(lanes))
     carried: list[tuple[int, Work] | None] = [None] * len(lanes)
