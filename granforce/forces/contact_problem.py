@@ -213,16 +213,19 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
         A, b, _ = knowledge.extended(A, b + _instead(ensemble, known), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
-    if ensemble.reference is not None:
-        # Multipliers of redundant rows may be large: a network's residual, up to BALANCED, would
-        # give a false bound there.
-        given = A @ _coordinates(ensemble, ensemble.reference)
-        off = np.abs(given - b)
-        off[sides] = 0.0
-        if off.max(initial=0.0) <= 2 * BALANCED:
-            b = np.where(off > 10 * ROUNDING, given, b)
     problem = independent_problem_of(ensemble)
     middle = centre_of(ensemble)
+    states = [middle.y] if middle.reached else []
+    if ensemble.reference is not None:
+        states.append(_coordinates(ensemble, ensemble.reference))
+    if states:
+        # Multipliers of rows that follow from others may be large: what a state's unbalance, up to
+        # BALANCED, contradicts there would pass for a bound. The best balanced state decides.
+        offs = np.abs(np.stack([A @ y for y in states]) - b)
+        offs[:, sides] = 0.0
+        least = int(np.argmin(offs.max(axis=1, initial=0.0)))
+        if offs[least].max(initial=0.0) <= 2 * BALANCED:
+            b = np.where(offs[least] > 10 * ROUNDING, A @ states[least], b)
     return certified_values.make_system(problem, middle, A.tocsr(), b, loads.tocsc(), bounding)
 
 
