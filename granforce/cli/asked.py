@@ -19,7 +19,7 @@ from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 from granforce.study.series import check_folder, save_series
 from granforce.study.store import Store, open_store
-from granforce.system.files import check_file, written
+from granforce.system.files import check_file, content_of, written
 from granforce.system.terminal import Bar
 
 
@@ -27,9 +27,7 @@ def radii(text: str, n: int) -> str | list[float]:
     if ":" in text:
         return text
     try:
-        radii = [float(line) for line in Path(text).read_text().split()]
-    except OSError as error:
-        raise InputError(f"radii file {text} cannot be read: {error.strerror or error}") from None
+        radii = [float(line) for line in content_of(text).decode().split()]
     except ValueError as error:
         raise InputError(f"radii file {text}: {error}") from None
     if len(radii) != n:

@@ -26,6 +26,7 @@ from granforce.experiment.listing import Listing
 from granforce.experiment.matfile import read_struct
 from granforce.packing.importers.text import LARGEST, Source
 from granforce.records import InputError
+from granforce.system.files import content_of
 from granforce.types import Floats
 
 _NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
@@ -88,14 +89,7 @@ def _content(source: Source) -> tuple[str, bytes]:
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
         name = os.fspath(source)
-        try:
-            if os.path.getsize(name) > _LARGEST_FILE:
-                raise InputError(f"{name}: more than {_LARGEST_FILE / 1e6:g} MB")
-            with open(name, "rb") as file:
-                content = file.read()
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"{name}: cannot be read ({reason}); check the path") from None
+        content = content_of(name, _LARGEST_FILE)
     name = os.path.basename(name) or name
     if isinstance(content, str) or not content:
         raise InputError(f"{name}: not a MATLAB file")

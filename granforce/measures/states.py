@@ -59,11 +59,21 @@ def eta2(states: Floats) -> float:
     return float(np.sqrt(2 * count / (count - 1) * variance / (mean**2).sum()))
 
 
+def _alike(one: Floats, other: Floats) -> None:
+    """InputError unless both arrays have one shape, as those of one packing have."""
+    if np.shape(one) != np.shape(other):
+        raise InputError(
+            f"shapes {np.shape(one)} and {np.shape(other)} differ; take both from one packing"
+        )
+
+
 def eta3(low: Floats, high: Floats) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
 
-    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact.
+    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact. Raises InputError where
+    they are not of as many contacts.
     """
+    _alike(low, high)
     return float((high - low).mean() / ((high + low) / 2).mean())
 
 
@@ -80,8 +90,10 @@ def normal_extent(low: Floats, high: Floats) -> Floats:
 def correlation(normal_forces: Floats, extent: Floats) -> float:
     """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary.
 
-    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n.
+    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n. Raises InputError where they are not of as many
+    contacts.
     """
+    _alike(normal_forces, extent)
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
         return float("nan")
     return float(stats.pearsonr(normal_forces, extent).statistic)

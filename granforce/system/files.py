@@ -16,6 +16,8 @@ from granforce.records import InputError
 _OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
 
 
+MOST_STREAMED = 2**30  # bytes taken from a device or a pipe, which may never end
+
 ASIDE = ".granforce-{}.part"  # what is still being written
 
 
@@ -51,6 +53,25 @@ def written(path: str | Path) -> Iterator[IO[bytes]]:
             with suppress(OSError):
                 os.unlink(aside)
             raise
+
+
+def content_of(path: str | os.PathLike[str], most: int | None = None) -> bytes:
+    """The bytes of a file, a device or a pipe.
+
+    most: how many there may be; by default any number in a file, else MOST_STREAMED. Raises
+    InputError where there are more, or it cannot be read.
+    """
+    try:
+        with open(path, "rb") as file:
+            if most is None and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                most = MOST_STREAMED
+            content = file.read(-1 if most is None else most + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
+    if most is not None and len(content) > most:
+        raise InputError(f"{path}: more than {most / 1e6:g} MB; give a smaller file")
+    return content
 
 
 def check_file(path: str | Path) -> None:

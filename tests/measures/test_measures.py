@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from granforce import measures
+from granforce.records import InputError
 
 
 @pytest.fixture
@@ -32,6 +33,12 @@ def test_eta3_of_intervals():
     high = np.array([[3.0, 1.0], [2.0, 0.0]])
     # lengths 2, 2, 2, 0; middles 2, 0, 1, 0
     assert measures.eta3(low, high) == pytest.approx(6 / 3)
+    for call in (
+        lambda: measures.eta3(low, high[:1]),
+        lambda: measures.correlation(low[:1, 0], high[:, 0] - low[:, 0]),
+    ):
+        with pytest.raises(InputError, match="take both from one packing"):
+            call()
 
 
 def test_one_state_is_fully_determined(states):

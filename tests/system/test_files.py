@@ -12,14 +12,18 @@ import subprocess
 import sys
 import tempfile
 import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from granforce.cli.asked import radii
 from granforce.cli.parser import main
+from granforce.experiment.pegs import read_pegs
 from granforce.packing.importers import load_packing
+from granforce.packing.importers.text import read_text
 from granforce.records import InputError
-from granforce.system.files import check_file, make_folder, written
+from granforce.system.files import MOST_STREAMED, check_file, content_of, make_folder, written
 
 PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"
 
@@ -31,6 +35,16 @@ def write(path, content=b"new"):
 
 def mode(path):
     return stat.S_IMODE(os.stat(path).st_mode)
+
+
+def test_devices_without_end_are_not_read_for_ever(tmp_path, monkeypatch):
+    (tmp_path / "file").write_bytes(b"whole" * 100)
+    monkeypatch.setattr("granforce.system.files.MOST_STREAMED", 64)
+    assert MOST_STREAMED > 64 and content_of(tmp_path / "file") == b"whole" * 100
+    assert content_of("/dev/null") == b""
+    for call in (read_text, partial(read_pegs, mu=0.3), partial(radii, n=8)):
+        with pytest.raises(InputError, match="/dev/zero: more than"):
+            call("/dev/zero")
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from granforce.records import InputError, are_whole
+from granforce.system.files import content_of
 from granforce.types import Floats, Integers, Mask
 
 # Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
@@ -216,7 +217,7 @@ def read_text(source: Source) -> tuple[str, str]:
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
-        name, content = os.fspath(source), _bytes(source)
+        name, content = os.fspath(source), content_of(source)
     name = os.path.basename(name) or name
     try:
         if not isinstance(content, str):
@@ -251,15 +252,6 @@ def read_csv(source: Source) -> Table:
     if len(rows) < 2:
         raise InputError(f"{name}: a header line and at least one row are needed")
     return make_table(name, [column.lower() for column in rows[0]], rows[1:], numbers[1:])
-
-
-def _bytes(path: str | os.PathLike[str]) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            return file.read()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
 
 
 def _unpacked(name: str, content: bytes) -> bytes:
