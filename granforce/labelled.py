@@ -117,19 +117,20 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
 
     result: a Packing, a record that `intervals`, `walk` and others return, the list of
-    `critical_forces`, networks (N_c, 2) or (S, N_c, 2), or a number per contact (N_c,), such as
-    limit loads of all of S. ensemble: of the result, not needed for a Packing, Volume or Outline.
-    Coordinates: contact, its number in the packing; i and j, its grains; x and y, the point of
-    contact, length; component, "f_n" or "f_t"; polygon, "inner" or "outer" of an outline's corners.
-    Forces are in the packing's unit. Numbers and texts of the record become attributes.
+    `critical_forces`, networks (N_c, 2), (S, N_c, 2) or (chains, S, N_c, 2), or a number per
+    contact (N_c,), such as limit loads of all of S. ensemble: of the result, not needed for a
+    Packing, Volume or Outline. Coordinates: contact, its number in the packing; i and j, its
+    grains; x and y, the point of contact, length; component, "f_n" or "f_t"; polygon, "inner" or
+    "outer" of an outline's corners. Forces are in the packing's unit. Numbers and texts of the
+    record become attributes.
 
     Raises InputError for anything else, and where the ensemble is missing or another one's.
     """
     result = _several(result)
     if isinstance(result, np.ndarray) and result.ndim == 1:
         dimensions, arrays = {"value": "contact"}, {"value": result}
-    elif isinstance(result, np.ndarray) and result.ndim in (2, 3):
-        words = ["state", "contact", "component"][-result.ndim :]
+    elif isinstance(result, np.ndarray) and result.ndim in (2, 3, 4):
+        words = ["chain", "state", "contact", "component"][-result.ndim :]
         dimensions, arrays = {"states": " ".join(words)}, {"states": result}
     else:
         dimensions = _DIMENSIONS.get(type(result).__name__, {})
@@ -176,7 +177,9 @@ def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
             label = part if name in ("states", "forces") else f"{name}_{part}"
             columns[label] = values.sel(component=part, drop=True)
     order = [
-        name for name in ("state", "value", "load", "side", "direction") if name in dataset.sizes
+        name
+        for name in ("chain", "state", "value", "load", "side", "direction")
+        if name in dataset.sizes
     ]
     order = [name for name in order if any(name in values.dims for values in columns.values())]
     table = xr.Dataset(columns).to_dataframe([*order, "contact"]).reset_index()

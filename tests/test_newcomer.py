@@ -204,6 +204,17 @@ def test_results_are_labelled_in_xarray_and_pandas():
         gf.to_dataset(walk, gf.ensemble(gf.scene("groove", 0.5)))
 
 
+def test_states_of_several_chains_are_drawn_and_labelled_as_they_come():
+    S = gf.ensemble(packed(30, 0.3))
+    sample = gf.sample_uniform(S, 8)
+    assert sample.states.ndim == 4
+    assert gf.plot(S.packing, sample.states, "spread", contacts=S.index, backend="matplotlib")
+    table = gf.to_dataframe(sample.states, S)
+    assert len(table) == 8 * len(S.index) and table["f_n"].iloc[-1] == sample.flat[-1, -1, 0]
+    with pytest.raises(gf.InputError, match=r"contacts=S\.index"):
+        gf.plot(S.packing, sample.states[..., 1:, :], contacts=S.index)
+
+
 def test_loads_volumes_and_shapes_are_labelled():
     S = gf.ensemble(packed(30, 0.3))
     first, second = (int(contact) for contact in S.index[[1, 4]])

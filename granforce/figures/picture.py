@@ -34,12 +34,12 @@ def plot(
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines: width f_n, and a colour with its scale.
 
-    states: a network (k, 2) or networks (S, k, 2) of which the mean is drawn, force; by default the
-    packing's own. contacts (k,): their numbers in the packing, needed where they are fewer than its
-    own (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard
-    deviation of f_n over states), or numbers (k,). Walls are drawn at the places that they touch.
-    backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the one, and .pdf, .png, .svg
-    with the other.
+    states: a network (k, 2) or networks (…, k, 2), also of several chains, of which the mean is
+    drawn, force; by default the packing's own. contacts (k,): their numbers in the packing, needed
+    where they are fewer than its own (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
+    "force", "spread" (standard deviation of f_n over states), or numbers (k,). Walls are drawn at
+    the places that they touch. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with
+    the one, and .pdf, .png, .svg with the other.
 
     Raises InputError for states that are not of these contacts, and for an unknown colour.
     """
@@ -47,12 +47,12 @@ def plot(
     count = len(packing.contacts.i)
     numbers = np.arange(count) if contacts is None else np.asarray(contacts)
     drawn = packing.forces[numbers] if states is None else np.asarray(states, dtype=float)
-    several = drawn if drawn.ndim == 3 else drawn[None]
-    if several.shape[1:] != (len(numbers), 2):
+    if drawn.shape[-2:] != (len(numbers), 2):
         raise InputError(
             f"states have shape {drawn.shape}, for {len(numbers)} contacts of the packing; give "
             "contacts=S.index with the networks of an ensemble S"
         )
+    several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
     unit = mean[:, 0].mean() or 1.0
     values, label, look = _coloured(packing, several, mean, colour, unit)
