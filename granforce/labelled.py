@@ -192,7 +192,7 @@ def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers
     if isinstance(result, Packing):
         return result, np.arange(len(result.contacts.i))
     if not isinstance(ensemble, Ensemble):
-        raise InputError("labels need the ensemble of the result: gf.to_dataset(result, S)")
+        raise InputError("labels require the ensemble of the result: gf.to_dataset(result, S)")
     return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
 
 

@@ -260,7 +260,7 @@ def friction(mu: Any) -> float:
     if value > LARGEST_FRICTION:
         raise InputError(
             f"friction coefficient {value:g} is too large for the balance of forces in double "
-            f"precision; take at most {LARGEST_FRICTION:g}"
+            f"precision; use at most {LARGEST_FRICTION:g}"
         )
     if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would leave the doubles
         raise InputError(

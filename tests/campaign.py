@@ -190,7 +190,7 @@ def next_measurements(S, rng):
     try:
         gf.informative(S, 2, states=40, check=1)
     except gf.InputError as error:
-        if "nothing is left to measure" not in str(error):
+        if "nothing to measure" not in str(error):
             raise
 
 

@@ -41,7 +41,7 @@ def interrupted(running):
     assert running.returncode == 130
     assert out == ""
     assert "Traceback" not in err
-    assert "finished entries are kept" in err
+    assert "finished entries are saved" in err
 
 
 def until_it_computes(running, seconds=0.3, patience=300):

@@ -81,7 +81,7 @@ def test_networks_of_another_packing_are_refused_by_every_method(S, others):
     foreign = others["packing"].original
     for method in (S.residual, S.violation, S.admits, S.expand, S.to_vector):
         assert np.shape(foreign)[0] != len(S.index)
-        with pytest.raises(InputError, match="no networks of this ensemble"):
+        with pytest.raises(InputError, match="not networks of this ensemble"):
             method(foreign)
 
 

@@ -270,9 +270,9 @@ class Job:
         except Cancelled:
             if not self.cancelled():
                 self.error = (
-                    f"this took longer than the {self._pool.seconds:g} s that a computation may "
-                    "take on this server: ask for less, or compute it on a machine of your own "
-                    "(Copy CLI command)"
+                    f"this took longer than the {self._pool.seconds:g} s allowed per computation "
+                    "on this server: choose smaller values, or run it on your computer (Copy CLI "
+                    "command)"
                 )
         except BaseException as error:  # told on the page, or nobody would see it
             self.error = told(error)
@@ -286,7 +286,7 @@ class Job:
             if on_end is not None:
                 on_end()
         except Exception:
-            _log.exception("the end of a job could not be told")
+            _log.exception("the end of a job could not be reported")
 
 
 def told(error: BaseException) -> str:
@@ -316,8 +316,8 @@ class Task(param.Parameterized):
     stage = param.String(doc="what the job is doing")
     fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
     seconds_left = param.Number(default=None, allow_None=True)
-    dismissed = param.Boolean(doc="told when the visitor wants no more of it; never stays True")
-    keeps = param.Boolean(doc="whether what the job has so far would be a result")
+    dismissed = param.Boolean(doc="triggered when the visitor cancels; never stays True")
+    keeps = param.Boolean(doc="whether the job's partial result can be used")
     message = param.String(doc="one line about what went wrong, or empty")
 
     def __init__(

@@ -19,14 +19,14 @@ def told(replay: Replay) -> str:
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
         said = f"No number is free: there is just one {term('network', 'force network')}."
-        said += " Choose some friction to see more." if summary["mu"] == 0 else ""
+        said += " Choose μ > 0 to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can vary."
         said = (
             "Lines are the forces between touching disks: the thicker, the stronger. Balance "
-            f"leaves {term('h', f'{free} numbers')} free, so countless sets of forces hold the "
-            f"very same disks. Play goes through some such {term('network', 'networks')}, found "
-            "at random: alternatives, not moments in time."
+            f"leaves {term('h', f'{free} numbers')} free, so infinitely many sets of forces hold "
+            f"the same disks in place. Play goes through some such {term('network', 'networks')}, "
+            "sampled at random: alternatives, not moments in time."
         )
     return f"<h2>{found}</h2><p>{said}</p>"
 
@@ -43,7 +43,7 @@ def rest(replay: Replay) -> str:
         why = (
             f"{carry} Without friction each of the {summary['contacts']} contacts carries one "
             "force, and there are as many equations as forces: the forces are determined, h = 0. "
-            "Choose some friction to see more than one network."
+            "Choose μ > 0 to see more than one network."
         )
     else:
         needed = forces - free
@@ -53,27 +53,23 @@ def rest(replay: Replay) -> str:
             f"But {summary['contacts']} contacts carry {forces} unknown force components, a "
             f"{term('fn')} and a {term('ft')} each: <b>h = {free}</b> numbers are left free "
             f"({term('h')}). That the forces are not determined by balance is called force "
-            "indeterminacy. "
-            f"{term('s')} is all that is left once no contact pulls (fₙ ≥ 0) and none slips "
-            "(|fₜ| ≤ μ fₙ)."
+            f"indeterminacy. {term('s')} is the set of networks in which no contact pulls (fₙ ≥ "
+            "0) and none slips (|fₜ| ≤ μ fₙ)."
         )
     return (
-        f"<p><b>Why not just one?</b> {why}</p>"
-        f"<p><b>How undetermined?</b> {term('eta1')}: how much a contact's force scatters over the "
-        f"networks. {term('eta2')}: how far apart two networks are. {term('eta3')}: how long a "
-        "contact's interval of possible forces is. All are measured against the mean force: 0 "
-        "means determined, 0.1 means uncertain by about a tenth.</p>"
-        "<p><b>How friction matters.</b> Each μ has its own packing. More friction lets each "
-        "contact carry a wider range of forces, but a packing made with more friction comes to "
-        "rest with fewer contacts, so fewer forces are free. With little friction many directions "
-        "are open, but narrow; with a lot of it few, but wide: the indeterminacy rises and "
-        "then falls, and is largest around μ = 0.2 to 0.3.</p>"
-        f"<p><b>Where the networks come from.</b> {term('walk')}: kick all forces at random, take "
-        f"the network in balance that is nearest to the kicked forces, go on from there. The "
-        f"{term('original')} is the one it came to rest with. All this follows "
-        f"{term('paper')}.</p>"
-        f"<p><b>Around the picture.</b> Dashed: the box{_sides(replay)}; disks outside it are "
-        "periodic copies of those inside.</p>"
+        f"<p><b>Why not just one?</b> {why}</p><p><b>How undetermined?</b> {term('eta1')}: how "
+        f"much a contact's force varies between networks. {term('eta2')}: how far apart two "
+        f"networks are. {term('eta3')}: how long a contact's interval of possible forces is. All "
+        "are measured against the mean force: 0 means determined, 0.1 means uncertain by about a "
+        "tenth.</p><p><b>How friction matters.</b> Each μ has its own packing. More friction "
+        "lets each contact carry a wider range of forces, but a packing made with more friction "
+        "comes to rest with fewer contacts, so fewer forces are free. With little friction many "
+        "directions are open, but narrow; with a lot of it few, but wide: the indeterminacy "
+        "rises and then falls, and is largest around μ = 0.2 to 0.3.</p><p><b>Where the networks "
+        f"come from.</b> {term('walk')}: perturb all forces at random, move to the nearest "
+        f"network in balance, and repeat. The {term('original')} is the one it came to rest with. "
+        f"All this follows {term('paper')}.</p><p><b>Around the picture.</b> Dashed: the "
+        f"box{_sides(replay)}; disks outside it are periodic copies of those inside.</p>"
     )
 
 

@@ -28,11 +28,11 @@ from .volume import Volume
 WAITING_MS = 250  # how often what Panel has kept back is sent
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
 KEYS = [
-    ["Space", "play, pause at the nearest network"],
-    ["← →  Home End", "one network back or on; to the first or last"],
+    ["Space", "play; pause at the nearest network"],
+    ["← →  Home End", "previous or next network; first or last"],
     ["N  Shift N", "select the next contact, the largest force first"],
     ["[ ]", "pull the selected force down or up"],
-    ["H", "hold the selected force; again: release it"],
+    ["H", "hold or release the selected force"],
     ["Z  Esc", "undo the last pull; release all"],
     ["1 … 6", "the tabs"],
     ["?", "this list"],

@@ -83,7 +83,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
         Quantity("phi", "φ", "packing fraction", exact=f"{summary['packing_fraction']:.4f}"),
         Quantity(
             "h", "h", "free dimensions", exact=f"{h} = {unknowns} − {unknowns - h}",
-            note="forces less independent equations",
+            note="forces minus independent equations",
         ),
         Quantity("volume", "ln V", "volume of S", exact=found),
     ]  # fmt: skip
@@ -145,8 +145,8 @@ def _doubts(r_hat: float, size: float, least: float) -> Iterator[str]:
         yield f"not mixed: R̂ = {r_hat:.2f}, more than {MIXED:g}; ask for more networks"
     if size < least:
         yield (
-            f"worth {size:.0f} independent networks only, fewer than {least:g}: errors are larger "
-            "than given"
+            f"worth {size:.0f} independent networks, fewer than {least:g}: errors are larger than "
+            "stated"
         )
 
 

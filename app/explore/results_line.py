@@ -82,7 +82,7 @@ LEFT_OUT = {
     "rattlers": ("rattler", "loose disks"),
     "unloaded_contacts": ("unloaded", "contacts without force"),
     "tangential_unknowns": ("no_friction", "forces along contacts"),
-    "skipped": ("determined", "networks that could only be the same"),
+    "skipped": ("determined", "networks identical to the others"),
     "held": ("held_components", "forces that cannot vary"),
     "dropped": ("dropped", "networks on the way to the sample"),
 }

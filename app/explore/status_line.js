@@ -30,7 +30,7 @@ export function render({ model, view }) {
 function invitation() {
   const told = made("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
   const link = made("a", { href: `${location.pathname}?learn${dark ? "&dark=1" : ""}`, textContent: "Learn" })
-  const close = button("×", () => { remember(NEW); told.remove() }, { ariaLabel: "Close for good" })
+  const close = button("×", () => { remember(NEW); told.remove() }, { ariaLabel: "Close permanently" })
   told.append("New to this? ", link, " starts with one disk", close)
   return told
 }

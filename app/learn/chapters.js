@@ -24,13 +24,13 @@ function counted({ contacts, disks, equations, free }, pressed, disksNote = "") 
 }
 
 /**
- * Each chapter: name in links; title in the list; heading; text and ask, what is read before the hand acts; doing, what
- * it then does; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
+ * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing, the instruction
+ * for the hand; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
  */
 export const CHAPTERS = [
   {
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
-    text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall presses on it with a normal force, and by friction holds it along the wall, with at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
+    text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
     doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; an arrow turns orange where its contact is about to slip.",
     see: ({ high, mu }) => [
@@ -45,7 +45,7 @@ export const CHAPTERS = [
     name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The plot shows it over two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
-    doing: "Drag the dot to the right as far as it goes. Where it was, it paints S.",
+    doing: "Drag the dot to the right as far as it goes. Its path paints S.",
     see: ({ high, weight, mu }) => [
       `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: the disks are wedged between them, and friction there pulls them down. With more, the lower disk would slip on the floor, where friction is at its limit, ${mu} × ${two(high)}.`,
       `So the floor can carry more than the disks weigh. Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip.`,
@@ -69,11 +69,11 @@ export const CHAPTERS = [
   },
   {
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
-    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. Counted as before, ${free} numbers are free. The marked line carries ${two(start)} times the mean force.`,
+    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${free} numbers are free. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make its force while no disk moves?",
     doing: "Drag the dot to the right, or the marked line upwards. The bluer a line, the more its force has changed.",
     see: ({ opened, sliding, changed }) => [
-      `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the network can give no more.`,
+      `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the force can grow no further.`,
       `To get here, ${changed} other forces changed by more than a tenth of the mean force, yet no disk moved. On a photograph of the packing you would see no difference.`,
     ],
     count: (facts) => counted(facts, true, ` that carry (of ${facts.all})`),
@@ -82,20 +82,19 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "Chance sees little", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now chance decides: a random walk leads from one admissible network to the next, and in each the marked force is read off.`
-      + ` It takes ${states} steps.`,
+    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now a random walk of ${states} steps moves from one admissible network to the next, and the marked force is read in each.`,
     ask: "What is the largest value that chance finds?",
     doing: "Drag the dot upwards: network after network.",
     see: ({ part, mean, free }) => [
-      `Chance covers ${percent(part)} of what is possible for this force, and ${percent(mean)} on average over all. To come to an end, most of the ${free} free numbers must work together, which chance hardly ever arranges.`,
-      `And that is one force alone. A body half as wide in each of ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of the whole: what was never seen need not be impossible.`,
+      `Chance covers ${percent(part)} of what is possible for this force, and ${percent(mean)} on average over all. To reach either end, most of the ${free} free numbers must work together, which chance hardly ever arranges.`,
+      `And that is one force alone. A body half as wide in each of ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of the whole: a value that was never sampled may still be possible.`,
     ],
     count: null,
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks (every 20th drawn)", dragged: true },
     experiment: Chance, options: {},
   },
   {
-    name: "friction", title: "Friction", heading: "Which friction leaves most open?",
+    name: "friction", title: "Friction", heading: "Where are forces least determined?",
     text: ({ all }) => `${all} disks run through their random networks at μ = 0.1; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
     ask: "At which friction μ do the forces vary most?",
     doing: "Drag the dot along the axis. Each stop shows a packing made with that friction.",
@@ -104,7 +103,7 @@ export const CHAPTERS = [
       const first = rows[0]
       return [
         `At smaller μ more numbers are free, but friction leaves each less room: at μ = ${first.mu}, ${first.free} are free and forces vary by ${percent(first.spread)}. At larger μ contacts vanish, and free numbers with them: ${most.free} at μ = ${most.mu}, ${last.free} at μ = ${last.mu}.`,
-        `So more friction does not mean more freedom: with very much of it, hardly any number is free. The line is the mean over many packings.`,
+        `So more friction does not mean more freedom: at very high friction, hardly any number is free. The line is the mean over many packings.`,
       ]
     },
     count: ({ rows }) => ({
@@ -120,8 +119,8 @@ export const CHAPTERS = [
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right: the arrows grow.",
     see: ({ high, limit, opened, slid }) => [
-      `Then ${opened} contacts open, ${slid} slip, and disks set off; their motion is drawn enlarged, the farthest by one mean radius.`,
-      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: which forces it really has decides, and no picture of the disks shows them. That is why it matters how much a picture leaves open.`,
+      `Then ${opened} contacts open, ${slid} slip, and disks start to move. The motion is drawn enlarged: the fastest disk moves by one mean radius.`,
+      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: its actual forces decide, and no picture of the disks shows them. That is why it matters how undetermined they are.`,
     ],
     count: null,
     x: { low: 0, high: 6, label: "push (mean force = 1)" }, y: null,

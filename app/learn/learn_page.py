@@ -18,7 +18,7 @@ from .workbench.workbench import Workbench
 
 KEYS = [
     ["arrows", "move the marker, or the dot"],
-    ["Tab", "goes from the plot to the buttons"],
+    ["Tab", "move from the plot to the buttons"],
 ]
 
 

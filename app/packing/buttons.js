@@ -37,7 +37,7 @@ const BUTTONS = `
       ${button("full", "full screen")}
     </div>
     <div class="bar tools">
-      ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
+      ${button("undo", "the last pull (Z); Esc releases all", "Undo")}
       <span class="knowing">
         ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±

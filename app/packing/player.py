@@ -39,7 +39,7 @@ class Player(Scripted, Seen):
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
     scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
-    asked = param.String(doc="what was asked for and is not on screen, in words")
+    asked = param.String(doc="the requested selection if it is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
     keepable = param.Boolean(doc="whether more networks of the walk could be stored")
     source = param.String(doc="where the states come from, in words")

@@ -33,7 +33,7 @@ LEGEND = """
 <span>up to <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩</span>
-<span class="loose" tabindex="0" data-term="rattler">pale disks carry nothing</span>
+<span class="loose" tabindex="0" data-term="rattler">pale disks carry no force</span>
 {marks}
 <details><summary>Scales</summary>
 <label>colours full at <input name="full" type="number" step="any" placeholder="auto"
@@ -47,8 +47,8 @@ LEGEND = """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
 <span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
-<span>pale disks: touch nothing; dashed: the box, which shrinks; disks outside
- are periodic copies</span>
+<span>pale disks: no contacts; dashed: the box, which shrinks; disks outside it are periodic
+copies</span>
 """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
@@ -239,7 +239,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
 
 def colour_words(looks: Looks, pulled: bool) -> str:
     """What colours mean just now."""
-    return "change by what was pulled" if pulled else COLOURS[looks.colour]
+    return "change by the pull" if pulled else COLOURS[looks.colour]
 
 
 def _full(looks: Looks, most: float) -> str:
@@ -264,7 +264,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
     if looks.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
     if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
-        bar = "(nothing is known: select a contact and press H)"
+        bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
     told = colour_words(looks, pulled)

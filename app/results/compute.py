@@ -52,7 +52,7 @@ def states(library: Library, selection: Selection) -> Work:
             cell = library.find(selection.kind, params)
             if cell is None:
                 _make_packing(job, library, selection.packing)
-                job.begin("finding which contacts carry")
+                job.begin("finding the contacts that carry force")
                 with _told_of_friction(selection):
                     dataset, _ = study.get(
                         library.own,
@@ -63,7 +63,7 @@ def states(library: Library, selection: Selection) -> Work:
                     )
                 cell = library.find(selection.kind, kind.reached(params, dataset))
             if cell is None:
-                raise InputError("these states were removed from the cache; ask for them again")
+                raise InputError("these states were removed from the cache; compute them again")
         return library.shown(cell)
 
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
@@ -77,7 +77,7 @@ def all_states(library: Library, cell: Cell) -> Work:
         computed_anew(library, cell, params, job)
         whole = library.find(cell.kind, params)
         if whole is None:
-            raise InputError("these states were removed from the cache; ask for them again")
+            raise InputError("these states were removed from the cache; compute them again")
         return library.shown(whole)
 
     return Work(work, wants=((cell.kind, params),))
@@ -113,7 +113,7 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
     walking = progress_feed.shared(progress_feed.Walking, params)
 
     def begun(S: Any) -> None:
-        job.begin("looking for the first state")
+        job.begin("finding the first state")
         walking.restart(first_replay(S, params["states"]))
 
     def add(found: Any) -> None:
@@ -132,7 +132,7 @@ def exact(library: Library, shown: Shown) -> Work:
         bounding = progress_feed.shared(progress_feed.Bounding, params)
         try:
             dataset = found_or_made(
-                library, job, "exact intervals, the widest first", kinds.INTERVALS, params,
+                library, job, "exact intervals, widest first", kinds.INTERVALS, params,
                 begun=bounding.restart, watch=bounding.add,
                 widths=replay.high[:, 0] - replay.low[:, 0],
             )  # fmt: skip

@@ -200,7 +200,7 @@ class Library:
         found = self.stored(kinds.PACKING, params)
         if found is not None:
             return dataset_packing(found)
-        raise InputError("the packing of these states is in no store that is open here")
+        raise InputError("the packing of these states is not in any open store")
 
     def table(self, cells: Sequence[Cell]) -> list[dict[str, Any]]:
         """One row of measures for each cell, as study.row with the ensemble's μ."""

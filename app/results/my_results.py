@@ -38,7 +38,7 @@ def delete(library: Library, name: str) -> None:
     store = library.own
     entry = store.entry(name)
     if entry is None or entry.kind not in SOURCES:
-        raise InputError("that computation is in the cache no more")
+        raise InputError("that computation is no longer in the cache")
     store.remove(name)
     packing, others = canonical(_packing(entry)), store.entries()
     same = [other for other in others if canonical(_packing(other)) == packing]

@@ -84,13 +84,13 @@ def infer(
 
     def work(job: Job) -> Frame:
         LIMITS.check(mu=mu)
-        job.begin("looking for forces that balance the disks, near the measured ones")
+        job.begin("finding balanced forces close to the measured ones")
         roles = uploads.FAMILIES[uploads.family(files)][1]
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
         found = read_pegs(
             frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
         )
-        job.begin("measuring the likeliest network again and again, for error bars")
+        job.begin("simulating repeated measurements, for error bars")
         dataset = series.infer_frame(found, states=DRAWS)
         names = " and ".join(name for name, _ in files.values())
         return frame_of(dataset, names, tuple(map(plain, frames.frames.tolist())))
@@ -180,9 +180,9 @@ def account(report: dict[str, Any]) -> Iterator[str]:
         yield f"Beware: {report['names']}."
     if "flags_ignored" in report:
         yield (
-            f"Beware: {report['flags_ignored']} disks are flagged as touching a wall, too many to "
-            "be true. The flags are ignored; disks at the boundary of the frame count as those at "
-            "walls."
+            f"Beware: {report['flags_ignored']} disks are flagged as touching a wall, which is "
+            "implausibly many. The flags are ignored; disks at the boundary of the frame count "
+            "as those at walls."
         )
     yield (
         f"Listed are {count('contacts_listed')} contacts of {count('grains')} disks. "
@@ -197,31 +197,29 @@ def account(report: dict[str, Any]) -> Iterator[str]:
             yield f"{report[key]} {words}"
     if report["unbalance_saved_if_tangential_forces_were_reversed"] > REVERSED:
         yield (
-            "If all tangential forces had the other sign, disks would be nearer to balance: "
-            "programs differ there, try the switch."
+            "With the other sign for all tangential forces, disks would be closer to balance. "
+            "Programs differ in this sign; try the switch."
         )
     yield (
-        f"On the listed contacts alone, no admissible forces balance "
+        "On the listed contacts alone, no admissible forces balance "
         f"{count('unbalanced_on_listed_contacts')} of the inner disks. {count('candidates')} "
-        "pairs that are about as near joined as contacts that were not measured."
+        "pairs at similar distances were added as unmeasured contacts."
     )
     yield _left(report)
     yield (
         "The admissible network nearest to the measurement differs from it by "
         f"{count('mean_change_of_f_n'):.2f} ⟨fₙ⟩ in fₙ and {count('mean_change_of_f_t'):.2f} ⟨fₙ⟩ "
-        f"in fₜ on average; {count('candidates_that_carry')} of the added contacts carry in it. "
-        "It is one of many: what was not measured may be otherwise. The standard error of "
-        f"{count('error'):.2f} ⟨fₙ⟩ was not measured either: it is the one that explains how far "
-        "the measured forces are from balance."
+        f"in fₜ on average; {count('candidates_that_carry')} of the added contacts carry force in "
+        "it. It is one of many: unmeasured forces may differ. The standard error of "
+        f"{count('error'):.2f} ⟨fₙ⟩ was estimated from how far the measured forces are from "
+        "balance."
     )
 
 
 def _walls(report: dict[str, Any]) -> str:
     at = f"{report['grains_at_walls']} disks are at walls"
     if report["walls"] == "open":
-        return (
-            f"{at}: what a wall does to them was not measured, so their balance is not asked for."
-        )
+        return f"{at}: wall forces were not measured, so these disks need not balance."
     return (
         f"{at}: the directions of {report['wall_contacts']} contacts with the walls are known, so "
         "that the forces there are inferred like all others."
@@ -229,9 +227,9 @@ def _walls(report: dict[str, Any]) -> str:
 
 
 DOUBTS = (
-    ("listed_twice_with_other_forces", "contacts are listed twice with different forces: the mean "
-     "was taken, the difference counts as an error."),
-    ("beyond_friction", "measured tangential forces are larger than friction allows at this μ."),
+    ("listed_twice_with_other_forces", "contacts are listed twice with different forces: their "
+                                       "mean is used, and the difference counts as an error."),
+    ("beyond_friction", "measured tangential forces exceed the friction limit at this μ."),
 )  # fmt: skip
 REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubted
 NAMED = 12  # disks that are named
@@ -240,10 +238,10 @@ NAMED = 12  # disks that are named
 def _left(report: dict[str, Any]) -> str:
     names = report["left_open"]
     if not names:
-        return "With them every inner disk is balanced: apart from the walls nothing was left open."
+        return "With them every inner disk is balanced."
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
-        f"With them {len(names)} inner disks still cannot be balanced, by "
-        f"{report['unbalance']:.2g} ⟨fₙ⟩ in sum: their balance was left open "
-        f"(disks {', '.join(map(str, names[:NAMED]))}{more})."
+        f"With them {len(names)} inner disks still cannot be balanced; the remaining unbalance is "
+        f"{report['unbalance']:.2g} ⟨fₙ⟩ in sum: their balance was left open (disks "
+        f"{', '.join(map(str, names[:NAMED]))}{more})."
     )

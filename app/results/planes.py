@@ -93,7 +93,7 @@ def strong_pair(replay: Replay) -> tuple[int, int]:
     that no disk has in common with it (where there are none, the second). InputError for fewer.
     """
     if replay.normal.shape[1] < 2:
-        raise InputError("there are no two contacts to be compared")
+        raise InputError("there are not two contacts to compare")
     strong = np.argsort(-replay.normal[0], kind="stable")
     disks = np.zeros((len(strong), 2), dtype=int)
     disks[replay.links.contact] = np.column_stack([replay.links.i, replay.links.j])

@@ -276,5 +276,5 @@ def _read_selection(given: dict[str, str]) -> Selection:
     casts = {"radii": str, "sweeps": int}
     options = {name: casts.get(name, float)(given.pop(name)) for name in OPTIONS if name in given}
     if ":" not in options.get("radii", ":"):
-        raise InputError("radii in a link are named distributions")
+        raise InputError("radii in a link must be a named distribution")
     return made._replace(packing=made.packing | options)

@@ -200,10 +200,10 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
     """
 
     def work(job: Job) -> Brought:
-        job.begin("looking for its backbone")
+        job.begin("finding its backbone")
         report = importers.report(packing) | {"notes": packing.info.get("notes", [])}
         if library.cache is None:
-            raise InputError("no cache folder can be written, so nothing can be taken in")
+            raise InputError("no cache folder can be written, so no files can be read")
         params = kinds.imported_parameters(packing)
         kinds.keep_packing(library.cache, params, packing)
         call(library.cache, str(params["imported"]), source.partition(": ")[2])
@@ -230,7 +230,7 @@ _ROWS = (
     ("packing fraction φ", "packing_fraction", ".4f", ""),
     ("pressure", "pressure", ".4g", ""),
     ("mean normal force", "mean_normal_force", ".4g", ""),
-    ("unbalance of its forces", "residual", ".1e", " ⟨fₙ⟩"),
-    ("outside Coulomb's cones by", "violation", ".1e", " ⟨fₙ⟩"),
+    ("unbalance of the forces", "residual", ".1e", " ⟨fₙ⟩"),
+    ("distance from Coulomb's cones", "violation", ".1e", " ⟨fₙ⟩"),
     ("largest overlap", "largest_overlap", ".1e", " radii"),
 )

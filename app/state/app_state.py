@@ -232,8 +232,8 @@ class AppState(param.Parameterized):
                 self._ask(asked, at_once=not dear)
                 if dear and self.missing:
                     self.work.message = (
-                        "this link asks for what takes long to compute, and a link alone does not "
-                        "start that on this server: press Compute"
+                        "this link needs a long computation, which a link does not start on this "
+                        "server: press Compute"
                     )
             self.work.message = self.work.message or message
 
@@ -346,7 +346,7 @@ class AppState(param.Parameterized):
         """Put the Replay of a walk that begins on screen."""
         asked = self.work.live.selection
         told = brief(asked, self.library.series(asked))
-        source = f"μ = {asked.mu:g}, {told} (as they are found)"
+        source = f"μ = {asked.mu:g}, {told} (as they are sampled)"
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
             self.param.update(seen=replay, plane=None, source=source, displacement=None)
@@ -368,7 +368,7 @@ class AppState(param.Parameterized):
             return ""
         words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
         if self.work.computation.running:
-            return f"asked for: {words}"
+            return f"requested: {words}"
         return f"of μ = {self.cell.mu:g}; not computed: {words}"
 
     def compute_exact(self) -> None:

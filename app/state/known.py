@@ -158,7 +158,7 @@ class Knowledge(param.Parameterized):
             return
         try:
             if len(others) >= MOST_KNOWN:
-                raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
+                raise InputError(f"{MOST_KNOWN} known forces are the maximum; release some")
             self.known = [*others, self._stated(contact, value, error)]
             self.work.message = ""
         except InputError as refusal:
@@ -179,7 +179,7 @@ class Knowledge(param.Parameterized):
                 self.release(contact)
 
     def compute(self) -> None:
-        """Compute the exact intervals under what is known, in the background."""
+        """Compute the exact intervals given the known forces, in the background."""
         state = self.state
         replay, known, cell = state.replay, tuple(self.known), state.cell
         shown = Shown(cell, replay, state.exact)
@@ -217,13 +217,14 @@ class Knowledge(param.Parameterized):
         width = high - low
         if width < DETERMINED:
             raise InputError(
-                f"fₙ of contact {number} is {low:.3f} × the mean force in every network that is "
-                "left: to hold it would tell nothing new"
+                f"fₙ of contact {number} is {low:.3f} × the mean force in every remaining "
+                "network: holding it would add no information"
             )
         if not low - INWARD * width <= value <= high + INWARD * width:
             raise InputError(
-                f"fₙ of contact {number} is {value:.3f} × the mean force on screen, but what is "
-                f"known leaves {low:.3f} to {high:.3f}: pull it there first, or let another go"
+                f"fₙ of contact {number} is {value:.3f} × the mean force on screen, but the held "
+                f"forces allow {low:.3f} to {high:.3f}: pull it there first, or release another "
+                "force"
             )
         inside = np.clip(value, low + INWARD * width, high - INWARD * width)
         return Statement(contact, _rounded(inside))
@@ -324,7 +325,7 @@ def narrowing(
         selection = shown.cell.selection
         given: dict[str, Any] = {"mu": selection.mu, "known": rows(shown.replay, known)}
         params = kinds.INTERVALS.parameters(selection.packing, **given)
-        stage = "exact intervals under what is known"
+        stage = "exact intervals given the known forces"
         options: dict[str, Any] = {"widths": affected(shown.replay, known), "watch": bounds.add}
         found = compute.found_or_made(library, job, stage, kinds.INTERVALS, params, **options)
         return Narrowed(known, whole, found)
@@ -361,7 +362,7 @@ def ranking(
         params = kinds.INFORMATIVE.parameters(
             selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
         )
-        stage = "which measurement next"
+        stage = "the best contacts to measure next"
 
         def watch(found: Any) -> None:
             job.so_far = ranked(*found)
@@ -394,5 +395,5 @@ def read(text: str) -> list[Statement]:
     if not len(parts) == len(known) == len(contacts) <= MOST_KNOWN:
         raise ValueError("too many known forces, or one contact twice")
     if min(contacts) < 0 or not all(0 <= n < LARGEST and math.isfinite(n) for n in numbers):
-        raise ValueError("forces that cannot be")
+        raise ValueError("impossible forces")
     return known

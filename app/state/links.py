@@ -22,7 +22,7 @@ def _pair(text: str) -> tuple[int, int]:
 def _place(text: str) -> tuple[float, ...]:
     place = tuple(float(part) for part in text.split(":"))
     if not all(abs(value) < 1e6 for value in place) or not place[-1] > 0:
-        raise ValueError("no place that can be seen")
+        raise ValueError("no visible place")
     return place
 
 

@@ -61,7 +61,7 @@ class Hand(param.Parameterized):
     {"held": …}, {"rail": …} of a contact and {"fan": …} of a plane.
     """
 
-    pulls = param.List(doc="what was pulled one after the other, from the state on screen on")
+    pulls = param.List(doc="the pulls, in order, starting from the state on screen")
     held = param.Parameter(doc="the Held that pulls have led to, or None")
 
     def __init__(self, state: Any) -> None:
@@ -85,7 +85,7 @@ class Hand(param.Parameterized):
         state.looks.contact = contact
         if contact in _held(state.knowledge.known):
             self.work.message = (
-                f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
+                f"contact {state.replay.backbone[contact]} is held: release it (H) to pull it"
             )
             self.tell({"rail": None})
         else:
@@ -99,7 +99,7 @@ class Hand(param.Parameterized):
     def hold(self, pull: Pull) -> None:
         """Let go: the pull stays."""
         if len(self.pulls) >= MOST_PULLS:
-            self.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
+            self.work.message = f"{MOST_PULLS} pulls are the maximum; undo some (Z)"
             return
         self.pulls = [*self.pulls, pull]
 
@@ -311,13 +311,13 @@ def read(text: str) -> list[Pull]:
 def _read(name: str, *at: str) -> Pull:
     values = tuple(float(value) for value in at)
     if not all(abs(value) < 1e6 for value in values):
-        raise ValueError("forces that cannot be")
+        raise ValueError("impossible forces")
     if len(values) == 2:
         planes.read(name)
         return name, *values
     (value,) = values
     if int(name) < 0 or value < 0:
-        raise ValueError("forces that cannot be")
+        raise ValueError("impossible forces")
     return int(name), value
 
 

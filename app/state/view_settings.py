@@ -12,15 +12,15 @@ COLOURS = {
     "extent": "length of the interval ΔFₙ",
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
-    "known": "what is known: part of the interval gone",
-    "deviation": "inferred less measured fₙ, in σ",
+    "known": "known forces: fraction of the interval removed",
+    "deviation": "inferred minus measured fₙ, in σ",
 }
 WIDTHS = {
     "normal": "normal force fₙ",
     "extent": "ΔFₙ",
     "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
-    "known": "what is known: length of the interval gone",
+    "known": "known forces: length of the interval removed",
     "measured": "measured fₙ",
 }
 # What colours and widths show → key of the glossary.
@@ -41,7 +41,7 @@ SORTS = {
     "extent": "ΔFₙ of all networks",
     "exact": "exact ΔFₙ",
     "position": "place as packed in its interval",
-    "shortened": "how much what is known shortened it",
+    "shortened": "how much the known forces shortened it",
 }
 DRAWN = {"all": "all", "some": "a few"}
 # What single tabs can show.

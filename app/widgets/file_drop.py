@@ -48,7 +48,7 @@ class Dropper(Scripted):
 
     def _take(self, name: str, data: Any) -> None:
         if not isinstance(data, (bytes, bytearray, memoryview)):
-            return self._refuse("what was sent is no file")
+            return self._refuse("the upload is not a file")
         self._size += memoryview(data).nbytes
         if self._size > self.most:
             return self._refuse(f"more than {self.most / 1e6:g} MB were sent")

@@ -23,7 +23,7 @@ LABELS = {
     "ΔFₙ of all networks": "seen",
     "exact ΔFₙ": "exact",
     "place as packed in its interval": "place",
-    "how much what is known shortened it": "known",
+    "how much the known forces shortened it": "known",
     "mean force = 1": "mean_force",
     "force as packed = 1": "original",
     "Compute exact intervals": "exact",

@@ -47,7 +47,7 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
         pairs = _paired(list(filter(_is_text, files)))
     if not pairs:
         raise InputError(
-            f"{', '.join(map(str, paths))}: no frames; wanted are *_solved.mat, or text files with "
+            f"{', '.join(map(str, paths))}: no frames; expected *_solved.mat, or text files with "
             "'positions' (or 'centers') and 'adjacency' in their names"
         )
     found = [

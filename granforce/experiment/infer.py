@@ -79,7 +79,7 @@ class Inference(NamedTuple):
     def drawn(self) -> Draws:
         """The draws; AttributeError where none were asked for."""
         if self.draws is None:
-            raise AttributeError("no states were drawn: ask for some by `states`")
+            raise AttributeError("no states were drawn: set `states`")
         return self.draws
 
     @property

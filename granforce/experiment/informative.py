@@ -69,7 +69,7 @@ def informative(
         held = some_network(ensemble, held)
     expected = _expected(normal)
     if not expected.any():
-        raise InputError("nothing is left to measure: every force is known by balance")
+        raise InputError("nothing to measure: balance determines every force")
     order = np.argsort(-expected, kind="stable")[: min(k, int(np.sum(expected > 0)))]
     before, after = np.nan, np.full(len(order), np.nan)
     best = order[:check]

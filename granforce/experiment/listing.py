@@ -215,22 +215,22 @@ def _told_apart(grains: Columns, contacts: Columns) -> TextFrames:
         found = next((some for some in map(_ascending, ends) if some[-1] == count), None)
         if found is None:
             raise InputError(
-                f"{grains.name}: ids begin anew {count} times, and where in {contacts.name} a "
-                "frame ends is not told; add a column for the frame to both files"
+                f"{grains.name}: ids restart {count} times, and where in {contacts.name} a frame "
+                "ends is unclear; add a column for the frame to both files"
             )
         contacts = contacts.with_frames(found)
     elif len(numbers) == count:
         parts = numbers[parts - 1]
     else:
         raise InputError(
-            f"{grains.name}: ids begin anew {count} times, and {contacts.name} has "
-            f"{len(numbers)} frames; add a column for the frame"
+            f"{grains.name}: ids restart {count} times, and {contacts.name} has {len(numbers)} "
+            "frames; add a column for the frame"
         )
     return TextFrames(grains.with_frames(parts), contacts)
 
 
 def _begun_anew(ids: Floats) -> Integers | None:
-    """(rows,) numbers from 1 of the parts in each of which ids begin anew, None for a single one.
+    """(rows,) numbers from 1 of the parts in each of which ids restart, None for a single one.
 
     A part has at least half as many rows as the largest, and most of its ids are in the first.
     """

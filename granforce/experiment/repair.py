@@ -18,15 +18,19 @@ from granforce.types import Floats, Integers
 # Kind of finding → what it is called, whether it is of grains (0) or contacts (1), and how much of
 # the data it spoils: 1 what is left out or not measured any more, 0 what is only told.
 KINDS = {
-    "unreadable_grains": ("grains with a field that is no finite number, or no radius", 0, 1),
+    "unreadable_grains": (
+        "grains with a field that is not a finite number, or without a radius",
+        0,
+        1,
+    ),
     "doubled_grains": ("grains listed twice", 0, 1),
     "false_detections": ("grains inside others, which fit fewer contacts and sizes", 0, 1),
     "unreadable_contacts": ("contacts with a field that cannot be a name or a force", 1, 1),
     "contacts_with_themselves": ("contacts of a grain with itself", 1, 1),
-    "contacts_of_missing_grains": ("contacts that name a grain that is not there", 1, 1),
+    "contacts_of_missing_grains": ("contacts that name a missing grain", 1, 1),
     "contacts_too_long": ("contacts of grains too far apart to touch", 1, 1),
     "negative_normal_forces": ("contacts that pull, taken as not measured", 1, 1),
-    "beyond_friction": ("measured forces beyond friction at this μ, kept", 1, 0),
+    "beyond_friction": ("measured forces beyond the friction limit at this μ, not changed", 1, 0),
 }
 # Disks may overlap by this part of the smaller radius before one of them must be false.
 OVERLAP = 0.5
@@ -89,7 +93,7 @@ class Account(NamedTuple):
                     if KINDS[kind][1:] == (which, 1) and self.of(kind)
                 )
                 raise InputError(
-                    f"{len(spoilt)} of {count} {what} would have to be mended, more than "
+                    f"{len(spoilt)} of {count} {what} would have to be repaired, more than "
                     f"{self.most:.0%}: {kinds}; the first: {spoilt[0].text}; check units, columns "
                     "and that both files are of one frame"
                 )
@@ -196,7 +200,7 @@ def _strangers(listing: Listing, share: float) -> str:
     if len(absent):
         row = absent[0]
         named = listing.ends[row][rows[row] == -2][0]
-        words += f"; {len(absent)} name grains that are not there ({plain(named)}, the first)"
+        words += f"; {len(absent)} name missing grains ({plain(named)}, the first)"
     if np.isfinite(gap).any():
         words += f"; the median gap is {np.nanmedian(gap) / radius:.3g} mean radii"
         i, j = rows[np.isfinite(gap)].T

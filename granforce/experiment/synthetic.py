@@ -95,7 +95,7 @@ def synthetic_frame(
                 f"{name} must be from {1 / LARGEST_UNIT:g} to {LARGEST_UNIT:g}, got {value}"
             )
     if not np.any(packing.forces[:, 0] > 0):
-        raise InputError("the packing has no forces of its own that could be measured")
+        raise InputError("the packing has no forces to measure")
     rng = np.random.default_rng(random_seed(seed))
     S = ensemble(packing)
     c, unit = S.contacts, float(newton)

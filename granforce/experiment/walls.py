@@ -139,7 +139,7 @@ def flagged(
     Raises InputError for another flag.
     """
     if flag not in (None, "ignore"):
-        raise InputError(f"flag: ignore is all that can be said of it, got {str(flag)[:40]!r}")
+        raise InputError(f"flag must be ignore, got {str(flag)[:40]!r}")
     given = listing.flag
     many, shaped = np.mean(given != 0), walls not in (None, "open")
     told = given.any() or np.any(listing.ends < 0)
@@ -157,10 +157,10 @@ def flagged(
     if flag == "ignore" or not given.any():
         return found, None
     return found, (
-        f"{np.sum(given != 0)} of {len(given)} grains are flagged as touching a wall, which is no "
-        f"flag of walls: it is ignored, and the {np.sum(found != 0)} grains at the boundary of the "
-        "frame count as those at walls (as with --flag ignore); --walls annulus, box or auto makes "
-        "walls of the boundary"
+        f"{np.sum(given != 0)} of {len(given)} grains are flagged as touching a wall, so the flag "
+        f"is ignored, and the {np.sum(found != 0)} grains at the boundary of the frame count as "
+        "those at walls (as with --flag ignore); --walls annulus, box or auto makes walls of the "
+        "boundary"
     )
 
 

@@ -1,1 +1,1 @@
-"""How large S is, and what lies in it: walks, uniform states, exact intervals, outlines."""
+"""Explore S: random walks, uniform states, exact intervals, outlines, volume."""

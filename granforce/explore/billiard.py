@@ -1,9 +1,9 @@
 """Paths in S between its walls: straight ones, for uniform states, and harmonic ones, for normal.
 
-A path is told by the slacks s of all walls and the speeds w at which they change. At a wall that is
-met, its own speed is turned: w ← w − 2 w_k/K_kk · (row k of K). So a turn costs one pass over the
-walls, and a row of K. Where that is missing in the `RowStore`, a path stops where it is until it is
-made, and goes on, bit for bit as if it had been there.
+A path is described by the slacks s of all walls and their speeds w. When a path meets wall k, it is
+reflected: w ← w − 2 w_k/K_kk · (row k of K). A reflection costs one pass over the walls and a row
+of K. If the row is missing in the `RowStore`, the path pauses until it is computed, with
+bit-identical results.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from granforce.types import Floats, Integers, Mask
 BLOCK = 64
 # Memory for rows of K, all threads together: all those of 11,500 walls (3500 disks at μ = 0.1) fit.
 MEMORY = 1 << 30
-# Turns after which a path is not taken, per dimension; a usual path has less than one.
+# Reflections after which a path is rejected, per dimension; a typical path has less than one.
 MOST_TURNS = 10
-# Slacks stay above this: a point that rounding put on a wall turns there at once.
+# Slacks stay above this: a point that rounding put on a wall is reflected there at once.
 _LEAST = 1e-300
 # Flight.count: paths done, turns on this one, turns and paths not taken in all; whether on a path,
 # and the wall that is next on it.
@@ -37,29 +37,29 @@ RowsOf = Callable[[Integers], Floats]
 
 
 class RowCache(NamedTuple):
-    """Rows of K that are there."""
+    """Cached rows of K."""
 
     values: Floats  # (places, walls)
-    place: Integers  # (walls,) where each row is, −1 where it is not
+    place: Integers  # (walls,) place of each row, −1 if not cached
     owner: Integers  # (places,) wall of each place, −1 where it is free
-    used: Mask  # (places,) bool, since the hand came by last
-    hand: Integers  # (1,) the next place that may be given away
+    used: Mask  # (places,) bool, used since the clock hand last passed
+    hand: Integers  # (1,) the next place that may be reused
 
 
 class RowStore(NamedTuple):
     """Rows of K, made on demand; threads may share them where there is room for all."""
 
     cache: RowCache
-    making: threading.Lock  # held by the thread that makes some
+    making: threading.Lock  # held by the thread that computes rows
 
     @property
     def whole(self) -> bool:
-        """Whether there is room for all, so that none is ever given up."""
+        """Whether all rows fit, so that none is ever dropped."""
         return len(self.cache.owner) >= len(self.cache.place)
 
 
 class Flight(NamedTuple):
-    """Where one chain is."""
+    """Position of one chain."""
 
     s: Floats  # (walls,) slacks
     w: Floats  # (walls,) their speeds
@@ -69,7 +69,7 @@ class Flight(NamedTuple):
 
 
 def room_for_rows(walls: int, part: float = 1.0) -> RowStore:
-    """Rows of so many walls, with room in a part of MEMORY, none of them there yet."""
+    """An empty cache of rows for this many walls, within a share of MEMORY."""
     count = max(1, walls)
     places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))
     cache = RowCache(
@@ -83,7 +83,7 @@ def room_for_rows(walls: int, part: float = 1.0) -> RowStore:
 
 
 def make_rows(rows_of: RowsOf, rows: RowCache, wanted: Sequence[int]) -> None:
-    """Put the rows of so many walls where others were not used for long; those there stay."""
+    """Compute rows for these walls in place of the least recently used; cached rows stay."""
     wanted = [wall for wall in wanted if rows.place[wall] < 0]
     if not wanted:
         return
@@ -121,9 +121,9 @@ def follow(
     """Paths of some chains, as `fly` takes them, from slacks starts (walls,) each.
 
     rows_of: makes rows of K; dimension: h of S, which bounds the turns of a path.
-    Returns slacks where they end (chains, walls) and after each path (chains, paths, walls), and
-    the turns and paths not taken (chains, 2). Where rows are missing, those of the walls that are
-    next for each chain are made side by side.
+    Returns the final slacks (chains, walls), those after each path (chains, paths, walls), and the
+    numbers of reflections and rejected paths (chains, 2). Missing rows for the next walls of all
+    chains are computed together.
     """
     flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (dimension + 1)
     outs = np.ones((len(starts), len(drawn[0][0]), len(rows.cache.place)))
@@ -150,7 +150,8 @@ def follow(
 
 @compiled
 def fly(rows, speeds, times, middles, flight, limit, out, stop):
-    """Path after path of speeds (paths, walls) and times (paths,), from where the last one ended.
+    """Follow paths with speeds (paths, walls) and times (paths,), each from the end of the last
+    one.
 
     Without middles (0, walls) they are straight, and mirrored at walls: a billiard walk (Polyak,
     Gryazina, EJOR 238, 497 (2014)). For speeds in a random direction and times whose law does not
@@ -160,9 +161,9 @@ def fly(rows, speeds, times, middles, flight, limit, out, stop):
     covariance K around the slacks `middle`, cut by the walls, as it is: energy is conserved and
     walls are met at times in closed form (Pakman, Paninski, arXiv:1208.4118).
 
-    A path with more than `limit` turns is not taken, which is as likely as for its reverse. out
-    (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing. Ends
-    early, with states that mean nothing, once stop[0] is raised.
+    A path with more than `limit` reflections is rejected, which is as likely as for its reverse.
+    out (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing.
+    Ends early, with invalid states, once stop[0] is set.
     """
     s, w, count, harmonic = flight.s, flight.w, flight.count, len(middles) > 0
     while count[_PATH] < len(times):
@@ -214,11 +215,11 @@ def chords(speeds, parts, s):
 
 @within
 def _onward(flight, middle, harmonic, row, time, kick):
-    """Go on for a time, turn (w −= kick · row), and find the wall that is next, −1 for none.
+    """Move for a time, reflect (w −= kick · row), and find the next wall, −1 for none.
 
     Both in one pass, by lanes: s ← m + (s − m) cos + w sin, of which straight paths, m = s, are the
-    case cos = 1, sin = t. A rate takes a division, or a root as well, and is found only where
-    products tell that a wall comes before those looked at so far and before the end of the path.
+    case cos = 1, sin = t. A rate requires a division, or also a root, and is computed only if
+    products show that a wall comes before the earlier candidates and before the end of the path.
     """
     s, w, left = flight.s, flight.w, flight.left
     left[0] -= time

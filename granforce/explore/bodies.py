@@ -1,8 +1,8 @@
-"""S drawn whole where it has three dimensions or fewer: its corners, its sides, and where it ends.
+"""All of S in up to three dimensions: its corners, sides and rays.
 
 In cone coordinates S = {y ≥ 0 : A y = b}. Orthonormal coordinates u of its affine hull, in the
-metric of the 2 N_c forces, make of every y_k ≥ 0 a half-space: a contact slides one way at its
-other side (f_t = ±μ f_n), or opens (f_n = 0). In homogeneous coordinates (u, t) corners u/t and the
+metric of the 2 N_c forces, turn every y_k ≥ 0 into a half-space, at whose boundary a contact slides
+one way (f_t = ±μ f_n) or opens (f_n = 0). In homogeneous coordinates (u, t) corners u/t and the
 rays of an S without end, t = 0, are the edges of one cone. Qhull finds the edges, as the corners of
 a section through the cone; each is then solved for from the sides that meet in it, to rounding. A
 ray counts as one where it is certified: A d = 0, d ≥ 0.
@@ -24,13 +24,13 @@ from granforce.records import InputError, Packing, takes
 from granforce.types import Floats, Integers, Mask
 
 MOST_DIMENSIONS = 3
-# Coordinates y, in ⟨f_n⟩, up to which a point inside is as near as those of usual forces.
+# Coordinates y, in ⟨f_n⟩, up to which an inner point counts as close to usual forces.
 _USUAL = 10.0
-# Along a ray no y falls faster than this, relative to the one that changes most: it is rounding.
+# Along a ray no y decreases faster than this, relative to the fastest; smaller rates are rounding.
 _RAY = 1e-12
-# Least cosine between a ray and what Qhull makes of it.
+# Least cosine between a ray and Qhull's result.
 _PARALLEL = 1 - 1e-6
-# Distance from a wall, relative to the sizes of which it is the difference, of a point on it.
+# Distance below which a point is on a wall, relative to the terms whose difference it is.
 _ON_WALL, _ROUNDING = 1e-11, 1e-14
 # Least singular value of unit normals of walls that meet in one point.
 _SINGULAR = 1e-13
@@ -54,12 +54,12 @@ class Body(NamedTuple):
     origin: Floats  # (N_c, 2) the network at u = 0, force
     axes: Floats  # (h, N_c, 2) networks of length 1: F = origin + u · axes
     corners: Floats  # (V, h) force
-    rays: Floats  # (R, h) unit vectors along which S has no end; none where it is bounded
+    rays: Floats  # (R, h) unit vectors along which S is unbounded; none if it is bounded
     sides: tuple[Side, ...]  # of Side
 
     @property
     def bounded(self) -> bool:
-        """Whether S has an end everywhere."""
+        """Whether S is bounded."""
         return not len(self.rays)
 
     def forces(self, u: Floats) -> Floats:
@@ -68,7 +68,7 @@ class Body(NamedTuple):
 
     @property
     def intervals(self) -> tuple[Floats, Floats]:
-        """Least and largest f_n, f_t (N_c, 2) of the contacts; ±inf where there is no end."""
+        """Least and largest f_n, f_t (N_c, 2) of the contacts; ±inf where unbounded."""
         low, high = self.forces(self.corners).min(axis=0), self.forces(self.corners).max(axis=0)
         for along in np.tensordot(self.rays, self.axes, axes=1):
             high = np.where(along > 10 * _RAY, np.inf, high)
@@ -76,27 +76,27 @@ class Body(NamedTuple):
         return low, high
 
     def _repr_html_(self) -> str:
-        """The body as notebooks show it."""
+        """HTML for notebooks."""
         lines = {"dimension h": len(self.axes), "corners": len(self.corners)}
-        return notebook.table("S, whole", lines | {"has an end everywhere": self.bounded})
+        return notebook.table("S, whole", lines | {"bounded": self.bounded})
 
 
 @takes(Ensemble)
 def body(S: Ensemble) -> Body:
     """The Body of an Ensemble S of at most MOST_DIMENSIONS dimensions.
 
-    Certificates decide where S has no end: a ray balances without load and leaves no cone, both to
-    a relative 10⁻¹². Just below the friction μ′ at which S loses its end (the tangent of half the
-    angle of a groove), rounding moves far corners by a relative 10⁻¹⁴/(1 − μ/μ′): measured in
-    grooves of 10° to 179°, they are right to 10⁻⁹ up to 1 − μ/μ′ = 10⁻⁵.
+    Certificates decide where S is unbounded: a ray balances without load and leaves no cone, both
+    to a relative 10⁻¹². Just below the friction μ′ at which S becomes unbounded (the tangent of
+    half the angle of a groove), rounding moves far corners by a relative 10⁻¹⁴/(1 − μ/μ′): measured
+    in grooves of 10° to 179°, they are right to 10⁻⁹ up to 1 − μ/μ′ = 10⁻⁵.
 
-    Raises InputError where there are more dimensions, or forces are known.
+    Raises InputError if S has more dimensions, or if forces are known.
     """
     if S.known is not None:
-        raise InputError("S is drawn whole only where no forces are known: leave them out")
+        raise InputError("gf.body does not accept known forces: leave them out")
     h = S.dimension
     if h > MOST_DIMENSIONS:
-        raise InputError(f"S has {h} dimensions; up to {MOST_DIMENSIONS} can be drawn whole")
+        raise InputError(f"S has {h} dimensions; gf.body accepts at most {MOST_DIMENSIONS}")
     # By forces, not cone coordinates: their f_t, μ times a difference, is rounded μ times as much.
     origin = _inner(S)
     axes = null_space(hull.constraints(S, S.hull.held).toarray(), h)
@@ -113,8 +113,8 @@ def body(S: Ensemble) -> Body:
 def fall(packing: Packing, mu: float | None = None) -> Floats | None:
     """The motion (N, 3) of the grains, velocity and r ω, that proves that nothing balances.
 
-    Loads do work in it, and no admissible force on a contact takes any: Aᵀu ≥ 0 in cone coordinates
-    (Farkas). Its largest entry is 1. None where S is not empty, or no proof was found.
+    Loads do work in this motion, and no admissible contact force absorbs any: Aᵀu ≥ 0 in cone
+    coordinates (Farkas). Its largest entry is 1. None if S is not empty, or no proof was found.
     """
     whole = ensemble(packing, mu, prune=False)
     A, b, _ = whole.scaled_form
@@ -133,7 +133,7 @@ def fall(packing: Packing, mu: float | None = None) -> Floats | None:
 def _inner(S: Ensemble) -> Floats:
     """Forces (unknowns,) inside S, in ⟨f_n⟩, balanced to rounding.
 
-    They are of the usual size: the centre of an S that is long lies far out.
+    They are of the usual size: the centre of an elongated S lies far out.
     """
     A, y = S.scaled_form[0], S.hull.inner
     if not S.hull.held.any() and y.max(initial=0.0) > _USUAL:

@@ -1,9 +1,8 @@
 """Exact bounds: the least and largest f_n and f_t of every contact over S, and limit loads.
 
-Each bound is a linear program in cone coordinates y ≥ 0. All are solved by an interior-point method
-that carries eight programs side by side (`linear_programs`), and certified without trust in any
-solver (`certified_values`). What 400 disks at μ = 0.1 took (h = 232, 2628 programs, one thread of a
-shared machine):
+Each bound is a linear program in cone coordinates y ≥ 0. An interior-point method solves eight
+programs at a time (`linear_programs`); certificates do not rely on the solver (`certified_values`).
+Times for 400 disks at μ = 0.1 (h = 232, 2628 programs, one thread of a shared machine):
 
     HiGHS, primal simplex, each program warm-started from the last        88 s, 384 pivots each
     dense tableau, exact steepest edge, the nearest program next          51 s, 158 pivots each
@@ -38,16 +37,16 @@ class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
     contacts: Integers  # (k,) their numbers in the packing
-    low: Floats  # (k, 2) least value, force; NaN where cancelled before, or not certified
+    low: Floats  # (k, 2) least value, force; NaN if cancelled or not certified
     high: Floats  # (k, 2) largest value, force; NaN likewise
     gap: Floats  # (k, 2, 2) duality gap of [component, low or high] in ⟨f_n⟩
     backbone: Mask  # (k,) bool, largest f_n > 0
-    max_gap: float  # largest gap among the bounds that were reached
-    converged: bool  # every bound was reached with a gap ≤ INTERVAL_GAP
+    max_gap: float  # largest gap among the certified bounds
+    converged: bool  # every bound was certified with a gap ≤ INTERVAL_GAP
     counts: dict[str, int]  # programs solved, skipped by reason, solved again by HiGHS; iterations
 
     def _repr_html_(self) -> str:
-        """The bounds as notebooks show them."""
+        """HTML for notebooks."""
         lines: dict[str, Any] = {
             "contacts": len(self.contacts),
             "all bounds certified": self.converged,
@@ -61,7 +60,7 @@ class Intervals(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """One exact bound, as it is found."""
+    """One exact bound, as soon as it is computed."""
 
     contact: int  # its number in the packing
     component: int  # 0 for f_n, 1 for f_t
@@ -77,7 +76,7 @@ class LimitLoads(NamedTuple):
     load: Floats  # (k,) limit load F, force; inf without a limit; NaN: cancelled, or not certified
     gap: Floats  # (k,) duality gap in ⟨f_n⟩
     max_gap: float
-    converged: bool  # every load was reached with a gap ≤ INTERVAL_GAP
+    converged: bool  # every load was certified with a gap ≤ INTERVAL_GAP
     counts: dict[str, int]  # programs, again, iterations
 
 
@@ -98,15 +97,15 @@ def intervals(
     """Least and largest f_n and f_t over S on contacts (numbers in the packing; default all of S).
 
     workers: threads; the result does not depend on their number. states (…, N_c, 2): known
-    states of S. skip: a contact seen with f_n = 0 in one of them, or in the optimum of another
-    program, needs no program for its least f_n. watch(Bound) is called with each bound as it is
-    found, those of the largest widths (N_c,) first, which change nothing else: all upper bounds of
-    f_n, then the lower ones, then those of f_t; at last, perhaps again, those where f_n = 0 was
-    seen, which differ by INTERVAL_GAP at most. progress(done, total) is called as programs end.
-    cancel() → True ends early: what is not reached yet is NaN and ``converged`` False.
+    states of S. skip: a contact with f_n = 0 in one of them, or in the optimum of another program,
+    needs no program for its least f_n. watch(Bound) is called with each bound as it is computed:
+    all upper bounds of f_n, then the lower ones, then those of f_t, each in order of decreasing
+    widths (N_c,), which affect only this order; bounds with f_n = 0 may be sent again at the end,
+    changed by INTERVAL_GAP at most. progress(done, total) is called as programs end. cancel() →
+    True ends early: missing bounds are NaN and ``converged`` is False.
 
-    Raises InputError for a contact that carries nothing and where the forces in S are not bounded,
-    NotJammedError where S is empty, Cancelled where that was asked for before the first program.
+    Raises InputError for a contact that carries nothing and if the forces in S are not bounded,
+    NotJammedError if S is empty, Cancelled if cancelled before the first program.
     """
     places = _positions(ensemble, contacts)
     frictionless = ensemble.mu == 0
@@ -121,7 +120,8 @@ def intervals(
     system = make_system(ensemble)
 
     def seen(key: Key, y: Floats) -> None:
-        # What lower bounds attain counts as seen nowhere: the others alone tell which are needed.
+        # Networks that attain lower bounds are not used here: only the others decide which programs
+        # are needed.
         if key[1:] != (0, 0):
             known.add(y)
 
@@ -146,8 +146,8 @@ def intervals(
         return solved(ensemble, solver, [key for key in keys if key not in given])
 
     bounds = given | solve(upper)
-    # Lower bounds come early for those who watch. What is seen afterwards replaces them: the result
-    # is as if they had come last, for a program or two in a hundred more.
+    # With watch, lower bounds are computed early and replaced afterwards if f_n = 0 is seen: the
+    # result is the same, for one or two more programs in a hundred.
     bounds |= solve([key for key in lower if not zero(key)] + tangential)
     seen_zero = [key for key in lower if zero(key)]
     for key in seen_zero:
@@ -163,7 +163,7 @@ def intervals(
 
 
 def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
-    """{key: (value attained, value that bounds it)} of those whose component is known exactly."""
+    """{key: (value attained, value that bounds it)} of the components that are known exactly."""
     if ensemble.known is None:
         return {}
     value = np.stack([ensemble.known.value, -ensemble.known.value], axis=-1)
@@ -171,16 +171,16 @@ def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
 
 
 def needs_no_program(ensemble: Ensemble, system: System) -> bool:
-    """Whether all is `determined`; asked where S has no inside, or something is known, only."""
+    """Whether everything is `determined`; checked only if S has no interior or forces are known."""
     asked = ensemble.known is not None or not system.middle.reached
     return asked and ensemble.is_determined
 
 
 def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
-    """{key: (value attained, value that bounds it)} where the equations leave no freedom.
+    """{key: (value attained, value that bounds it)} of components that the equations determine.
 
-    For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
-    rounding leaves of Aᵀλ bounds the error.
+    For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. The
+    rounding error of Aᵀλ bounds the error.
     """
     known, size = ensemble.known, ensemble.per_contact
     held = np.zeros((len(ensemble.index), 2)) if known is None else known.pinned
@@ -238,14 +238,14 @@ def limit_load_bounds(
     One program per contact (numbers in the packing; default all of S), for the static limit load of
     PRE 79, 052302. The pair adds F to the normal force on the contact, in the balance and in the
     pressure, but not in the contact's own cone. (Left out of the pressure, the limit would be
-    F/(1 − F ℓ/2P0V).) Infinite where the balance of both grains is left open, as no equation then
-    has the load. Options and errors as in `intervals`.
+    F/(1 − F ℓ/2P0V).) Infinite if neither grain has to balance, as no equation then contains the
+    load. Options and errors as in `intervals`.
     """
     places = [int(place) for place in _positions(ensemble, contacts)]
     met = np.diff(ensemble.A.tocsc().indptr)[:: ensemble.per_contact] > 0
     keys = [place for place in places if met[place]]
     solver = Solver(make_system(ensemble), workers=workers, progress=progress, total=len(keys))
-    # Of each contact: maximise F, where f_n + F and f_t act on the grains.
+    # For each contact: maximise F, with f_n + F and f_t acting on the grains.
     bounds = solver.solve(keys, [Program([], [], key) for key in keys])
     bounds |= {place: (0.0, 0.0) for place in places if not met[place]}
     attained, gap = told(bounds, places)
@@ -255,14 +255,14 @@ def limit_load_bounds(
 
 
 def told(bounds: dict[Any, tuple[float, float]], keys: Sequence[Any]) -> tuple[Floats, Floats]:
-    """Values attained and duality gaps (k,) of keys; NaN where a program has not ended."""
+    """Values attained and duality gaps (k,) of keys; NaN for unfinished programs."""
     none = np.nan, np.nan
     both = np.array([bounds.get(key, none) for key in keys]).reshape(-1, 2)
     return both[:, 0], np.abs(both[:, 0] - both[:, 1])
 
 
 def _judged(gap: Floats) -> tuple[float, bool]:
-    """Largest gap reached, and whether all were reached and are small."""
+    """Largest gap, and whether all bounds are finished with small gaps."""
     reached = gap[~np.isnan(gap)]
     return float(reached.max(initial=0.0)), bool(np.all(gap <= INTERVAL_GAP))
 
@@ -287,7 +287,8 @@ def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Pro
 def solved(
     ensemble: Ensemble, solver: Solver, keys: Sequence[Key], points: dict[Any, Floats] | None = None
 ) -> Bounds:
-    """{key: (value attained, value that bounds it)} of those reached; points as for the Solver."""
+    """{key: (value attained, value that bounds it)} of finished programs; points as for the
+    Solver."""
     return solver.solve(keys, [bound_of(ensemble, *key) for key in keys], points)
 
 
@@ -295,7 +296,7 @@ class Seen:
     """The smallest f_n (N_c,) of any known state of S, in ⟨f_n⟩."""
 
     def __init__(self, ensemble: Ensemble, states: Floats | None) -> None:
-        """states (…, N_c, 2): those that are not admitted count for nothing."""
+        """states (…, N_c, 2): those that are not admitted are ignored."""
         shape = (-1, len(ensemble.index), 2)
         states = np.empty((0, *shape[1:])) if states is None else states
         states = ensemble.networks(states, "states").reshape(shape)
@@ -303,6 +304,6 @@ class Seen:
         self.least = normal.min(axis=0, initial=np.inf)
 
     def add(self, y: Floats) -> None:
-        """Take note of one more state, in cone coordinates (2 N_c,)."""
+        """Include one more state, in cone coordinates (2 N_c,)."""
         pairs = y[: 2 * len(self.least)].reshape(-1, 2)
         np.minimum(self.least, pairs.mean(axis=1), out=self.least)

@@ -1,8 +1,8 @@
-"""Have chains mixed, and how many independent states are they worth?
+"""Convergence diagnostics: have chains mixed, and what is their effective sample size?
 
 Rank-normalised split R̂ and effective sample sizes as in Vehtari et al., Bayesian Analysis 16, 667
 (2021). They compare chains with each other and cannot see a wrong target. ArviZ gives the same
-numbers, one component after the other: of thousands that takes longer than to draw them.
+numbers, one component at a time, which for thousands takes longer than sampling.
 """
 
 from typing import NamedTuple
@@ -15,11 +15,11 @@ from granforce import notebook
 from granforce.system import cancelling
 from granforce.types import Floats, Mask
 
-# Split chains of fewer draws say nothing.
+# Least number of draws for diagnostics of split chains.
 FEWEST_DRAWS = 4
 # Quantiles whose effective sample size is that of the tails.
 _TAILS = 0.05, 0.95
-# Components between two askings of cancel.
+# Components between two calls of cancel.
 _AT_ONCE = 128
 
 
@@ -50,7 +50,7 @@ class Mixing(NamedTuple):
 def mixing(draws: Floats, varies: Mask) -> Mixing:
     """Mixing of draws (chains, draws, …); varies (…): which components vary in the target at all.
 
-    A component that should vary, and does not in any chain, has R̂ = ∞ and is worth nothing.
+    A component that should vary but does not in any chain has R̂ = ∞ and an effective size of 0.
     """
     values = draws[:, :, varies]
     answers = np.full((3, values.shape[2]), np.nan)
@@ -113,7 +113,7 @@ def _effective(x: Floats) -> Floats:
     last = max(0, (n - 1) // 2 - 1)
     even, odd = correlation[:, 0 : 2 * last + 1 : 2], correlation[:, 1 : 2 * last + 2 : 2]
     pairs = even + odd
-    # The first pair that is not positive ends the sum, the last one where there is none.
+    # The sum ends at the first pair that is not positive.
     ended = pairs <= 0
     end = np.where(ended.any(axis=1), ended.argmax(axis=1), last)
     each = np.arange(components)

@@ -24,27 +24,28 @@ from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask, Progress
 
 _FIRST = 16  # directions to begin with
-_MOST = 4096  # directions after which it is given up
-# Directions closer than this (in radians) are one: the corner of two half planes that are known to
-# INTERVAL_GAP is then not known better than the tolerances asked for here.
+_MOST = 4096  # largest number of directions
+# Directions closer than this (in radians) count as one: the corner of two half planes known to
+# INTERVAL_GAP would not meet the tolerances required here.
 _CLOSEST = 1e-5
-# Smallest gap that can be asked for, in units of the axes: the programs' own is 1e-8.
+# Smallest gap that can be requested, in units of the axes: that of the programs is 1e-8.
 _FLOOR = 1e-7
 
 
 @notebook.brief
 class Outline(NamedTuple):
-    """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons run left about."""
+    """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons are
+    anticlockwise."""
 
     inner: Floats  # (k, 2) corners of a polygon inside: projections of states of S
     outer: Floats  # (m, 2) corners of a polygon outside: of certified half planes
     gap: float  # largest distance of a corner of the outer polygon from the inner one
     converged: bool  # the gap is within the tolerance
-    counts: dict[str, int]  # directions asked for; programs, again, iterations as in `Intervals`
+    counts: dict[str, int]  # directions, programs, again, iterations as in `Intervals`
 
 
 class _Support(NamedTuple):
-    """Directions d and what is known of them, in order of their angles."""
+    """Directions d with their points and bounds, in order of their angles."""
 
     d: Floats  # (n, 2) unit vectors
     point: Floats  # (n, 2) projection of a state that goes farthest along d
@@ -66,11 +67,11 @@ def outline(
 
     tolerance: largest distance of the outer polygon from the inner one, relative to the extent of
     the outline. workers: threads; the result does not depend on them. progress(done, total) counts
-    directions, total being what is known to be needed. cancel() → True ends early, with
-    ``converged`` False and the polygons found so far, or Cancelled before the first program.
+    directions; total is the number known so far. cancel() → True ends early, with ``converged``
+    False and the polygons found so far, or Cancelled before the first program.
 
-    Raises InputError for axes of another shape or of zeros and where S is not bounded,
-    NotJammedError where it is empty.
+    Raises InputError for axes of another shape or of zeros and if S is not bounded, NotJammedError
+    if it is empty.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     tolerance = positive(tolerance, "tolerance")
@@ -118,7 +119,7 @@ def supports(
 def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
     """Networks of S (k, N_c, 2), force, that go farthest along directions (k, 2) of the axes.
 
-    axes (2, N_c, 2). Raises Cancelled, and InputError where a program fails.
+    axes (2, N_c, 2). Raises Cancelled, and InputError if a program fails.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
@@ -180,7 +181,7 @@ def _normals(support: _Support, wide: Mask) -> Floats:
     normal = np.column_stack([edge[:, 1], -edge[:, 0]])
     size = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(size, np.finfo(float).tiny)[:, None]
-    # Of an edge that is all rounding error the normal may point anywhere.
+    # The normal of an edge within rounding error may point anywhere.
     between = (_cross(d, normal) > _CLOSEST) & (_cross(normal, after) > _CLOSEST)
     middle = d + after
     middle /= np.linalg.norm(middle, axis=1)[:, None]
@@ -193,7 +194,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _hull(points: Floats) -> Floats:
-    """Corners of the convex hull of points (n, 2), left about (Andrew's monotone chain)."""
+    """Corners of the convex hull of points (n, 2), anticlockwise (Andrew's monotone chain)."""
     chain: list[Any] = []
     for ordered in (np.unique(points, axis=0), np.unique(points, axis=0)[::-1]):
         begin = len(chain)
@@ -204,5 +205,5 @@ def _hull(points: Floats) -> Floats:
                     break
                 chain.pop()
             chain.append((x, y))
-        chain.pop()  # the first of the way back, or of the way there
+        chain.pop()  # the first point of either half
     return np.array(chain or points[:1].tolist())

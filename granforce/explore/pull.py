@@ -1,7 +1,7 @@
-"""Pulling a contact: the networks nearest to a given one in which its f_n has other values.
+"""Pull a contact: the networks nearest to a given one with other values of its f_n.
 
-The contact's f_n is pinned, and its f_t is whatever is nearest: a contact program whose polygon
-there is a segment. All values are solved side by side (`numerics.contact_program`).
+The contact's f_n is pinned and its f_t is free: a contact program whose polygon at this contact is
+a segment. Values are solved together (`numerics.contact_program`).
 """
 
 from typing import Any, NamedTuple
@@ -28,16 +28,17 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask
 
-# A force of zero is approached to within this (in ⟨f_n⟩), so that its contact has an inside.
+# A force of zero is approached to within this (in ⟨f_n⟩), so that its polygon has an interior.
 _LEAST = 1e-13
 _MOST_STEPS = 100
-# Values at the ends of the interval are taken this part of its width before them: the first that
-# does.
+# Fractions of the width by which values at the ends of the interval are moved inwards; the first
+# that converges is used.
 _INWARD = 1e-6, 1e-5, 1e-4
-# Of more contacts each value is taken alone: eight factors side by side leave the cache (16,500
-# contacts: 0.12 s a step of eight, 0.03 s of one), and each ends when it is there.
+# Beyond this many contacts each value is solved alone: eight factors at once exceed the cache
+# (16,500 contacts: 0.12 s for a step of eight, 0.03 s for one), and each ends as soon as it
+# converges.
 _ALONE = 5000
-# A contact is open, or slides, where that is so to within this (in ⟨f_n⟩).
+# Tolerance with which a contact counts as open or sliding (in ⟨f_n⟩).
 _AT_WALL = 1e-6
 
 
@@ -56,7 +57,7 @@ class Pull(NamedTuple):
 
 @notebook.brief
 class Reach(NamedTuple):
-    """How far f_n of one contact can be pulled, and what holds it there."""
+    """How far f_n of one contact can be pulled, and which contacts stop it."""
 
     contact: int  # its number in the packing
     low: float  # exact least f_n over S, force
@@ -86,12 +87,12 @@ def pull(
     workers: threads; no result depends on their number.
 
     Raises InputError for a contact that carries nothing, and for values outside the exact interval,
-    naming it; NotJammedError where S is empty.
+    which the message gives; NotJammedError if S is empty.
     """
     position = ensemble.position(contact)
     values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
     if not len(values):
-        raise InputError("give at least one value that the contact is pulled to")
+        raise InputError("give at least one value for the contact's force")
     if state is None:
         state = starting_network(ensemble)
     state = float_array(ensemble.network(state, "state"), (-1, 2), "state")
@@ -107,7 +108,7 @@ def pull(
 def _pulled_all(
     ensemble: Ensemble, position: int, values: Floats, state: Floats, workers: int = 1
 ) -> Floats:
-    """The networks (k, N_c, 2) of values (k,); where S has none, what comes nearest to it."""
+    """The networks (k, N_c, 2) for values (k,); the closest iterate if S has none."""
     width = 1 if len(state) > _ALONE else LANES
     groups = [values[first : first + width] for first in range(0, len(values), width)]
     with cancelling.threads(workers) as pool:
@@ -116,17 +117,17 @@ def _pulled_all(
 
 
 def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
-    """The same of up to LANES values."""
+    """The same for up to LANES values."""
     count, scale = len(values), ensemble.force_scale
     width = 1 if count == 1 else LANES
     problem = problem_of(ensemble)
     w = problem.w.copy()
     w[2 * position] = PINNED
-    start = np.repeat(problem.start[: len(w), None], width, axis=1)  # what is known stays
+    start = np.repeat(problem.start[: len(w), None], width, axis=1)  # known forces stay
     force = np.maximum(np.resize(values, width) / scale, _LEAST)
     start[2 * position : 2 * position + 2] = force
     targets = np.repeat(state[..., None] / scale, width, axis=2)
-    # Near the ends of the interval multipliers are so large that a shift of the rows would show.
+    # Near the ends of the interval multipliers are so large that shifted rows would be visible.
     search = Search(independent_problem_of(ensemble)._replace(w=w), targets, start)
     search.run(BALANCED / 4, _MOST_STEPS, count)
     states = ensemble.pin(search.forces()[:count] * scale)
@@ -137,9 +138,9 @@ def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) ->
 
 
 def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) -> Floats:
-    """The networks of values that were not reached: outside the interval, or at its very ends.
+    """The networks for values that did not converge: outside the interval, or at its ends.
 
-    At an end multipliers grow without bound: its network is taken a little before it.
+    Multipliers diverge at an end, so its network is computed slightly inside.
     """
     found = reach(ensemble, contact)
     beyond = INTERVAL_GAP * ensemble.force_scale
@@ -154,8 +155,8 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         if np.all(ensemble.admits(states)):
             return states
         raise UndecidedError(
-            f"the network nearest to the given one was not reached; contact {contact} has the same "
-            "normal force in all of them"
+            f"the nearest network was not found; contact {contact} has the same normal force in "
+            "all of them"
         )
     position = ensemble.position(contact)
     for part in _INWARD:
@@ -164,7 +165,8 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         if np.all(admitted := ensemble.admits(states)):
             return states
     between = np.clip((values - found.low) / width, 0.0, 1.0)[:, None, None]
-    # On the line between both ends lies a network with each value: S with that known has one.
+    # The segment between both ends contains a network with each value, so S with that value known
+    # is not empty.
     on_the_line = (1 - between) * found.states[0] + between * found.states[1]
     for k in np.flatnonzero(~admitted):
         states[k] = some_network(ensemble.with_normal(position, on_the_line[k]), state)
@@ -172,7 +174,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         return states
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
-        f"{contact} was not reached; take a value further from the ends of its interval, "
+        f"{contact} was not found; choose a value further from the ends of its interval, "
         f"{found.low:.9g} to {found.high:.9g}"
     )
 
@@ -184,11 +186,11 @@ def reach(
 ) -> Reach:
     """Exact least and largest f_n of one contact (its number in the packing); a Reach.
 
-    Contacts that are open or slide at an end are those that hold f_n there. workers: threads; no
+    Contacts that are open or slide at an end are those that stop f_n there. workers: threads; no
     result depends on their number.
 
-    Raises InputError for a contact that carries nothing, UndecidedError where the interval could
-    not be certified, NotJammedError where S is empty.
+    Raises InputError for a contact that carries nothing, UndecidedError if the interval could not
+    be certified, NotJammedError if S is empty.
     """
     position = ensemble.position(contact)
     keys = [(position, 0, side) for side in (0, 1)]
@@ -211,7 +213,7 @@ def reach(
 
 
 def _balanced(ensemble: Ensemble, y: Floats) -> Floats:
-    """The network (N_c, 2) of a vertex, balanced to rounding where it is not to BALANCED."""
+    """The network (N_c, 2) of a vertex, balanced to rounding if its residual exceeds BALANCED."""
     forces = forces_of(ensemble, y)
     if ensemble.residual(forces) <= BALANCED:
         return forces

@@ -1,8 +1,8 @@
 """The paper's random walk in S: perturb every force, relax to an equilibrium, accept or stay.
 
 The paper relaxes by contact dynamics: relax=gauss_seidel with rest=None and tolerance=EQUILIBRIUM.
-By default the network nearest to the perturbed one is taken, which is found 10 to 400 times faster
-and for every perturbation; it visits the same kind of states (see `granforce bench`, part walks).
+By default the walk moves to the network nearest to the perturbed one, which is 10 to 400 times
+faster and always exists; it visits the same kind of states (see `granforce bench`, part walks).
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Cancel, Floats, Integers, Progress
 
-# Chains from which on a thread steps them side by side: eight lanes cost as much as three chains.
+# Number of chains from which a thread vectorises them: eight lanes cost as much as three chains.
 WORTH_LANES = 4
-SHUFFLED = ("order", "seed")  # options of relaxations that each have their own order of contacts
+SHUFFLED = ("order", "seed")  # options of relaxations with their own order of contacts
 
 
 Seed = int | np.random.SeedSequence
@@ -43,23 +43,23 @@ Relax = Callable[..., Relaxation]  # as `nearest`
 
 @notebook.brief
 class Walk(NamedTuple):
-    """Accepted states of one or more chains, and what it took to reach them."""
+    """Accepted states of one or more chains, and the effort to reach them."""
 
     states: Floats  # (S, N_c, 2) admissible networks, force
     residual: Floats  # (S,) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (S,) in ⟨f_n⟩, by Ensemble.violation
-    sweeps: Integers  # (S,) solver iterations spent since the state before, failures included
-    attempts: Integers  # (S,) perturbations tried since the state before
+    sweeps: Integers  # (S,) solver iterations since the previous state, failures included
+    attempts: Integers  # (S,) perturbations since the previous state
     counts: dict[str, int]  # accepted, rejected (no equilibrium), unconverged, skipped (a point)
 
     @property
     def acceptance(self) -> float:
-        """Part of all attempts that gave a new state (1 where none was needed)."""
+        """Fraction of attempts that gave a new state (1 if none was needed)."""
         tried = sum(self.counts[name] for name in ("accepted", "rejected", "unconverged"))
         return self.counts["accepted"] / tried if tried else 1.0
 
     def _repr_html_(self) -> str:
-        """The walk as notebooks show it."""
+        """HTML for notebooks."""
         lines = {"states": len(self.states), "acceptance": self.acceptance, **self.counts}
         if self.states.size:
             lines |= {"η1": measures.eta1(self.states), "η2": measures.eta2(self.states)}
@@ -70,14 +70,14 @@ class Walk(NamedTuple):
 
 @notebook.brief
 class Found(NamedTuple):
-    """One accepted state of a walk under way, as `watch` of `walk` gets it."""
+    """One accepted state of a running walk, as passed to `watch` of `walk`."""
 
     chain: int
     number: int  # among the chain's states, from 0
     forces: Floats  # (N_c, 2) its own copy
     residual: float  # ⟨f_n⟩
     violation: float  # ⟨f_n⟩
-    attempts: int  # perturbations tried since the state before
+    attempts: int  # perturbations since the previous state
 
 
 def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
@@ -110,19 +110,19 @@ def walk(
 ) -> Walk:
     """Random walk until `states` accepted states in all; chains follow each other in the result.
 
-    chains: independent walks from the original network, states shared out evenly; workers: threads
-    they run on; many chains go side by side in each. Neither changes the result. relax, options:
-    the relaxation and its options. max_attempts: per chain, by default 20 per state. whole: whether
-    fewer states than wanted are an error; else there may be fewer, or none.
-    begun: a Walk of one chain, otherwise the same, with fewer states: its chain goes on. enough():
-    asked after each state of a chain that is alone; True ends it with the states that it has.
-    progress(done, total); watch(Found) gets each state as it is accepted, from the thread that
-    found it; neither changes the result. cancel() returning True raises Cancelled.
+    chains: independent walks from the original network, with states divided evenly; workers:
+    threads, each of which vectorises many chains. Neither changes the states of a chain. relax,
+    options: the relaxation and its options. max_attempts: per chain, by default 20 per state.
+    whole: whether fewer states than requested are an error; otherwise there may be fewer, or none.
+    begun: a Walk of one chain with the same arguments and fewer states, which is continued.
+    enough(): called after each state of a single chain; True ends it with the states so far.
+    progress(done, total); watch(Found) receives each state as it is accepted, from the worker
+    thread; neither changes the result. cancel() returning True raises Cancelled.
 
-    Where S is a single point (h = 0) every state is that point and no relaxation is done, unless
-    skip is False: sweeps end where the unbalance is small, which is not quite that point. Raises
-    InputError for sizes below 1, and for more than one chain that goes on or ends by `enough`;
-    NotJammedError when max_attempts bring too few of a whole walk.
+    If S is a single point (h = 0), every state is that point and no relaxation is done, unless skip
+    is False: sweeps end at a small residual, not exactly at that point. Raises InputError for sizes
+    below 1, and for several chains with `begun` or `enough`; NotJammedError if max_attempts yield
+    too few states of a whole walk.
     """
     states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)
@@ -134,13 +134,13 @@ def walk(
         raise InputError(f"relax must be a function, such as granforce.nearest, got {brief(relax)}")
     check_memory(16 * states * len(ensemble.index), f"{states} states")
     if chains > 1 and not (begun is None and enough is None):
-        raise InputError("only one chain alone goes on from a walk, or ends when it is enough")
+        raise InputError("begun and enough need a single chain")
     all_chains = [
         _Chain(ensemble, k, states // chains + (k < states % chains), own, max_attempts, whole)
         for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
     ]
     if begun is not None:
-        ensemble.refuse_foreign(begun.states, begun.residual, "the walk to go on from")
+        ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
         all_chains[0].go_on(begun, watch)
 
     def tell() -> None:
@@ -172,7 +172,8 @@ def _joined(walks: Sequence[Walk]) -> Walk:
 def _groups(
     chains: list[_Chain], relax: Relax, workers: int, options: dict[str, Any]
 ) -> list[list[_Chain]]:
-    """Chains that go side by side, in lanes if there are enough; it changes nothing in them."""
+    """Groups of chains that run together, vectorised if there are enough; states do not depend on
+    it."""
     in_lanes = relax is nearest or (relax is gauss_seidel and options.keys().isdisjoint(SHUFFLED))
     together = min(LANES, -(-len(chains) // workers))
     together = together if in_lanes and together >= WORTH_LANES else 1
@@ -187,7 +188,7 @@ def _run(
     enough: Callable[[], bool] | None,
     options: dict[str, Any],
 ) -> None:
-    """All chains of a group to their end."""
+    """Run all chains of a group."""
     at_own_pace = relax is gauss_seidel and len(group) > 1
     found = _each_at_its_pace(group, options) if at_own_pace else _in_step(group, relax, options)
     for chain, relaxation in found:
@@ -200,7 +201,7 @@ def _run(
         cancelling.check("random walk")
 
 
-# Each yields (chain, relaxation of its kicked state) until no chain goes on.
+# Each yields (chain, relaxation of its perturbed state) until all chains have ended.
 
 
 def _in_step(
@@ -233,7 +234,7 @@ def _each_at_its_pace(
 
 
 class _Chain:
-    """One chain of a walk, and the states it has found."""
+    """One chain of a walk, and its states."""
 
     def __init__(
         self,
@@ -260,15 +261,15 @@ class _Chain:
 
     @property
     def done(self) -> bool:
-        """Whether it has all its states, or may end without them."""
+        """Whether it has all its states, or may end early."""
         ended = not self.whole and sum(self.counts.values()) >= self.limit
         return ended or self.ended or self.counts["accepted"] == len(self.walk.states)
 
     def go_on(self, begun: Walk, watch: Callable[[Found], object] | None) -> None:
-        """Take over the states of a walk that was the same so far, and its place in the stream."""
+        """Continue from the states of an earlier walk, at its place in the random stream."""
         tried = int(begun.attempts.sum())
         if len(begun.states) > len(self.walk.states) or tried != sum(begun.counts.values()):
-            raise InputError("the walk to go on from has more states, or ended between two")
+            raise InputError("the walk to continue has more states, or ended between two")
         self.counts.update(begun.counts)
         count = len(begun.states)
         self.walk.states[:count], self.walk.residual[:count] = begun.states, begun.residual
@@ -284,13 +285,13 @@ class _Chain:
     def kicked(self) -> Floats:
         """The start of the next attempt: to every component a number uniform in ±⟨F_n⟩ is added.
 
-        Raises NotJammedError where there were too many.
+        Raises NotJammedError after too many attempts.
         """
         if sum(self.counts.values()) >= self.limit:
             raise NotJammedError(
                 f"only {self.counts['accepted']} of {len(self.walk.states)} states after "
                 f"{self.limit} attempts ({self.counts['rejected']} rejected, "
-                f"{self.counts['unconverged']} unconverged): allow more iterations, or take "
+                f"{self.counts['unconverged']} unconverged): allow more iterations, or use "
                 "another relaxation"
             )
         amplitude = np.mean(self.forces[:, 0])
@@ -300,7 +301,7 @@ class _Chain:
         return self.forces + kick
 
     def take(self, relaxation: Relaxation, options: dict[str, Any]) -> bool:
-        """Count an attempt, and keep its state if it is accepted; whether it was."""
+        """Count an attempt, and store its state if accepted; returns whether it was."""
         walk, k = self.walk, self.counts["accepted"]
         outcome = judge(relaxation, options.get("tolerance", BALANCED))
         self.counts[outcome] += 1
@@ -325,14 +326,14 @@ class _Chain:
         )
 
     def stay(self) -> None:
-        """Every state is where the chain stands: S is this one point."""
+        """All states are the current one: S is a single point."""
         self.counts["skipped"] = len(self.walk.states)
         self.walk.states[:] = self.forces
         self.walk.residual[:] = self.ensemble.residual(self.forces)
         self.walk.violation[:] = self.ensemble.violation(self.forces)
 
     def walked(self) -> Walk:
-        """The walk with the states that it has."""
+        """The walk with its states so far."""
         count = self.counts["accepted"] + self.counts["skipped"]
         return Walk(
             states=self.walk.states[:count],

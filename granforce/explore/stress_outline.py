@@ -1,4 +1,4 @@
-"""Which stresses a packing's contacts can carry at its pressure: an exact outline in a plane.
+"""The stresses that a packing's contacts can carry at its pressure: an exact outline in a plane.
 
 A stress of given pressure P is a point ((σ_xx − σ_yy)/2P, σ_xy/P); its distance from the origin is
 the ratio of the largest shear stress to the pressure, whatever the directions of the box. Both are
@@ -32,17 +32,17 @@ class StressOutline(NamedTuple):
     inner: Floats  # (n, 2) corners of a polygon inside: stresses of networks in S
     outer: Floats  # (m, 2) corners of a polygon outside, of certified half planes
     friction: float  # largest shear stress over pressure of any network in S
-    friction_bound: float  # what it is certain not to exceed
+    friction_bound: float  # certified upper bound of it
     own: Floats  # (2,) the stress of the packing's own network
-    converged: bool  # the polygons are as close as asked for
+    converged: bool  # the polygons agree within the tolerance
     counts: dict[str, int]  # as in `Outline`
 
     def _repr_html_(self) -> str:
-        """The outline as notebooks show it."""
+        """HTML for notebooks."""
         lines = {
             "largest shear stress / pressure": self.friction,
             "of the packing's own network": float(np.hypot(*self.own)),
-            "certainly not above": self.friction_bound,
+            "certified upper bound": self.friction_bound,
             **self.counts,
         }
         return notebook.table("Stresses that the contacts can carry", lines)
@@ -63,7 +63,7 @@ def stress_outline(
     angles: how many, evenly spaced from 0 on, or the angles themselves (k,). workers, progress,
     cancel: as for `outline`. `stress_plane` gives the points of any networks.
 
-    Raises InputError where the pressure is not prescribed, or the whole stress is.
+    Raises InputError if the pressure is not prescribed, or if the whole stress is.
     """
     if not isinstance(angles, (list, tuple, np.ndarray)):
         count = whole(angles, "the number of angles", 1, 4096)
@@ -110,10 +110,10 @@ def plane_of(stresses: Floats) -> Floats:
 def stress_axes(ensemble: Ensemble) -> Floats:
     """Axes (2, N_c, 2) of the plane of stresses, for forces in ⟨f_n⟩.
 
-    Raises InputError where the pressure is not prescribed, or the whole stress is.
+    Raises InputError if the pressure is not prescribed, or if the whole stress is.
     """
     if not ensemble.has_pressure_row:
-        raise InputError("stresses are compared at a prescribed pressure; none is prescribed here")
+        raise InputError("an outline of stresses needs a prescribed pressure")
     if ensemble.prescribed == "stress":
         raise InputError("the whole stress is prescribed: prescribe the pressure for an outline")
     packing = ensemble.packing

@@ -1,4 +1,4 @@
-"""K of a thin S by singular values, where pivots of A C Aᵀ do not tell its rows apart.
+"""K of a thin S by singular values, for use when pivots of A C Aᵀ cannot distinguish its rows.
 
 Those pivots are squares: at μ = 10⁻⁷, what friction adds to a row that else follows from others
 (as the rows of the stress do) is 10⁻¹⁴ of it, which is rounding. With the columns of N orthonormal
@@ -53,7 +53,7 @@ class ThinMatrix(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """What a balance leaves free, and what restores it, before y weights them."""
+    """The null space of a balance and the correction that restores it, before weighting by y."""
 
     free: Floats  # (w, h) orthonormal
     inverse: Floats  # (w, rows) the least change of y that takes up an unbalance

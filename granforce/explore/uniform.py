@@ -1,7 +1,7 @@
-"""Uniform sampling of S: states of equal density in the affine hull of S, and how well it mixed.
+"""Uniform sampling of S: states of equal density in the affine hull of S, with diagnostics.
 
-Unlike the paper's walk, whose measure is not known, the walks used here have the uniform measure
-as their stationary one (see `billiard`), from whatever state they start.
+Unlike the paper's walk, whose measure is not known, these walks have the uniform measure as their
+stationary one (see `billiard`), for any initial state.
 """
 
 import copy
@@ -28,10 +28,10 @@ from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
-# Mean length of a path in root mean square distances of states from the centre; what an effective
-# state costs has its minimum, a flat one, near this.
+# Mean length of a path in root mean square distances of states from the centre; the cost of an
+# effective state has a flat minimum near this.
 PATH = 2.0
-# Paths between states that are kept: 1000 states are then worth 400 to 700 independent ones.
+# Paths between stored states: the effective size of 1000 states is then 400 to 700.
 PATHS_PER_STATE = 2
 # Paths whose directions are drawn side by side; after each such batch rounding is taken off.
 BATCH = lanes.LANES
@@ -43,7 +43,7 @@ WARM_UP = 20, 40
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed., 11.4);
 # the largest R̂ of 1300 components of chains that have is 1.01 for 1000 states, 1.06 for 200.
 MIXED = 1.1
-# A run that wants an effective sample size ends at this many times as many states.
+# With an effective sample size requested, a run ends at this many times as many states.
 MOST_STATES = 10
 # States of each chain between two calls of progress and cancel.
 ROUND = 20
@@ -52,27 +52,27 @@ METHODS = ("billiard", "hit_and_run")
 
 
 class ChainState(NamedTuple):
-    """Where a chain stands: its place and its own random stream."""
+    """State of a chain: its position and its random stream."""
 
     slacks: Floats  # (walls,) s
     rng: np.random.Generator
     paths: int = 0  # taken so far
 
 
-# Chains where they end, their slacks (chains, count, walls) after each path or state, and how often
-# each turned at walls and how many paths were refused for that (chains, 2).
+# Final chains, their slacks (chains, count, walls) after each path or state, and the numbers of
+# reflections and of paths rejected for too many (chains, 2).
 Flown = tuple[list[ChainState], Floats, Integers]
 
 
 @notebook.brief
 class UniformSample(NamedTuple):
-    """Uniform states of S by chain, and whether they can be trusted."""
+    """Uniform states of S by chain, with diagnostics."""
 
     states: Floats  # (chains, k, N_c, 2) admissible networks, force
     residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
-    reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
+    reached: bool  # complete, all in S, R̂ ≤ MIXED, and the effective sample size as requested
     counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates, skipped states
     setup_seconds: float  # wall time of the walls
     sampling_seconds: float  # wall time of the steps, those dropped included
@@ -101,7 +101,7 @@ class UniformSample(NamedTuple):
 def init(made: Walls, seed: int | np.random.SeedSequence) -> ChainState:
     """A chain on a random ray from the centre, nine tenths of the way to the wall.
 
-    Chains so start far from each other, which R̂ relies on. seed: as for numpy.random.default_rng.
+    Chains thus start far from each other, as R̂ requires. seed: as for numpy.random.default_rng.
     """
     rng = np.random.default_rng(seed)
     direction = made.moved(rng.standard_normal((1, made.count)))[0]
@@ -217,17 +217,16 @@ def sample_uniform(
 ) -> UniformSample:
     """At least `states` states of S in all, uniform in its affine hull; a UniformSample.
 
-    chains: independent chains of equal length (states are rounded up to that); workers: threads,
-    which change nothing in the result. effective: effective sample size (bulk and tail, of every
-    component) that is wanted: more states are drawn, up to MOST_STATES times the larger of both
-    numbers, until it is reached; ``reached`` tells whether it was. method: "billiard", or
-    "hit_and_run", a slow second witness. previous: a UniformSample of this ensemble to go on with,
-    as if it had never ended; its chains and method are taken. progress(done, total) counts states;
-    cancel() → True ends early with the states there are; before there is any chart of S it raises
-    Cancelled.
+    chains: independent chains of equal length (states are rounded up to that); workers: threads;
+    the result does not depend on their number. effective: requested effective sample size (bulk and
+    tail, of every component): more states are drawn, up to MOST_STATES times the larger of both
+    numbers, until it is reached; ``reached`` says whether it was. method: "billiard", or
+    "hit_and_run", a slow independent check. previous: a UniformSample of this ensemble to continue,
+    with its chains and method. progress(done, total) counts states; cancel() → True ends early with
+    the states so far, or raises Cancelled before sampling has begun.
 
-    Where S is one point (h = 0) every state is that point and no path is taken. Raises InputError
-    for sizes below 1 or forces without bounds, NotJammedError where S is empty.
+    If S is one point (h = 0), every state is that point. Raises InputError for sizes below 1 or
+    unbounded forces, NotJammedError if S is empty.
     """
     states, chains = whole(states, "states", 1), whole(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)
@@ -239,7 +238,7 @@ def sample_uniform(
     if previous is None:
         sample, stores = _start(ensemble, chains, seed, method, workers)
     else:
-        ensemble.refuse_foreign(previous.states, previous.residual, "the sample to go on from")
+        ensemble.refuse_foreign(previous.states, previous.residual, "the sample to continue")
         sample, stores = previous, stores_for(previous.walls, len(previous.ends), workers)
     most = MOST_STATES * max(states, effective or 0)
     while True:
@@ -256,7 +255,7 @@ def sample_uniform(
 
 
 def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:
-    """Where so many chains begin, each with a random stream of its own."""
+    """Initial states of the chains, each with its own random stream."""
     return [init(made, own) for own in np.random.SeedSequence(seed).spawn(chains)]
 
 
@@ -400,7 +399,7 @@ def _extend(
 
 
 def inside(residual: Floats, violation: Floats) -> bool:
-    """Whether all states are in S, by the judges of the ensemble."""
+    """Whether all states are in S, by residual and violation."""
     return bool(np.all(residual <= BALANCED) and np.all(violation <= ADMISSIBLE))
 
 

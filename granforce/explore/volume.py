@@ -1,18 +1,18 @@
-"""The volume of S: how many networks there are, by a ladder of normal distributions cut by walls.
+"""The volume of S, by a ladder of normal distributions truncated by the walls.
 
-With q = |s − 1|² of the slacks (see `walls`) and Z(β) = ∫_S exp(−½ β q), the volume is Z(0). At a
-large β hardly a wall is met: Z = (2π/β)^(h/2) P, where P is the part of independent normal states
-that lie in S. From there steps lead down to β = 0, each so short that the logarithm of what is
-averaged has a standard deviation of STEP:
+With q = |s − 1|² of the slacks (see `walls`) and Z(β) = ∫_S exp(−½ β q), the volume is Z(0). At
+large β walls hardly matter: Z = (2π/β)^(h/2) P, where P is the part of independent normal states
+that lie in S. From there, steps go down to β = 0, each so short that the logarithm of the averaged
+quantity has a standard deviation of STEP:
 
     Z(β′)/Z(β) = ⟨exp(½ (β − β′) q)⟩_β = 1/⟨exp(−½ (β − β′) q)⟩_β′
 
-The geometric mean of both takes off the bias of either to first order. Draws follow harmonic paths
+The geometric mean of both removes the bias of either to first order. Draws follow harmonic paths
 between the walls (`billiard.fly`) from random speeds w. Near the top of the ladder |w|², which has
-a known distribution (χ² with h degrees of freedom), tells most of q: what it tells is taken off
-(control variates), by slopes that the other ladder has found. Two ladders are climbed by chains of
-their own, one down from the narrowest distribution and one up from uniform states: were chains too
-short to forget where they came from, both would differ.
+a known distribution (χ² with h degrees of freedom), determines most of q: its contribution is
+removed (control variates), with slopes from the other ladder. Two ladders use separate chains, one
+down from the narrowest distribution and one up from uniform states: if chains were too short to
+forget their start, the two would differ.
 """
 
 import itertools
@@ -63,8 +63,8 @@ class Volume(NamedTuple):
     error: float  # its standard error
     dimension: int  # h
     per_grain: float  # ln V over the number of grains of the backbone
-    ladders: Floats  # (2,) ln V by the way down and by the way up
-    reached: bool  # the error is the wanted one, and both ladders agree
+    ladders: Floats  # (2,) ln V from the ladder down and from the ladder up
+    reached: bool  # the error is as requested, and both ladders agree
     counts: dict[str, Any]  # rungs, paths, turns, refused paths
     seconds: float  # wall time
 
@@ -76,7 +76,7 @@ class Volume(NamedTuple):
         return float(np.exp(self.log_volume / self.dimension) / np.sqrt(2 * np.pi * math.e))
 
     def _repr_html_(self) -> str:
-        """The volume as notebooks show it."""
+        """HTML for notebooks."""
         lines = {
             "dimension h": self.dimension,
             "ln V": self.log_volume,
@@ -101,11 +101,11 @@ def volume(
     """ln V of S with a standard error of `accuracy`; a Volume.
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
-    of ⟨f_n⟩; a single point has ln V = 0. workers: threads, which change nothing in the result.
-    progress(done, total) counts paths, of as many as seem to be needed.
+    of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
+    number. progress(done, total) counts paths; total is an estimate.
 
-    Raises InputError for an accuracy below LEAST_ACCURACY and forces without bounds, NotJammedError
-    where S is empty.
+    Raises InputError for an accuracy below LEAST_ACCURACY and unbounded forces, NotJammedError if S
+    is empty.
     """
     begin = time.perf_counter()
     accuracy, seed = positive(accuracy, "accuracy", least=LEAST_ACCURACY), random_seed(seed)

@@ -1,4 +1,4 @@
-"""S by its walls: the slack of each, relative to that at a centre, is all that sampling moves.
+"""S by its walls: sampling moves only the slack of each wall, relative to that at a centre.
 
 At the centre f° of S every slack is s = 1. Around the analytic centre (the largest Π y of the cone
 coordinates y ≥ 0 and of what is left of known bounds), S contains the ball |s − 1| ≤ 1 and lies in
@@ -79,8 +79,8 @@ def walls(
     walls, which has the largest Σ log y − ½ Σ W (f − m)², in place of the analytic one; K then has
     W in its stiffness.
 
-    Raises NotJammedError where S is empty, InputError where the centre lies at infinity,
-    UndecidedError where no solver could tell, or S is thinner than rounding.
+    Raises NotJammedError if S is empty, InputError if the centre lies at infinity, UndecidedError
+    if no solver could decide, or S is thinner than rounding.
     """
     y = ensemble.hull.inner
     setup = _setup(ensemble, weight, measured)
@@ -92,21 +92,21 @@ def walls(
         centre = _centred(setup, y, matrix_at)
     if centre is None and np.any(weight):
         raise UndecidedError(
-            "no centre of what is measured was found: its errors are too small, for the forces or "
-            "beside each other; take larger ones"
+            "no centre of the measurement was found: its errors are too small, or too different "
+            "from each other; use larger errors"
         )
     if centre is None:
         raise InputError(certificates.UNBOUNDED)
     if not np.all(centre >= 0):
         raise UndecidedError(
-            "these conditions leave so little room to the forces that rounding hides it: take a "
-            "larger friction coefficient, or prescribe less"
+            "these conditions leave too little freedom to resolve: use a larger friction "
+            "coefficient, or prescribe less"
         )
     return _walls(setup, centre, matrix_at)
 
 
 class _Setup(NamedTuple):
-    """What does not change while the centre is looked for."""
+    """Constants of the search for the centre."""
 
     ensemble: Ensemble
     problem: Problem  # its balance, independent rows
@@ -219,7 +219,7 @@ class _Thin:
 def _balanced(
     setup: _Setup, y: Floats, matrix: WallMatrix | ThinMatrix, moving: Integers
 ) -> Floats:
-    """y, what it lacks of the balance added."""
+    """y, corrected to balance."""
     if isinstance(matrix, ThinMatrix):
         A, _, _ = setup.ensemble.scaled_form
         lacking = matrix.inverse @ (setup.ensemble.hull.b - A @ y)
@@ -237,7 +237,7 @@ def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
 
 
 def _is_thin(setup: _Setup, y: Floats) -> bool:
-    """Whether the sparse factor lost rows of the balance at y, as dense matrices tell."""
+    """Whether the sparse factor lost rows of the balance at y, checked by dense matrices."""
     ensemble = setup.ensemble
     A, b = ensemble.scaled_form[0], ensemble.hull.b
     if A.shape[0] > MOST_DENSE:
@@ -265,7 +265,7 @@ def _centred(
 ) -> Floats | None:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps.
 
-    None where they do not end: it may lie at infinity.
+    None if they do not converge: it may lie at infinity.
     """
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")

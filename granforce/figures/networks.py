@@ -49,7 +49,7 @@ def force_densities(
     """Figure 3 of every contact and any number of states, counted by `ratio_counts`.
 
     groups: {μ: (original (N_c,), counts (N_c, bins), least (N_c,), extent (N_c,))}. Colours tell
-    which part of the states has the ratio, bars the interval seen in all of them.
+    which fraction of the states has the ratio, bars the interval seen in all of them.
     """
     style.ready(backend)
     frames = []
@@ -62,7 +62,7 @@ def force_densities(
         image = hv.Image((x, middles, np.where(part > 0, part, np.nan)), ["x", "y"], "part")
         look = {"cmap": "viridis_r", "clim": (1e-3, 1), "logz": True}
         look["colorbar"] = k % 2 == 1 or len(groups) == 1  # there is room at the right edge
-        drawn = [image.opts(backend=backend, clabel="part of the states", **look)]
+        drawn = [image.opts(backend=backend, clabel="fraction of the states", **look)]
         frames.append(_ratios(mu, drawn, original, least, extent, chosen, LARGEST, backend))
     return style.page(frames, backend, columns=2)
 

@@ -53,8 +53,8 @@ def prescribed_stress(
     closed = np.isfinite(packing.volume) and not np.isnan(packing.pressure)
     if prescribed == "none" and closed and not held.any() and not packing.load.any():
         raise InputError(
-            "with nothing prescribed nothing says how large the forces are: prescribe the pressure "
-            "or the stress, or freeze contacts"
+            "without a prescribed pressure or stress, the scale of the forces is undetermined: "
+            "prescribe one, or freeze contacts"
         )
     if prescribed == "none":
         return None
@@ -62,7 +62,8 @@ def prescribed_stress(
         return np.array([packing.pressure]) if closed and not held.any() else None
     if held.any():
         raise InputError(
-            "the stress cannot be prescribed where contacts are frozen: their forces decide it"
+            "the stress cannot be prescribed together with frozen contacts, whose forces "
+            "determine it"
         )
     if not np.isfinite(packing.volume):
         raise InputError("the stress can be prescribed in a periodic box only; this one is open")
@@ -70,11 +71,11 @@ def prescribed_stress(
         stress = stress_of(packing, packing.forces)
         if not stress[0] + stress[1] > 0:
             raise InputError(
-                "the packing has no forces of its own to take the stress from: give the stress"
+                "the packing has no forces from which to compute the stress: give the stress"
             )
     stress = float_array(stress, (3,), "stress")
     if not stress[0] + stress[1] > 0:
-        raise InputError("a stress must press: σ_xx + σ_yy must be above 0")
+        raise InputError("the stress must be compressive: σ_xx + σ_yy must be above 0")
     return stress
 
 

@@ -56,7 +56,7 @@ def ensemble(
     loaded = np.nan_to_num(packing.load).any()
     if np.isnan(packing.pressure) and not packing.forces.any() and not loaded:
         raise InputError(
-            "all forces are zero, and nothing says how large they are: give forces, a pressure, or "
+            "all forces are zero, and their scale is undetermined: give forces, a pressure, or "
             "loads on the grains"
         )
     bounds = None if known is None else knowledge.bounds_of(known, count)
@@ -116,8 +116,8 @@ def _check_frozen_and_known(
     wrong = np.flatnonzero(held & (outside.max(axis=1) > ADMISSIBLE * scale))
     if len(wrong):
         raise InputError(
-            f"contact {wrong[0]} is frozen at a force that contradicts what is known of it: leave "
-            "one of both out"
+            f"contact {wrong[0]} is frozen at a force that contradicts its known force: leave out "
+            "one of the two"
         )
 
 
@@ -140,7 +140,7 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
     if not len(free):
         if held.any():
             raise InputError(
-                "no free contact can carry a force; freeze fewer contacts, or take a larger slice"
+                "no free contact can carry a force; freeze fewer contacts, or use a larger slice"
             )
         raise NotJammedError("the packing has no contact that could carry a load")
     contacts = packing.contacts.picked(free)

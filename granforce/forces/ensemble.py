@@ -257,7 +257,7 @@ class Ensemble:
         if len(self.frozen):
             lines["frozen contacts"] = len(self.frozen)
         if self.known is not None:
-            lines["contacts of which something is known"] = int(self.known.informed.sum())
+            lines["contacts with a known force"] = int(self.known.informed.sum())
         left_out = {name.replace("_", " "): n for name, n in self.skipped.items() if n}
         return notebook.table("Admissible force networks S", lines | left_out)
 
@@ -290,8 +290,8 @@ class Ensemble:
         unknown = contacts[~np.isin(contacts, self.index)]
         if len(unknown):
             raise InputError(
-                f"contact {unknown[0]} is none of the {len(self.index)} that carry a load in this "
-                "packing"
+                f"contact {unknown[0]} is not one of the {len(self.index)} that carry a load in "
+                "this packing"
             )
         return np.searchsorted(self.index, contacts)
 
@@ -306,7 +306,7 @@ class Ensemble:
         count = len(self.index)
         if forces.shape[-2:] != (count, 2):
             raise InputError(
-                f"{name} of shape {forces.shape} are no networks of this ensemble, which has "
+                f"{name} of shape {forces.shape} are not networks of this ensemble, which has "
                 f"{count} contacts: (…, {count}, 2)"
             )
         return forces
@@ -332,7 +332,7 @@ class Ensemble:
         forces = self.networks(forces, name)
         balanced = np.all(self.residual(forces) <= np.maximum(AT_REST, 2 * np.asarray(residual)))
         if not (balanced and np.all(self.violation(forces) <= AT_REST)):
-            raise InputError(f"{name} belongs to another ensemble: it has no networks of this one")
+            raise InputError(f"{name} belongs to another ensemble")
 
     def to_vector(self, forces: Any) -> Any:
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""

@@ -75,7 +75,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
         raise InputError(f"a known contact is none of the packing's 0 … {count - 1}")
     contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
-        raise InputError("a bound is NaN; give −inf and inf where nothing is known")
+        raise InputError("a bound is NaN; use −inf and inf for unknown bounds")
     bounds = np.empty((count, 2, 2))
     bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
     np.maximum.at(bounds[..., 0], contacts, low)
@@ -85,7 +85,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     if len(wrong):
         c, k = wrong[0]
         raise InputError(
-            f"what is known of {_NAMES[k]} of contact {c} contradicts itself: at least "
+            f"what is known of {_NAMES[k]} of contact {c} is contradictory: at least "
             f"{bounds[c, k, 0]:.6g}, at most {bounds[c, k, 1]:.6g}"
         )
     return bounds
@@ -266,4 +266,4 @@ def _statements(
                 text += f" (would have to give {given[k]:.3g})"
             told.append(text)
     together = "; ".join(told)
-    return f"no network agrees with all that is known; these cannot hold together: {together}"
+    return f"no network agrees with all known forces; these conflict: {together}"

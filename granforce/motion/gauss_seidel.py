@@ -149,8 +149,8 @@ def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """
     if ensemble.prescribed == "stress" or ensemble.known is not None:
         raise InputError(
-            "contact dynamics keeps the pressure and Coulomb's law only: with a prescribed stress, "
-            "or known forces, take the nearest network"
+            "contact dynamics supports only the pressure and Coulomb's law: with a prescribed "
+            "stress, or known forces, use the nearest network"
         )
     contacts, grains = ensemble.contacts, ensemble.grains
     longest = float(ensemble.packing.r.max())

@@ -17,8 +17,8 @@ def make_step(ensemble: Ensemble) -> Step:
     """
     if ensemble.known is not None:
         raise InputError(
-            "grains that move change their forces, whatever is known of them: perturb the packing "
-            "without known forces (its limit loads can be had with them)"
+            "moving grains change their forces, so known forces cannot hold: perturb the packing "
+            "without them (limit loads accept known forces)"
         )
     network, b, b_border, _, place = balance_of(ensemble)
     # Rows that nothing acts on (torques without friction) may have any mass.

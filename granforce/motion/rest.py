@@ -65,7 +65,7 @@ def rest(
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, **conditions)
     draws = whole(draws, "draws", least=1)
     if not S.original.any():
-        raise InputError("the packing has no forces of its own that could come to rest")
+        raise InputError("the packing has no forces to check for rest")
     step, own = make_step(S), S.original / S.force_scale
     first = relax(step, _from(own))
     if not first.at_rest:

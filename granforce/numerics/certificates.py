@@ -27,7 +27,7 @@ _BALANCED_DIRECTION = 1e-13
 _USUAL_MEAN = 2.0
 UNBOUNDED = (
     "the forces on these contacts are not bounded: prescribe a pressure or a load, give bounds on "
-    "single forces, or freeze contacts all around them"
+    "single forces, or freeze the surrounding contacts"
 )
 
 
@@ -48,8 +48,8 @@ def why_unsolved(
     if recession(A) is not None:
         return InputError(UNBOUNDED)
     return UndecidedError(
-        "whether these contacts can be in balance is undecided: linear programs over their forces "
-        "ended without a result that could be checked; change a contact or the friction slightly"
+        "whether these contacts can balance is undecided: linear programs over their forces gave "
+        "no result that could be checked; change a contact or the friction slightly"
     )
 
 

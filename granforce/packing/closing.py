@@ -198,6 +198,6 @@ def _shrink_program(
     if u is None:
         raise UndecidedError(
             "the last step of the compaction is undecided: no solver found the optimum of one of "
-            "its linear programs; take another seed"
+            "its linear programs; use another seed"
         )
     return u[: 2 * n].reshape(-1, 2), u[2 * n :]

@@ -209,7 +209,7 @@ def _check_neighbours(packing: Packing) -> None:
     if np.unique(pairs, axis=1).shape[1] < pairs.shape[1]:
         raise NotJammedError(
             f"{len(packing.r)} disks are too few for a periodic box: two of them touch through "
-            "both sides of it; take more disks, or another seed"
+            "both sides of it; use more disks, or another seed"
         )
 
 

@@ -74,7 +74,7 @@ def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The same Packing, whether or not anything balances: its forces are 0, or of another μ."""
     if not isinstance(name, str) or name not in SCENES:
-        raise InputError(f"there is no scene {brief(name)}; choose one of {', '.join(SCENES)}")
+        raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(SCENES)}")
     kind = SCENES[name]
     mu = kind.mu if mu is None else friction(mu)
     try:
@@ -113,7 +113,7 @@ def assembled(
     pressing = np.zeros(len(walls)) if pressing is None else pressing
     pressing = float_array(pressing, (len(walls),), "forces of walls")
     if not len(r):
-        raise InputError("there is no disk; put one")
+        raise InputError("there is no disk; add one")
     i, j = np.triu_indices(len(r), 1)
     branch, reach = x[j] - x[i], r[i] + r[j]
     between = _touching(np.hypot(*branch.T) - reach, r, "two disks", tolerance)
@@ -154,7 +154,7 @@ def with_network(packing: Packing) -> Packing:
     found = nearest(S, S.original)
     if not S.admits(found.forces):
         raise UndecidedError(
-            f"no network was reached: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
+            f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
         )
     return packing._replace(forces=S.expand(found.forces))
 

@@ -34,10 +34,11 @@ CAPTIONS = {
     "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of the "
     "friction coefficient μ; bars are standard errors over packings.",
     "figure2_limit": "As Figure 2, with the limit load (dashed) beside the critical force.",
-    "figure3": "Normal forces that contacts can have over those they have in the original network: "
-    "the interval seen (bars), and by its colour which part of the states of the random walk "
-    "({walk}) has which ratio, for several friction coefficients μ; every contact, from weak to "
-    "strong. The ordinate is cut at 3; titles count the contacts that reach beyond.",
+    "figure3": "Normal forces that contacts can have over those they have in the original "
+    "network: the interval seen (bars), and by its colour which fraction of the "
+    "states of the random walk ({walk}) has which ratio, for several friction "
+    "coefficients μ; every contact, from weak to strong. The ordinate is cut at 3; "
+    "titles count the contacts that reach beyond.",
     "figure4": "Distribution of the extent ΔF_n of normal forces, in units of ⟨f_n⟩, that the "
     f"random walk ({{walk}}) has seen, {_TAILS}.",
     "figure5": "Contacts with f_n > 2⟨f_n⟩ over those with ΔF_n > ⟨ΔF_n⟩ ({walk}); grey, all "

@@ -129,7 +129,7 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
             packings[k] = kinds.get_packing(store, task.cell.parameters["packing"])[0]
     _compare_distances(store, every, centres)
     if not rows:
-        raise InputError(f"the store at {path} holds nothing of this study")
+        raise InputError(f"the store at {path} has no results of this study")
     joined = {
         name: np.concatenate([part[name] for part in samples]) if samples else np.zeros(0)
         for name in SAMPLES
@@ -338,7 +338,7 @@ def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
             if other[1] != version:
                 raise InputError(
                     f"the study mixes {row['part']} {_version_words(row)} with {other[0]['part']} "
-                    f"{_version_words(other[0])}: reduce it anew from cells of one version"
+                    f"{_version_words(other[0])}: reduce it again from cells of one version"
                 )
 
 

@@ -174,7 +174,7 @@ def critical_forces(
         cancelling.check("critical force")  # which leaves limit loads open
     for number in np.asarray(contacts)[np.isposinf(limit_loads)]:
         raise InputError(
-            f"the balance of both grains of contact {number} is left open: no load sets them off"
+            f"the balance of both grains of contact {number} is not required: no load moves them"
         )
     if not np.isfinite(limit_loads).all():
         number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]

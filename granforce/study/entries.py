@@ -293,8 +293,8 @@ class _Whole(LocalStore):
         found = await super().get(key, prototype, byte_range)
         if found is None and "c" in key.split("/")[1:]:
             raise InputError(
-                f"entry {self.root.name} in {self.root.parent} has lost its part {key} since it "
-                "was opened: was it removed meanwhile?"
+                f"entry {self.root.name} in {self.root.parent} lacks its part {key} since it was "
+                "opened; it may have been removed"
             )
         return found
 

@@ -43,8 +43,8 @@ def _plain(value: Any, where: str) -> Any:
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
     raise TypeError(
-        f"{where} cannot enter a key: {type(value).__name__} {value!r:.60} "
-        "(use numbers, strings, None, lists, or dicts with string keys)"
+        f"{where} cannot be part of a key: {type(value).__name__} {value!r:.60} (use numbers, "
+        "strings, None, lists, or dicts with string keys)"
     )
 
 
@@ -52,7 +52,7 @@ def _quantised(value: float | np.floating[Any], where: str) -> int | float:
     # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
     number = float(str(value)) if isinstance(value, np.floating) else float(value)
     if not math.isfinite(number):
-        raise TypeError(f"{where} cannot enter a key: {value} is not finite")
+        raise TypeError(f"{where} cannot be part of a key: {value} is not finite")
     number = float(f"{number:.{MU_DIGITS}g}")
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
 

@@ -318,7 +318,7 @@ def _over_dask(
         from dask.distributed import Client, KilledWorker, as_completed
     except ImportError:
         raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
-    gone = InputError(f"the dask scheduler at {scheduler} is gone; finished entries are kept")
+    gone = InputError(f"the dask scheduler at {scheduler} is gone; finished entries are saved")
     with _without_tracebacks(), _client_of(scheduler, Client) as client:
         waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
         completed, workers = as_completed(list(waiting)), _Workers(scheduler)

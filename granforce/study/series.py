@@ -300,7 +300,7 @@ def check_folder(path: str | Path) -> Path:
     if path.is_symlink() and not path.exists():
         raise InputError(f"{path}: is a link to nothing; choose another")
     if path.exists() and not (path / "zarr.json").is_file():
-        raise InputError(f"{path}: is there already and no Zarr folder; choose another")
+        raise InputError(f"{path}: exists already and is not a Zarr folder; choose another")
     if is_store(path):
         raise InputError(f"{path}: is a store of results, which would be replaced; choose another")
     if not path.parent.is_dir():

@@ -254,7 +254,7 @@ class Store(Mapping[str, xr.Dataset]):
         try:
             return self.save(kind, params, dataset, **options)
         except NotKeptError as error:
-            warnings.warn(f"{error}; results are given, but not kept", stacklevel=3)
+            warnings.warn(f"{error}; results are returned, but not saved", stacklevel=3)
             name = self.name(kind, params, version=options["version"])
             self._unkept[name] = dataset
             return name

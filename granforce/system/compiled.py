@@ -28,8 +28,8 @@ def find_a_place() -> None:
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = place
     tell(
-        f"granforce: compiled kernels are kept in {place}, since neither the installation nor the "
-        "home folder can be written; set NUMBA_CACHE_DIR to keep them elsewhere"
+        f"granforce: compiled kernels are saved in {place}, since neither the installation nor "
+        "the home folder can be written; set NUMBA_CACHE_DIR to save them elsewhere"
     )
 
 

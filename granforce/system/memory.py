@@ -14,5 +14,5 @@ def check_memory(needed: float, what: str) -> None:
     if needed > there:
         raise InputError(
             f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, and this machine has "
-            f"{there / 1e9:.3g} GB; ask for less"
+            f"{there / 1e9:.3g} GB; choose smaller values"
         )

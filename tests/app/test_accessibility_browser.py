@@ -68,7 +68,7 @@ def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):
     page = visit("", 390)
     assert findings(page) == []
     page.get_by_role("button", name="Help and keys").click()
-    page.get_by_role("dialog").get_by_text("play, pause at the nearest network").wait_for()
+    page.get_by_role("dialog").get_by_text("play; pause at the nearest network").wait_for()
     assert findings(page) == []
 
 

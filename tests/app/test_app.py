@@ -88,7 +88,7 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
 
 def test_missing_stores_leave_a_note_not_an_error(tmp_path, visited):
     library = Library(tmp_path / "nowhere", tmp_path / "cache")
-    assert "no store" in library.notes[0]
+    assert "not in any open store" in library.notes[0]
     state = visited(library=library)
     assert state.replay is None and state.work.message == ""
 
@@ -642,7 +642,7 @@ def test_the_sentence_of_the_intervals_says_what_is_drawn(state):
     assert "pale: every admissible network" in view.lead.object
     state.choose(mu=0)
     wait_for(state)
-    assert "Nowhere" in view.lead.object and "dark" not in view.lead.object
+    assert "Not at all" in view.lead.object and "dark" not in view.lead.object
 
 
 def test_the_axis_holds_every_bar_and_names_the_order_that_there_is(state):
@@ -679,7 +679,7 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
     view = PackingView(state)
     assert "change from the forces as packed</option>" in view.player.legend
     view.player.pulled = True
-    assert "change by what was pulled" in view.player.legend
+    assert "change by the pull" in view.player.legend
 
 
 def test_what_is_refused_does_not_stay_in_its_box(state):
@@ -967,7 +967,7 @@ def test_what_takes_too_long_is_ended_with_a_line():
 
     job = Job(work, Pool(1, "test", seconds=0.01))
     assert job.wait(60) and not job.cancelled()
-    assert "longer than the 0.01 s that a computation may take on this server" in job.error
+    assert "longer than the 0.01 s allowed per computation on this server" in job.error
 
 
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
@@ -1120,7 +1120,7 @@ def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_pa
         garble(library.shipped, entry.name, "*")
     assert library.expected_steps(DISKS, 0.1) is None
     state = visited(library=library)
-    assert "no store" in state.work.message and state.cell is None
+    assert "not in any open store" in state.work.message and state.cell is None
     state.ask(small(1, 4), at_once=True)
     wait_for(state)
     assert state.cell.mu == 1 and state.cell.store is library.cache and state.work.message == ""

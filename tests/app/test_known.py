@@ -119,7 +119,7 @@ def test_a_link_cannot_state_more_than_a_page(state):
     for contact in range(known.MOST_KNOWN):
         state.knowledge.known = [*state.knowledge.known, Statement(contact, 1.0, 5.0)]
     state.knowledge.hold(40, 1.0)
-    assert "let some go" in state.work.message and len(state.knowledge.known) == known.MOST_KNOWN
+    assert "release some" in state.work.message and len(state.knowledge.known) == known.MOST_KNOWN
     state.work.cancel()
 
 
@@ -142,13 +142,11 @@ def test_what_is_left_no_room_for_is_refused_at_once(state):
     )
     scale = state.replay.force_scale
     state.knowledge.hold(9, float(high[9] / scale + 0.2))
-    assert (
-        "leaves" in state.work.message and len(state.knowledge.known) == 1 and not state.work.busy
-    )
+    assert "allow" in state.work.message and len(state.knowledge.known) == 1 and not state.work.busy
     fixed = [c for c in np.flatnonzero(high - low < 1e-9) if c != 4]
     for contact in fixed[:1]:
         state.knowledge.hold(int(contact), float(low[contact] / scale))
-        assert "nothing new" in state.work.message and len(state.knowledge.known) == 1
+        assert "no information" in state.work.message and len(state.knowledge.known) == 1
 
 
 def test_messages_of_browsers_that_make_no_sense_are_ignored(state):
@@ -177,7 +175,7 @@ def test_pulls_keep_what_is_held(state):
     np.testing.assert_allclose(normal[:, 4], state.knowledge.known[0].value, atol=1e-6)
     assert np.ptp(normal[:, 9]) > 0
     hand.heard({"grab": 4})
-    assert told[-1] == {"rail": None} and "let it go" in state.work.message
+    assert told[-1] == {"rail": None} and "release it" in state.work.message
 
 
 def test_what_was_pulled_can_be_held(state):

@@ -12,7 +12,7 @@ def select(page, contact):
 def chips(page, count):
     """Wait for so many chips, and for what they leave open."""
     if not count:
-        page.get_by_text("the other intervals can only shrink").wait_for()
+        page.get_by_text("All other intervals shrink").wait_for()
         return
     page.locator(".known .chip").nth(count - 1).wait_for()
     page.locator(".known .chip").nth(count).wait_for(state="detached")
@@ -74,6 +74,6 @@ def test_a_contradiction_in_a_link_is_one_line(visit):
 def test_the_plane_of_stresses(visit):
     page = visit("?tab=plane")
     page.get_by_role("combobox", name="Plane").select_option("stress")
-    page.get_by_text("The pressure alone is held").wait_for()
+    page.get_by_text("Only the pressure is prescribed").wait_for()
     assert len(column(page, "outer", "x")) > 3
     picture(page, "known/stresses")

@@ -13,7 +13,7 @@ CHAPTERS = {
     "thirteen": ("How strong can one contact get?", ("ArrowRight", 40), "4.84"),
     "four-hundred": ("Grab one force", ("ArrowRight", 40), None),
     "chance": ("How far does chance go?", ("ArrowUp", 65), None),
-    "friction": ("Which friction leaves most open?", ("ArrowRight", 4), "μ = 0.2"),
+    "friction": ("Where are forces least determined?", ("ArrowRight", 4), "μ = 0.2"),
     "push": ("When does something move?", ("ArrowRight", 60), None),
 }
 COUNTS = {"groove": "4 − 3", "box": "8 − 6", "thirteen": "46 − 38"}

@@ -71,7 +71,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     assert fractions[-1] > 0.75 and pictures[0]["box"][0] > 1.15 * pictures[-1]["box"][0]
     assert len(pictures[0]["x"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
     assert state.growing and state.replay is old
-    assert "as they are found" in state.source
+    assert "as they are sampled" in state.source
     begun = browser.player.walk
     assert begun["room"] == 21 and len(begun["number"]) == 1 and begun["mu"] == 0.23
     assert len(tab.growth.growth.data["state"]) == 21
@@ -192,12 +192,12 @@ def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser = Browser(state)
     view = PackingView(state)
-    assert "pale disks carry nothing" in view.player.legend
+    assert "pale disks carry no force" in view.player.legend
     state.ask(asked(0.35, 20_000), at_once=True)
     browser.run(lambda: state.work.moving)
     assert "which shrinks" in view.player.legend
     browser.run(lambda: state.growing)
-    assert "pale disks carry nothing" in view.player.legend
+    assert "pale disks carry no force" in view.player.legend
     state.work.cancel()
     browser.run()
 

@@ -52,7 +52,7 @@ def test_what_is_not_in_the_list_is_left_alone(computed):
         view.hear({"call": [entry, "mine"]})
         wait_for(state)
     assert sorted(state.library.own) == before and entry_labels.names(state.library.own) == {}
-    with pytest.raises(InputError, match="no more"):
+    with pytest.raises(InputError, match="no longer"):
         my_results.delete(state.library, packing)
 
 

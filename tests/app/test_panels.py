@@ -186,7 +186,7 @@ def test_disks_without_a_box_ask_for_it(state):
     view = upload_view.View(state)
     view.mu.value = "0.1"
     view._dropped([("disks.csv", table(packing))])
-    assert view.waiting.visible and view.waiting.title.startswith("Fill in Box")
+    assert view.waiting.visible and view.waiting.title.startswith("Enter the sides")
     assert view.box.visible and view.box.error_state and view.read.visible
     assert not view.error.visible and not view.task.running
     view.box.value = ", ".join(map(repr, map(float, packing.box)))
@@ -314,8 +314,8 @@ def test_more_than_allowed_is_not_collected(state):
     "pieces, word",
     [
         ([{"name": f"{k}", "data": b""} for k in range(1000)], "16 files"),
-        ([{"name": "a", "data": 7}, {"name": "b", "data": b"x,y,r"}], "no file"),
-        ([{"name": "a", "data": {"deep": [1]}}], "no file"),
+        ([{"name": "a", "data": 7}, {"name": "b", "data": b"x,y,r"}], "not a file"),
+        ([{"name": "a", "data": {"deep": [1]}}], "not a file"),
     ],
 )
 def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):
@@ -529,7 +529,7 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
     wait_for(state)
     head, held = table()
     number, after = state.replay.backbone[4], state.knowledge.narrowed.after
-    assert f"Known: contact {number}: fₙ = " in head and "exact with these forces held" in head
+    assert f"Known: contact {number}: fₙ = " in head and "exact given these held forces" in head
     assert list(np.flatnonzero(held["known"])) == [4] and f"hold={number}%3A" in head
     scale = state.replay.force_scale
     for name in ("low", "high"):
@@ -580,9 +580,9 @@ def test_what_is_held_is_said_not_to_be_respected_by_a_push(state):
     assert "respected" not in view.lead.object
     state.knowledge.hold(3, float(state.replay.normal[0, 3]))
     wait_for(state)
-    assert "Held forces are not respected here" in view.lead.object
+    assert "Held forces are ignored here" in view.lead.object
     view.what.value = "all"
-    assert "not respected" in view.lead.object
+    assert "ignored" in view.lead.object
 
 
 def test_the_slider_of_a_push_has_networks_in_balance_from_none_to_the_critical_force(state):

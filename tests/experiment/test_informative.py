@@ -1,4 +1,4 @@
-"""Which measurement next, and which contacts carry for certain."""
+"""Which measurement next, and which contacts certainly carry force."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_expectation_alone_takes_no_program(S):
 
 
 def test_nothing_is_left_to_measure_where_all_is_determined():
-    with pytest.raises(InputError, match="nothing is left"):
+    with pytest.raises(InputError, match="nothing to measure"):
         informative(ensemble(two_disks()))
 
 

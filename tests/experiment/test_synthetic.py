@@ -83,5 +83,5 @@ def test_what_is_wrong_is_told():
     for options in (*wrong, {"noise": 1e200}):
         with pytest.raises(InputError):
             synthetic_frame(packing, **options)
-    with pytest.raises(InputError, match="no forces of its own"):
+    with pytest.raises(InputError, match="no forces to measure"):
         synthetic_frame(packing._replace(forces=0 * packing.forces))

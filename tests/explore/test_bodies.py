@@ -178,7 +178,7 @@ def test_sides_in_one_place_have_no_corner_of_their_own():
 
 
 def test_more_dimensions_cannot_be_drawn():
-    with pytest.raises(InputError, match="can be drawn whole"):
+    with pytest.raises(InputError, match="accepts at most"):
         gf.body(gf.ensemble(reference("n100_mu0.1_s11")))
 
 

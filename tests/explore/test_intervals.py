@@ -329,7 +329,7 @@ def test_progress_counts_up_and_cancelling_leaves_the_rest_open(first):
 def test_contacts_outside_the_ensemble_are_refused(first):
     system, _ = first
     for beyond in (-1, len(system.packing.contacts.i)):
-        with pytest.raises(InputError, match=f"contact {beyond} is none of"):
+        with pytest.raises(InputError, match=f"contact {beyond} is not one of"):
             intervals(system, [beyond])
     with pytest.raises(InputError, match="twice"):
         limit_loads(system, [system.index[1], system.index[1]])
@@ -349,7 +349,7 @@ def test_contacts_are_named_by_their_number_in_the_packing(first):
         np.testing.assert_allclose(one.high[0], whole.high[k], atol=1e-7 * frozen.force_scale)
         assert load.load[0] == pytest.approx(loads.load[k], rel=1e-6)
     for result in (intervals, limit_loads):
-        with pytest.raises(InputError, match=f"contact {system.index[4]} is none of"):
+        with pytest.raises(InputError, match=f"contact {system.index[4]} is not one of"):
             result(frozen, [system.index[4]])
 
 

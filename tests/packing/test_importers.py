@@ -707,7 +707,7 @@ LINKS = "i,j,fn,ft\n7,8,1,0\n8,9,1,0\n"
         (GRAINS.replace("8,2,0", "8,1e200,0"), LINKS, {}, "line 3: x is '1e200'"),
         (GRAINS.replace("8,2,0", "8,1e50,0"), LINKS, {}, "too far to resolve"),
         (GRAINS.replace("8,2,0,1", "8,2,0,-1"), LINKS, {}, "line 3: radius -1 is not positive"),
-        (GRAINS.replace("8,2,0,1", "8,2,0,1e-320"), LINKS, {}, "line 3: radius .* nothing beside"),
+        (GRAINS.replace("8,2,0,1", "8,2,0,1e-320"), LINKS, {}, "line 3: radius .* is too small"),
         (GRAINS.replace("8,2", "7,2"), LINKS, {}, "line 3: id '7' was given in line 2"),
         (GRAINS.replace("8,2,", "8,1.5,"), LINKS, {}, "line 3: grains 0 and 1 .* overlap by 0.5"),
         (GRAINS.replace("8,2,", "8,0,"), LINKS, {}, "line 3: grains 0 and 1 .* overlap by 2"),

@@ -261,7 +261,7 @@ def test_a_part_of_the_cells_makes_a_part_of_the_table(done):
     larger = TINY._replace(packings=3)
     table = tables.reduce(done / "cells.zarr", larger)
     assert table.skipped["missing_cells"] == len(plans.tasks(larger)) - len(plans.tasks(TINY))
-    with pytest.raises(InputError, match="nothing of this study"):
+    with pytest.raises(InputError, match="no results of this study"):
         tables.reduce(done / "cells.zarr", TINY._replace(n=21, sizes=(), tails_n=21))
 
 
@@ -362,7 +362,7 @@ def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
     # No time: nothing is begun, and what is missing is told.
     late = ["study", "--quick", "--parts", "walk", "--minutes", "1e-9", "--workers", "1"]
     assert main([*late, "--out", str(tmp_path / "late"), "--formats", ""]) == 2
-    assert "holds nothing of this study" in capsys.readouterr().err
+    assert "has no results of this study" in capsys.readouterr().err
     assert not list((tmp_path / "late" / "cells.zarr").glob("walk-*"))
 
 

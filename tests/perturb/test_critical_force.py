@@ -266,7 +266,7 @@ def test_crystal_answers_with_the_symmetry_of_the_pair():
 def test_what_cannot_be_perturbed_is_told():
     packing = packed(40, 0.5)
     S = ensemble(packing)
-    with pytest.raises(InputError, match="none of the"):
+    with pytest.raises(InputError, match="not one of the"):
         critical_force(packing, len(packing.contacts.i))
     for precision in (0, 1e-300, 1e300):
         with pytest.raises(InputError, match="precision"):

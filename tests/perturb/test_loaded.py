@@ -49,5 +49,5 @@ def test_loads_above_the_limit_load_are_refused():
     limit = limit_loads(S)
     with pytest.raises(InputError, match="above its limit load"):
         loaded_networks(S, S.index[4], [0.5 * limit[4], 1.01 * limit[4]])
-    with pytest.raises(InputError, match="none of the"):
+    with pytest.raises(InputError, match="not one of the"):
         loaded_networks(S, 10**6, [0.1])

@@ -197,7 +197,7 @@ def own(text: str, mu: float | None = None) -> Packing:
     disks, walls, press = ([*(text or BEGIN).split("|"), "", ""])[:3]
     disks, walls = _numbers(disks, 3, MOST_DISKS, "disks"), _numbers(walls, 4, MOST_WALLS, "walls")
     if not len(disks):
-        raise InputError("there is no disk; put one")
+        raise InputError("there is no disk; add one")
     x, r = disks[:, :2], disks[:, 2]
     load, pressing = scenes.weights(r), np.zeros(len(walls))
     if press:
@@ -212,7 +212,7 @@ def _pressing(text: str, walls: int) -> Integers:
     """Which of so many walls press."""
     lids = [int(k) for k in text[1:].split(",") if k] if PRESSED.fullmatch(text) else [walls]
     if max(lids, default=0) >= walls and lids:
-        raise InputError("this link's walls that press cannot be read")
+        raise InputError("the pressing walls in this link cannot be read")
     return np.unique(np.array(lids, dtype=np.int64))
 
 

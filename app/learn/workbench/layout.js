@@ -10,7 +10,7 @@ export function layout(most) {
       <span class="buttons">
         <button type="button" class="soft play" title="Go at random through S, from one set of forces to the next">Random walk</button>
         <button type="button" class="soft fill" title="Fill S with points, everywhere equally many">Random points</button>
-        <button type="button" class="soft undo" title="Take the last pull back (Z)" disabled>Undo</button>
+        <button type="button" class="soft undo" title="Undo the last pull (Z)" disabled>Undo</button>
         <button type="button" class="soft push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Test push</button>
         <button type="button" class="soft save" title="This scene as a file for granforce: gf.load_packing">Download data</button>
       </span>

@@ -19,7 +19,7 @@ class Workbench(Scripted):
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
     titles = param.List(doc="[name, title] of every scene")
-    note = param.String(doc="what was wrong with the link")
+    note = param.String(doc="error in the link")
     dark = param.Boolean()
 
     def __init__(self, asked: small_scenes.Asked, task: Task, **params: Any) -> None:

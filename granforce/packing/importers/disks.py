@@ -83,7 +83,7 @@ def enclosed(
     if walls is None and not gravity:
         return packing
     if np.isfinite(packing.box).any():
-        raise InputError("walls and gravity are of open packings: leave out the box")
+        raise InputError("walls and gravity apply to open packings: leave out the box")
     load = packing.load.copy()
     load[:, 1] -= gravity * np.pi * packing.r**2
     if walls is None:

@@ -135,8 +135,8 @@ def check_disks(
         raise InputError(f"the largest radius is {largest:g}; give lengths in another unit")
     for g in np.flatnonzero(r < largest / EXTENT)[:1]:
         raise InputError(
-            f"{place(g)}: radius {r[g]:g} is nothing beside the largest, {largest:g}; correct or "
-            "remove the grain"
+            f"{place(g)}: radius {r[g]:g} is too small compared with the largest, {largest:g}; "
+            "correct or remove the grain"
         )
     none, box = np.empty((0, 2)), cell.box
     make_packing(x, r, box, make_contacts([], [], none, [], r), none, 0, tilt=cell.tilt)

@@ -38,8 +38,7 @@ def read_known(source: Source) -> Known:
                     side[given, k] = values
     if not told:
         raise InputError(
-            f"{table.name}: no column f_n, f_t, f_n_low, f_n_high, f_t_low or f_t_high: "
-            "nothing would be known"
+            f"{table.name}: no column f_n, f_t, f_n_low, f_n_high, f_t_low or f_t_high"
         )
     return Known(contacts, low, high)
 

@@ -90,10 +90,10 @@ def read_table(
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
-            raise InputError("reverse is of tables with forces (fn, ft): leave it out")
+            raise InputError("reverse applies to tables with forces (fn, ft): leave it out")
         return find(packing, forces="found")
     if walls is not None or gravity:
-        raise InputError("walls and gravity are of tables without forces: leave out fn and ft")
+        raise InputError("walls and gravity apply to tables without forces: leave out fn and ft")
     return adopt(packing, reverse=reverse, forces="given")
 
 

@@ -42,7 +42,9 @@ def _exact_parameters(
     box: contacts with a grain outside are frozen at their original forces. asked: the conditions.
     """
     if slice_ is not None and asked.get("prescribed") == "stress":
-        raise InputError("the forces around a slice decide its stress: prescribe none with a slice")
+        raise InputError(
+            "the forces around a slice determine its stress: prescribe nothing with a slice"
+        )
     return {
         **cones_of(packing, mu, **asked),
         "contacts": chosen_contacts(contacts),

@@ -50,8 +50,8 @@ def _perturbation_parameters(
     """
     if asked.get("known") is not None:
         raise InputError(
-            "grains that move change their forces, whatever is known of them: perturb the packing "
-            "without known forces (its limit loads can be had with them)"
+            "moving grains change their forces, so known forces cannot hold: perturb the packing "
+            "without them (limit loads accept known forces)"
         )
     if contacts is not None and random is not None:
         raise InputError("name the contacts to perturb, or how many at random, not both")

@@ -75,13 +75,13 @@ def _walk_parameters(
     cones = cones_of(packing, mu, **asked)
     if relax.startswith("gauss_seidel") and {"prescribed", "known"} & cones.keys():
         raise InputError(
-            "contact dynamics keeps the pressure and Coulomb's law only: with other conditions "
-            "take the nearest network"
+            "contact dynamics supports only the pressure and Coulomb's law: with other conditions "
+            "use the nearest network"
         )
     named = {**cones, **size, "relax": relax}
     if residual is not None:
         if relax != "gauss_seidel_only":
-            raise InputError("only the sweeps of 'gauss_seidel_only' end at a residual of choice")
+            raise InputError("only 'gauss_seidel_only' takes a residual")
         named["residual"] = positive(residual, "residual")
     if attempts is not None:
         named["attempts"] = whole(attempts, "attempts per state", 1)

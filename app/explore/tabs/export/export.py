@@ -112,7 +112,7 @@ GROUPS = {
         "netcdf": Kind("States (NetCDF)", Snapshot.netcdf, True),
         "zarr": Kind("States (Zarr, zipped)", Snapshot.zarr, True),
     },
-    "To go on elsewhere": {
+    "To continue elsewhere": {
         "npz": Kind("Packing (NPZ)", Snapshot.npz),
         "json": Kind("Parameters (JSON)", Snapshot.json),
     },
@@ -122,14 +122,14 @@ FILES = {
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the view as it is now, with what is pulled and held. Pictures have a colour bar, a
-scale and a caption. The movie plays from the first network to the last, or to and fro between two,
-at the player's speed. The page as one file needs no server and no network connection.
-Contacts: one row each, with disks, forces as packed and now, the range over the networks and,
-where known, the exact bounds; forces are in mean forces, as on screen, and the first lines explain
-the columns. States: the packing, and <b>all</b> states with their measures, units and parameters;
-where only some were kept, all are computed again. Every plot is saved as PNG or SVG by the buttons
-above it. The address of the page reopens this view; <code>granforce walk --packing
+Each file shows the current view, including pulled and held forces. Pictures have a colour bar, a
+scale and a caption. The movie plays from the first network to the last, or back and forth between
+two, at the player's speed. The HTML page needs no server and no network connection.
+Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
+if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
+columns. States: the packing and <b>all</b> states with their measures, units and parameters; states
+that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above it. The
+address of the page reopens this view; <code>granforce walk --packing
 packing.npz</code> continues with the packing.
 """
 
@@ -162,7 +162,7 @@ class View:
         state, kind = self.state, KINDS[key]
         self.told.object = ""
         if state.replay is None:
-            self.told.object = "There is nothing on screen yet."
+            self.told.object = "Nothing is on screen yet."
             self.buttons.rest()
         elif kind.make is None:
             name = f"{stem(state.cell.selection)}.{key}"

@@ -14,7 +14,7 @@ TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
 WIDTH_MM = 170  # of a page's two columns
 HELP = """
-As they are seen now, as lines and letters. From 120 mm on the plots are beside the packing.
+As on screen, as vector graphics. From 120 mm on, the plots are next to the packing.
 """
 
 

@@ -96,8 +96,8 @@ COLUMNS = {
     "i": "number of the first grain; the normal n points from i to j",
     "j": "number of the second grain",
     "known": "1 where the normal force is held, else 0",
-    "f_n_original": "normal force that the packing came to rest with",
-    "f_t_original": "tangential force with it, along t = (-n_y, n_x)",
+    "f_n_original": "normal force as packed",
+    "f_t_original": "tangential force as packed, along t = (-n_y, n_x)",
     "f_n": "normal force in the network on screen",
     "f_t": "tangential force in the network on screen",
     "f_n_seen_low": "smallest normal force of all states",
@@ -113,7 +113,7 @@ COLUMNS = {
 
 def _meaning(column: str) -> str:
     name = column.removesuffix(" [mean]")
-    free = ", whatever is held" if name.endswith(FREE) else ""
+    free = ", ignoring held forces" if name.endswith(FREE) else ""
     return f"{COLUMNS[name.removesuffix(FREE)]}{free}"
 
 
@@ -129,8 +129,8 @@ def bounds_of(knowledge: Knowledge) -> str:
     if not knowledge.known:
         return ""
     if knowledge.whole is None:
-        return f"Bounds that heed what is held are still being computed; {FREE[1:]}: without it."
-    return f"Bounds are exact with these forces held; {FREE[1:]}: without them."
+        return f"Bounds given the held forces are still being computed; {FREE[1:]}: without it."
+    return f"Bounds are exact given these held forces; {FREE[1:]}: without them."
 
 
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:

@@ -24,8 +24,8 @@ WHOLE = "principal", "stress"  # planes that are the same whatever contact is se
 # Width over height: beside the packing a window is no higher than this; on a wide screen there is
 # a place of its own for it.
 ASPECT, WIDE_ASPECT = 1.6, 1.15
-COMING = "The networks come as they are found."
-GROWS = "The networks come as they are found; the exact outline of S follows."
+COMING = "Networks appear as they are sampled."
+GROWS = "Networks appear as they are sampled; the exact outline of S follows."
 ONE_POINT = "At h = 0 the forces are determined: S is one point."
 # The point goes along an axis by itself, see drag_point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up ↕")

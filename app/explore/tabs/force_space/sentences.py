@@ -14,12 +14,10 @@ from ....widgets.plot_style import DOT, ORIGINAL, PALE, STATES
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
 MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
 
-CROWDED = (
-    ": to get far out, many forces have to change together, which hardly ever happens by chance"
-)
+CROWDED = ": to move far out, many forces have to change together, which is unlikely by chance"
 HEADING = "<b>Every network, and the one on screen.</b> "
 HELP = (
-    "A line that is clicked in the packing becomes the green one. Shown is the shadow "
+    "Click a line in the packing to make it the green one. Shown is the shadow "
     f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: the "
     f"shaded {term('outline')} holds all of it."
 )
@@ -38,7 +36,7 @@ def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
         mark(ORIGINAL, term("original", "as packed")),
     ]
     if outlined:
-        marks.insert(0, mark(PALE, f"all that is possible ({term('exact', 'exact')})"))
+        marks.insert(0, mark(PALE, f"all possible values ({term('exact', 'exact')})"))
     h = replay.summary["dimension"]
     shadow = f" {term('s', 'S')} has {term('h', f'{h} dimensions')}; this is its shadow on two"
     shadow += " of the forces." if plane.components else "."
@@ -79,11 +77,12 @@ def stresses(found: Outlined) -> str:
     reach = np.hypot(*found.inner.T).max(initial=0.0)
     path = np.hypot(*found.plane.path.T)
     return (
-        f"Shaded: every {term('stress', 'stress')} that these contacts can carry at this pressure, "
-        f"exactly ({found.programs} linear programs, {found.seconds:.1f} s). The farther from "
-        f"(0, 0), the more shear: at most <b>{reach:.3f}</b> of the pressure, certainly not above "
-        f"{reach + found.gap:.3f}; the network as packed carries {path[0]:.3f}, the "
-        f"{len(path) - 1} networks shown up to {path[1:].max():.3f}. The pressure alone is held."
+        f"Shaded: every {term('stress', 'stress')} that these contacts can carry at this "
+        f"pressure, exactly ({found.programs} linear programs, {found.seconds:.1f} s). The "
+        f"farther from (0, 0), the larger the shear: at most <b>{reach:.3f}</b> of the pressure, "
+        f"certified not to exceed {reach + found.gap:.3f}; the network as packed carries "
+        f"{path[0]:.3f}, the {len(path) - 1} networks shown up to {path[1:].max():.3f}. Only the "
+        "pressure is prescribed."
     )
 
 

@@ -54,7 +54,7 @@ def legend() -> str:
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
         f"<b>What the paper claims, and what the study found</b> ({PAPER}). Each cell: verdict, "
-        f"value, 95 % interval over packings; point at it for the criterion. {marks}."
+        f"value, 95 % interval over packings; hover over it for the criterion. {marks}."
     )
 
 

@@ -73,11 +73,11 @@ class Indeterminacy:
         z = statistics.means(walks, "coordination")
         return (
             f"<b>Forces are least determined at μ = {mu:g}: η₂ = {with_error(value, error)}.</b> "
-            f"Friction widens what each contact can carry, but packings made with more of it have "
-            f"fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). As in the "
-            "paper's Figure 1. Points: means "
-            f"over {packings(walks)} packings of 400 disks, with standard errors; ring: the "
-            "packing on screen. Click a point to open such a packing, or to compute it."
+            "Friction widens the range of forces at each contact, but packings made with more "
+            f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
+            f"As in the paper's Figure 1. Points: means over {packings(walks)} packings of 400 "
+            "disks, with standard errors; ring: the packing on screen. Click a point to open or "
+            "compute such a packing."
         )
 
 
@@ -125,7 +125,7 @@ def extents(own: list[Row], mu: float) -> tuple[Figure, str]:
         return fig, ""
     widest = max(means, key=lambda label: means[label])
     text = (
-        f"<b>How long are the intervals?</b> (Figure 4) Of these, longest on average at {widest}: "
+        f"<b>How long are the intervals?</b> (Figure 4) Longest on average at {widest}: "
         f"{means[widest]:.2f} mean forces. Beyond the median P falls like exp(−(λx)<sup>b</sup>); "
         f"b = 1 is exponential. {'; '.join(tails)}. Bars: standard errors over packings."
     )

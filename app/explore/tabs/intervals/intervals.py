@@ -30,7 +30,7 @@ from .order import MOST_BARS, SOME, ordered, picked
 SMALL = {"width": 146, "margin": (4, 4, 2, 6)}
 GROWS = "How many networks does it take?"
 HEADING = "<b>How far can each force go while no disk moves?</b> "
-FIXED = "Nowhere: balance leaves every force one value."
+FIXED = "Not at all: balance determines every force."
 
 
 class View(TabView):
@@ -130,7 +130,7 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
     text = HEADING + "".join(f"{part}. " for part in parts)
     if beyond:
-        text += f"Bars of contacts that carry almost nothing go on beyond the axis: {beyond}. "
+        text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "
     return text + "Drag a dot, or a line in the packing."
 
 

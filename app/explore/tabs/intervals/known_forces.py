@@ -15,8 +15,8 @@ from ....widgets.hints import term
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
 ASK = (
-    "Is a force known, say measured? Hold it (button Hold, or H): the other intervals can only "
-    "shrink."
+    "To treat a force as known, for example from a measurement, hold it (button Hold, or H). All "
+    "other intervals shrink or stay the same."
 )
 
 
@@ -24,9 +24,9 @@ class Known(Scripted):
     """Chips of what is known; see known.js. Contacts are positions in the backbone."""
 
     chips = param.List(doc="pairs (contact, words)")
-    words = param.String(doc="what it leaves open, HTML")
+    words = param.String(doc="effect on the other intervals, HTML")
     ranked = param.List(doc="pairs (contact, words), the best to measure first")
-    asking = param.Boolean(doc="whether the best to measure are being looked for")
+    asking = param.Boolean(doc="whether the best contacts to measure are being computed")
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
@@ -72,23 +72,23 @@ def words(knowledge: Knowledge, number: Integers) -> str:
         return ASK
     if narrowed is None or narrowed.known != known:
         working = knowledge.task.running
-        return "What it leaves open is being computed …" if working else "Not computed: cancelled."
+        return "Computing the other intervals …" if working else "Not computed: cancelled."
     if narrowed.left:
-        return f"Exact bounds are arriving, the strongest change first: {1 - narrowed.left:.0%}."
+        return f"Exact bounds, largest change first: {1 - narrowed.left:.0%}."
     (h, less), (mean, left) = narrowed.dimension, narrowed.mean
     free = f"<b>{h} → {less}</b>" if less < h else f"stay <b>{h}</b> (an error bar fixes no number)"
     told = (
         f"{term('h', 'Free dimensions')} {free}; a contact's {term('exact', 'possible')} fₙ spans "
         f"<b>{mean:.3f} → {left:.3f} × the mean force</b> on average ({_change(mean, left)}); "
         f"{narrowed.carrying} of {len(narrowed.shortened)} contacts "
-        f"{term('carrying', 'carry for certain')}."
+        f"{term('carrying', 'certain to carry force')}."
     )
     short = narrowed.shortened
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
         most = ", ".join(f"{number[c]} (by {short[c]:.2f})" for c in order)
         told += f" Shortened most: contacts {most}."
-    return told + " The networks that play are of all of S; pulls keep what is known."
+    return told + " The networks being played are from all of S; pulls keep the held forces."
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:

@@ -13,9 +13,9 @@ from ....widgets.plot_style import DARK, DOT, hover
 
 ASKED = (
     f"<b>How hard can each contact be pushed?</b> The {term('limit_load', 'limit load')}: the "
-    "largest pair of forces that may push its two disks apart before no forces at all balance it."
+    "largest pair of opposite forces on its two disks for which a balanced network exists."
 )
-HELD = " Held forces are not respected here: every admissible network counts."
+HELD = " Held forces are ignored here: all admissible networks count."
 
 
 class LimitLoads:
@@ -25,7 +25,7 @@ class LimitLoads:
         self.normal, self.loads = replay.normal[0], loads
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.figure = fig = figure(
-            "limit_loads", None, "its normal force fₙ as packed, in mean forces",
+            "limit_loads", None, "normal force fₙ as packed, in mean forces",
             "limit load, in mean forces", height=340,
         )  # fmt: skip
         source = ColumnDataSource({"x": self.normal, "y": loads.load, "contact": replay.backbone})
@@ -53,8 +53,9 @@ class LimitLoads:
         """What contacts bear, as HTML."""
         median, most = np.percentile(self.loads.load, [50, 90])
         return (
-            f"<b>Half of the contacts bear a push of {median:.2f} mean forces, one in ten more "
-            f"than {most:.2f}.</b> Each dot is one contact: click it to find it in the packing."
+            f"<b>Half of the contacts withstand a push of {median:.2f} mean forces, one in ten "
+            f"more than {most:.2f}.</b> Each dot is one contact: click it to select it in the "
+            "packing."
         )
 
     def computed(self) -> str:

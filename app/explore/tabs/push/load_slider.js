@@ -45,7 +45,7 @@ export function render({ model, view }) {
   }
 
   function show() {
-    const there = load >= end(), said = there ? ": disks set off" : ""
+    const there = load >= end(), said = there ? ": disks start to move" : ""
     range.value = load
     told.textContent = load.toFixed(2)
     part("b").textContent = said

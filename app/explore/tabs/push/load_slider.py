@@ -13,8 +13,8 @@ class LoadSlider(Scripted):
 
     contact = param.Integer(default=None, allow_None=True, doc="the one that is pushed")
     path = param.Dict(default={}, doc="networks under growing loads, see perturb.path; {} unknown")
-    most = param.Number(default=1.0, doc="end of the scale while it is not known what they hold")
-    running = param.Boolean(doc="whether it is being found out")
+    most = param.Number(default=1.0, doc="end of the scale until the limit is known")
+    running = param.Boolean(doc="whether it is being computed")
 
     def __init__(self, pushed: Callable[[], object], gave: Callable[[], object]) -> None:
         """pushed(): it was moved where no path is known; gave(): it has come to the end of it."""

@@ -17,24 +17,24 @@ F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<su
 LIMIT = term("limit_load", "limit load")
 HEADING = "<b>How hard can the two disks of contact {} be pushed apart?</b> "
 ASKED = (
-    "As packed they press on each other with {now:.2f} mean forces. A pair of opposite forces "
-    f"grows until disks set off: the {F_CRIT}. Beyond the {LIMIT} no forces balance it. Click "
-    "another line to push there."
+    "As packed, they press on each other with {now:.2f} mean forces. A pair of opposite forces "
+    f"increases until disks start to move: the {F_CRIT}. Beyond the {LIMIT} no network balances "
+    "it. Click another line to push that contact."
 )
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open, {slid} slide and {kept} hold.</b> At the end "
-    "of the slider the packing shows how disks set off, enlarged so that the farthest ({most:.3g} "
-    "times the rms motion) goes to and fro by one mean radius."
+    "of the slider the packing shows the first motion, scaled so that the fastest disk "
+    "({most:.3g} times the rms motion) moves back and forth by one mean radius."
 )
 HELD = (
-    " Held forces are not respected here: {} may change like all others, and the push begins with "
-    "the network as packed."
+    " Held forces are ignored here: {} may change like all others, and the push begins with the "
+    "network as packed."
 )
 COMPUTED = (
-    "Of all sets of forces that balance the push, those nearest to the forces as packed are shown; "
-    "orange carries more than before, blue less. F<sub>crit</sub> lies between the largest load at "
-    "which contact dynamics finds rest and the least at which it finds none. |u| is how far a disk "
-    "moves first, against the root mean square over all disks."
+    "Of all sets of forces that balance the push, those nearest to the forces as packed are "
+    "shown; orange carries more than before, blue less. F<sub>crit</sub> lies between the largest "
+    "load at which contact dynamics finds rest and the smallest at which it finds none. |u| is "
+    "the first motion of a disk, relative to the root mean square over all disks."
 )
 TABLE = '<table class="claims"><tr>{}</tr><tr>{}</tr></table>'
 

@@ -39,8 +39,8 @@ def responses(own: list[Row]) -> tuple[list[Figure], str, str]:
             legend_above(fig)
     text = (
         f"{term('critical_force', 'Critical force')}: the push at which the packing gives way. "
-        f"{term('limit_load', 'Limit load')}: the push beyond which nothing balances. "
-        f"{term('alpha', 'α')}: how fast the first motion fades with distance, |u| ~ r⁻ᵅ. Each "
+        f"{term('limit_load', 'Limit load')}: the push beyond which no network balances. "
+        f"{term('alpha', 'α')}: how fast the first motion decays with distance, |u| ~ r⁻ᵅ. Each "
         "point is the mean over the packings of one μ, which is written where there is room, "
         f"with its standard error; open symbols: {len(own)} packings on this page."
     )

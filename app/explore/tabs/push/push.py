@@ -24,8 +24,8 @@ from .load_slider import LoadSlider
 from .over_packings import responses
 
 ISOSTATIC = (
-    "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
-    "needs (it is isostatic)."
+    "<b>Without friction, any push moves the packing:</b> it has only as many contacts as "
+    "equations (it is isostatic)."
 )
 SCALE = 2.0  # of the largest force, up to which the slider goes at first
 
@@ -216,7 +216,7 @@ def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job
         found = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
         drawn, lead, text = responses(found)
-        table = claims.claims("store", "What the paper claims, and what was found", opened=True)
+        table = claims.claims("store", "The paper's claims and the results", opened=True)
         return Shown(lead, drawn, told=text + table)
 
     return work

@@ -22,7 +22,7 @@ from ....widgets.plot_style import (
 )
 
 WORDS = {
-    "inferred": "inferred; width: fₙ, pale: one standard error more",
+    "inferred": "inferred; width: fₙ, pale: plus one standard error",
     "measured": "measured; width: fₙ",
     "deviation": "width: inferred fₙ; colour: its difference",
 }
@@ -83,7 +83,7 @@ def network(frame: Frame, **options: Any) -> tuple[Figure, Layers]:
     corner(fig, WORDS["inferred"])
     next(one for one in fig.above if isinstance(one, Title)).name = "shown"
     bar = ColorBar(
-        color_mapper=colours, height=10, title="inferred less measured fₙ, in its σ",
+        color_mapper=colours, height=10, title="inferred minus measured fₙ, in σ",
         title_text_font_style="normal",
     )  # fmt: skip
     fig.add_layout(bar, "below")
@@ -132,7 +132,7 @@ def _draw_grains(fig: Figure, frame: Frame) -> None:
 
 
 def _mark(fig: Figure, frame: Frame) -> None:
-    """Suspects, contacts that carry for certain, and what was mended."""
+    """Suspects, contacts that certain to carry force, and what was mended."""
     middle = frame.lines.mean(axis=1)
     for label, places, marker, colour in (
         ("suspect", middle[frame.suspects], "triangle", AMBER),

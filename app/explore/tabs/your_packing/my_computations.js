@@ -14,7 +14,7 @@ export function render({ model, view }) {
   function remove(entry, it) {
     if (it.dataset.sure) return ask(model, view, { delete: entry })
     it.dataset.sure = "yes"
-    it.textContent = "Delete for good?"
+    it.textContent = "Delete permanently?"
   }
 
   function line({ entry, name, what, when, megabytes, here }) {

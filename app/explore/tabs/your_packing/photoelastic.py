@@ -147,8 +147,8 @@ class Frames:
 
 
 OPENED = """
-As a packing the frame is the packing of this page: its inferred forces, and what walls do in them
-to the disks held fixed. Then intervals, pulls and outlines tell what else balance would allow.
+Open as a packing makes this frame the packing of the page, with its inferred forces and with wall
+forces held fixed. Intervals, pulls and outlines then show which other forces balance allows.
 """
 
 
@@ -157,7 +157,7 @@ def found(report: dict[str, Any]) -> str:
     if not report["findings"]:
         return ""
     lines = "".join(f"<li>{html.escape(line)}</li>" for line in report["findings"])
-    return f"<details><summary>Line by line</summary><ul>{lines}</ul></details>"
+    return f"<details><summary>Repairs, line by line</summary><ul>{lines}</ul></details>"
 
 
 def compared(frame: Frame) -> Figure:
@@ -207,7 +207,7 @@ def listed(frame: Frame) -> str:
         (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
         (
             len(frame.certain),
-            "Contacts that were not measured and carry for certain, by 2 σ",
+            "Contacts that were not measured and certain to carry force, by 2 σ",
             certain,
         ),
     ):
@@ -232,5 +232,5 @@ def stresses(frame: Frame) -> str:
             )
             cells.append(f"<td>{'<br>'.join(lines)}</td>")
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    head = "Stress by region, in the mean pressure (y grows upwards in the picture)"
+    head = "Stress by region, relative to the mean pressure (y points up in the picture)"
     return f"<table class='claims'><caption>{head}</caption>{''.join(rows)}</table>"

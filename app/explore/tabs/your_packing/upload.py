@@ -23,16 +23,15 @@ STATES = 200  # of the walk that is made at once
 HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
-contacts; <b>tables</b> (CSV): disks with columns x, y, r, and, if there are any, contacts with
-columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
+contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
+j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
 y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
-of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a
-packing is kept, in the cache; a frame is not, unless it is opened as one.
+of PeGS 2, for which the nearest balanced forces are computed. Files are read into memory. A packing
+is saved in the cache; a frame is saved only if you open it as a packing.
 """
 BOX_WANTED = (
-    "Fill in Box: the two sides of the box in which these disks are periodic, such as 30, 30, and "
-    "its tilt, if it has one; then press Read. Disks in an open set need columns fx, fy, torque "
-    "with the load on each."
+    "Enter the sides of the periodic box in Box, such as 30, 30, and its tilt, if any; then press "
+    "Read. Disks without a box need columns fx, fy, torque with the load on each."
 )
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
@@ -149,8 +148,8 @@ class View:
             sides = (self.box.value_input or self.box.value).replace(",", " ").split()
             if len(sides) not in (0, 2, 3):
                 raise InputError(
-                    "give two sides of the box, such as 30, 30, and its tilt, if it has one; or "
-                    "nothing if it is open"
+                    "enter the two sides of the box, such as 30, 30, and its tilt, if any; leave "
+                    "it empty for an open packing"
                 )
             options["box"] = [positive(side, "a side of the box") for side in sides[:2]] or None
             options["tilt"] = (
