@@ -87,7 +87,7 @@ class Tabs:
         self.tabs.sx = WITHOUT_SPACE if wide else LOOK
         place.visible = wide  # nobody else need begin with it
         if wide and not place.objects:
-            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE)]
+            place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE), note(OPENING)]
 
     def beside(self, place: Any) -> Iterator[None]:
         """Put force space into a place of its own on a wide screen, else back into its tab."""
@@ -104,7 +104,7 @@ class Tabs:
             yield  # two plots of one name must not be in one message
             view = self._space = TABS["plane"][1](self.state)
             yield
-            place.append(view.panel())
+            place[1] = view.panel()
         else:
             self._leave(place)
             self._begun.discard("plane")

@@ -45,7 +45,7 @@ class View(TabView):
         self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.others = OtherStates(state, self._show_others)
-        self.lead, self.finding, self.told = note(), note(), note()
+        self.lead, self.finding, self.told = note("Placing the networks …"), note(), note()
         self.sweeps = [_sweep(label, axis) for axis, label in enumerate(SWEEPS)]
         for task in (self.placing, self.task):
             task.param.watch(self.failed, "message")

@@ -55,7 +55,8 @@ class View(TabView):
         super().__init__(state, "replay", "exact", "catalogue", looks=["axis"])
         self.task = state.work.task(reading)
         self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
-        self.first, self.fourth, self.sixth, self.told = note(), note(), note(), note()
+        self.first = note("Reading and drawing Figures 1, 4 and 6 …")
+        self.fourth, self.sixth, self.told = note(), note(), note()
         self.figures = [pn.Column(**WIDE) for _ in range(3)]
         self.folded = [pn.Column(**WIDE) for _ in THIS]
         self.indeterminacy: Indeterminacy | None = None
