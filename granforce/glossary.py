@@ -293,11 +293,6 @@ TERMS = {
         "carry for certain",
         "Contacts with a force above 0 in every network that remains, by certified bounds.",
     ),
-    "overlay": Term(
-        "strong and undetermined contacts",
-        "Filled: the tenth of the contacts with the largest force. Rings: the tenth with the "
-        "largest extent ΔFₙ. They are often not the same (Fig. 5 of the paper).",
-    ),
     "place": Term(
         "place in its interval",
         "Where the force as packed lies between the smallest and the largest possible.",

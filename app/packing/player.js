@@ -369,7 +369,7 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for those who find the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
+  const looks = ["most", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
   model.on(["tab", "wide", "pushing"], () => {
     if (!player.replay || player.live.moves) return

@@ -19,7 +19,7 @@ from .player import Player, frames
 
 # Both ways.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "overlay", "paused", "opened")
+SHARED += ("stretch", "paused", "opened")
 SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
@@ -33,15 +33,12 @@ LEGEND = """
 <span>up to <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩</span>
-<span class="loose" tabindex="0" data-term="rattler">pale disks carry no force</span>
-{marks}
+<span tabindex="0" data-term="rattler">pale disks carry no force</span>
 <details><summary>Scales</summary>
 <label>colours full at <input name="full" type="number" step="any" placeholder="auto"
   min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
 <label>widths times <input name="stretch" type="number" step="any"
   min="{stretch_least:g}" max="{stretch_most:g}" value="{stretch:g}"></label>
-<label data-term="overlay"><input name="overlay" type="checkbox"{overlay}>
-  mark strong and undetermined contacts</label>
 </details>
 """
 JAMMING = """
@@ -53,8 +50,6 @@ copies</span>
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
 )
-DOT = """<svg width="12" height="12">
- <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 
 
 class PackingView:
@@ -93,7 +88,7 @@ class PackingView:
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain,
-            ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab", "reference"],
+            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference"],
         )
         state.param.watch(self._explain, ["seen", "exact", "loads", "measured"])
         state.knowledge.param.watch(self._explain, ["known", "narrowed"])
@@ -286,8 +281,6 @@ def legend(state: AppState, pulled: bool = False) -> str:
         stretch=looks.stretch,
         stretch_least=least,
         stretch_most=most,
-        overlay=" checked" if looks.overlay else "",
-        marks=_marks(looks.dark) if looks.overlay else "",
     )
 
 
@@ -309,10 +302,3 @@ def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     )
     title = {"colour": "Colour", "thickness": "Width"}[name]
     return f'<select name="{name}" aria-label="{title}">{options}</select>'
-
-
-def _marks(dark: bool) -> str:
-    colours = palettes(dark)["scene"]
-    strong = DOT.format(fill=colours["strong"], line="none", text="tenth with largest fₙ")
-    loose = DOT.format(fill="none", line=colours["loose"], text="tenth with largest ΔFₙ")
-    return f'<span tabindex="0" data-term="overlay">{strong}{loose}</span>'

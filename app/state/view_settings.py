@@ -45,7 +45,6 @@ SORTS = {
 }
 DRAWN = {"all": "all", "some": "a few"}
 # What single tabs can show.
-AXES = {"linear": "linear", "log": "logarithmic"}
 PUSHES = {
     "one": "one contact",
     "all": "every contact",
@@ -82,7 +81,6 @@ class Seen(param.Parameterized):
         doc="⟨f_n⟩ at which colours are full; None: half for changes, else as the packing has it",
     )  # fmt: skip
     stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
-    overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
     pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
     scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
 
@@ -107,7 +105,6 @@ class Looks(Seen):
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
     )
-    axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 

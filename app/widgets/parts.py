@@ -162,11 +162,6 @@ def note(text: str = "", **options: Any) -> pn.pane.HTML:
     )  # fmt: skip
 
 
-def one_of_several(label: str, **options: Any) -> pmui.Button:
-    """A quiet button in a row of its kind."""
-    return pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED, **options)
-
-
 def by_words(labels: dict[str, str]) -> dict[str, str]:
     """Labels {value: words} as a list takes them: {words: value}."""
     return {words: value for value, words in labels.items()}

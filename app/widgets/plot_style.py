@@ -64,7 +64,6 @@ def palettes(dark: bool) -> dict[str, Any]:
             "disks": disks,
             "edge": EDGE,
             "strong": "#ffffff" if dark else "#101720",
-            "loose": "#ff5ca8" if dark else DOT,
             "selected": "#ff5ca8" if dark else DOT,
             "known": "#4dd0b5" if dark else "#00695c",
             **dict(zip(("across", "up"), lines(dark), strict=True)),

@@ -287,7 +287,7 @@ def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(query, visited
 
 def test_the_view_travels_with_the_link(state, visited):
     seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
-    state.looks.param.update(**seen, overlay=True, dark=True)
+    state.looks.param.update(**seen, stretch=2.0, dark=True)
     again = visited(state.link())
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
@@ -598,7 +598,7 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
 
 
 def test_a_link_keeps_what_single_tabs_show(state, visited):
-    chosen = {"axis": "log", "pushing": "all", "axes": "stress"}
+    chosen = {"pushing": "all", "axes": "stress"}
     chosen["zoom"] = (3.5, 4.25, 2.0)
     state.looks.param.update(**chosen)
     again = visited(f"?{state.link()}")

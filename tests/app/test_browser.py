@@ -289,19 +289,6 @@ def test_chains_are_coloured_by_what_is_chosen(visit, colour):
         np.testing.assert_allclose(shown, 32 * np.clip(extent / most, 0, 1), atol=0.501)
 
 
-def test_strong_and_undetermined_contacts_are_marked(visit):
-    page = visit("?overlay=1")
-    strong = np.array(scene(page, "Array.from(scene.style.strong)"), dtype=bool)
-    loose = np.array(scene(page, "Array.from(scene.style.loose)"), dtype=bool)
-    original = np.array(scene(page, "Array.from(scene.geometry.normal)"))[: len(strong)]
-    extent = np.array(
-        scene(page, "Array.from(scene.geometry.high, (h, k) => h - scene.geometry.low[k])")
-    )
-    for marked, values in ((strong, original), (loose, extent)):
-        assert marked.sum() == max(1, round(0.1 * len(values)))
-        assert values[marked].min() >= values[~marked].max()
-
-
 # Playing
 
 

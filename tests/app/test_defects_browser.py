@@ -177,15 +177,9 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
 # 6: Keys
 
 
-@pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
-def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
-    page = scales(visit("?tab=statistics" if focused == "toggle" else ""))
-    clicked = {
-        "tab": page.get_by_role("tab", name="Intervals"),
-        "toggle": page.get_by_role("button", name="logarithmic", exact=True),
-        "switch": page.get_by_label("mark strong and undetermined contacts"),
-    }[focused]
-    clicked.click()
+def test_space_and_arrows_play_whatever_was_clicked(visit):
+    page = visit()
+    page.get_by_role("tab", name="Intervals").click()
     page.keyboard.press("ArrowRight")
     state = page.locator(".state")
     page.wait_for_function("e => !e.textContent.endsWith('as packed')", arg=state.element_handle())
@@ -197,12 +191,11 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
 
 def test_who_goes_by_tab_means_the_widget(visit):
     page = scales(visit())
-    switch = page.get_by_label("mark strong and undetermined contacts")
-    page.get_by_label("widths times").focus()
+    page.get_by_label("colours full at").focus()
     page.keyboard.press("Tab")
-    assert switch.evaluate("e => e.getRootNode().activeElement === e")
+    wide = page.get_by_label("widths times")
+    assert wide.evaluate("e => e.getRootNode().activeElement === e")
     page.keyboard.press(" ")
-    searched(page, "overlay=1")
     assert page.locator(".stage.playing").count() == 0
 
 

@@ -95,7 +95,7 @@ SELECTION = (
     "radii", "source", "relax", "packing",
 )  # fmt: skip
 VIEW = (
-    "tab", "contact", "frame", "reference", "between", "colour", "thickness", "overlay", "sort",
+    "tab", "contact", "frame", "reference", "between", "colour", "thickness", "sort",
     "scale", "dark",
 )  # fmt: skip
 

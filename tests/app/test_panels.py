@@ -389,9 +389,7 @@ def test_nothing_of_friction_is_computed_before_it_is_seen(state):
     assert not view.task.running and not view.figures[0].objects
 
 
-@pytest.mark.parametrize("scale", ["linear", "log"])
-def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state, scale):
-    state.looks.axis = scale
+def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state):
     view = friction_tab(state)
     row = distributions.rows([state.cell])[0]
     wanted = {0: row["eta2"], 2: row["correlation"]}

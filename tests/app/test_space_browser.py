@@ -120,36 +120,6 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     searched(page, "~")
 
 
-@pytest.mark.parametrize(("button", "axis"), [("Sweep green", "x"), ("Sweep violet", "y")])
-def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
-    """Along one axis only; all forces are as they were after it, and after one that is stopped."""
-    page = visit("?tab=plane&frame=2")
-    ready(page)
-    before, (x, y) = normal(page), here(page)
-    sweep = page.get_by_role("button", name=button)
-    sweep.click()
-    ends = column(page, "outer", axis)
-    spot, across = f"{MODEL}('here')", {"x": "y", "y": "x"}[axis]
-    for end in (max(ends), min(ends)):
-        # as far as the line through the network goes
-        page.wait_for_function(
-            f"([from, end]) => ({spot}.get_column('{axis}')[0] - from) / (end - from) > 0.5",
-            arg=[{"x": x, "y": y}[axis], end],
-        )
-        other = page.evaluate(f"{spot}.get_column('{across}')[0]")
-        assert other == pytest.approx({"x": x, "y": y}[across], abs=1e-4)
-        assert normal(page).min() > -1e-6 and np.abs(normal(page) - before).max() > 1e-3
-    assert "orange carries more" in page.locator(".said").inner_text()
-    until(page, "scene.hand.spot.target === null")  # it comes to an end by itself
-    np.testing.assert_array_equal(normal(page), before)
-    assert page.locator(".said").text_content() == "" and "pull=" not in page.url
-    sweep.click()
-    until(page, "scene.hand.player.replay.held !== null")
-    sweep.click()
-    until(page, "scene.hand.player.replay.held === null")
-    np.testing.assert_array_equal(normal(page), before)
-
-
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""

@@ -28,7 +28,7 @@ export class PackingPicture {
   show(packing, marked) {
     this.packing = packing
     const count = packing.contacts
-    this.style = { width: new Float32Array(count), bin: new Int16Array(count), alpha: 1, strong: null, loose: null }
+    this.style = { width: new Float32Array(count), bin: new Int16Array(count) }
     this.scene.show(packing)
     this.scene.selected = marked
     this.scene.resize()

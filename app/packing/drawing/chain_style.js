@@ -3,9 +3,7 @@
 import { plain } from "../../browser/to_object.js"
 
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
-const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
-const DIM = 0.35 // chains under the marks of Fig. 5
 
 export class Look {
   constructor(model, walk) {
@@ -15,7 +13,6 @@ export class Look {
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
-    this.strong = largest(walk.normal.subarray(0, walk.contacts))
     this.measure()
   }
 
@@ -25,7 +22,6 @@ export class Look {
     this.exact = exact.low?.length === walk.contacts ? exact : null
     const { low, high } = this.exact ?? walk
     this.extent = high.map((value, c) => value - low[c])
-    this.loose = largest(this.extent)
     this.loads = model.loads?.length === walk.contacts ? model.loads : null
     this.mostLoad = Math.max(...(this.loads ?? [1]))
     const measured = plain(model.measured ?? {})
@@ -52,9 +48,6 @@ export class Look {
     for (let c = 0; c < style.bin.length; c++) {
       style.bin[c] = told ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
     }
-    style.alpha = model.overlay ? DIM : 1
-    style.strong = model.overlay ? this.strong : null
-    style.loose = model.overlay ? this.loose : null
     return style
   }
 
@@ -163,12 +156,4 @@ export class Look {
     }
     return virial / (2 * Math.PI * radius.reduce((sum, r) => sum + r * r, 0))
   }
-}
-
-/** Which of the values are among the largest, MARKED of them: 1 or 0 each. */
-function largest(values) {
-  const order = Array.from(values.keys()).sort((a, b) => values[b] - values[a] || a - b)
-  const marked = new Uint8Array(values.length)
-  for (const c of order.slice(0, Math.max(1, Math.round(MARKED * values.length)))) marked[c] = 1
-  return marked
 }

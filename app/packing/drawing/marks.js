@@ -1,29 +1,10 @@
 // Marks over the chains of a Scene, which says where everything is: the selected contact, axes of force space,
-// forces on a disk, and the strong and undetermined contacts of the paper's Fig. 5.
+// and forces on a disk.
 
 import { arrow, circle, line } from "../../browser/canvas_paths.js"
 
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
 const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
-const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
-
-/** Strong contacts filled, undetermined ones open; style: `strong` and `loose`, by contact. */
-export function markExtremes(marks, scene, style) {
-  const { scale, palette } = scene
-  const radius = Math.max(MARK, 2 / scale)
-  for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
-    marks.beginPath()
-    for (const { middle: [x, y] } of scene.segments((contact) => chosen[contact])) {
-      marks.moveTo(x + radius * size, y)
-      marks.arc(x, y, radius * size, 0, 2 * Math.PI)
-    }
-    marks.fillStyle = palette.strong
-    marks.strokeStyle = palette.loose
-    marks.lineWidth = Math.max(0.09, 1.2 / scale)
-    if (filled) marks.fill()
-    else marks.stroke()
-  }
-}
 
 /** The forces that press on a disk, each an arrow that ends where it acts. */
 export function markForces(marks, scene, disk) {

@@ -3,7 +3,7 @@
 
 import { made } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
-import { highlight, markExtremes, markForces, markSelected } from "./marks.js"
+import { highlight, markForces, markSelected } from "./marks.js"
 import { listen } from "../hand/pointing.js"
 import { PIXELS, Sheet } from "./svg_context.js"
 
@@ -194,9 +194,7 @@ export class Scene {
     }
     this.counts = { segments: contact.length, drawn, outside, thin }
     this.begin(chains)
-    chains.globalAlpha = style.alpha
     this.stroke(order.slice(0, drawn), style.colours)
-    chains.globalAlpha = 1
     this.drawMarks(style)
     if (!this.painted++) performance.mark("packing painted") // how long opening took
   }
@@ -226,11 +224,10 @@ export class Scene {
     }
   }
 
-  /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
+  /** The selected contact, the axes of force space, and what others add. */
   drawMarks(style) {
     const { marks, palette } = this
     this.begin(marks)
-    if (style.strong) markExtremes(marks, this, style)
     if (this.selected !== null) markSelected(marks, this, this.selected)
     this.pair.forEach((contact, k) => highlight(marks, this, contact, k ? palette.up : palette.across))
     if (this.pointed >= 0 && this.describe?.forces) markForces(marks, this, this.pointed)

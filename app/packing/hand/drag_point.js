@@ -4,10 +4,6 @@
 
 import { FORCES } from "../replay/live.js"
 
-const SWEEP_MS = 7000 // from the network on screen to both ends of S along an axis, and back
-const SWEPT = "From one end of S to the other and back: orange carries more than before, blue less"
-const STILL = matchMedia("(prefers-reduced-motion: reduce)")
-
 export class PointHand {
   constructor(hand) {
     this.hand = hand
@@ -19,13 +15,11 @@ export class PointHand {
   drop() {
     this.target = this.fan = this.from = null
     this.flung = false // whether it was let go before its networks were there
-    this.axis = this.was = null // along which it goes by itself, and what was on screen before
   }
 
   // The hand
 
   take(x, y) {
-    this.halt()
     if (!this.hand.begin()) return
     this.target = [x, y]
     this.hand.tell({ point: true })
@@ -62,48 +56,7 @@ export class PointHand {
     this.from.residual = hand.replay.residual
     hand.remember()
     this.set()
-    if (this.axis !== null) this.go()
-    else if (this.flung) this.leave()
-  }
-
-  // By itself
-
-  /** Go once to and fro along an axis of the plane (0: across, 1: up), and back; asked again, stop. */
-  sweep(axis) {
-    const { hand } = this, again = this.axis === axis
-    this.halt()
-    if (again || !hand.begin()) return
-    const { mixed, held } = hand.replay, here = hand.player.plots.projected(mixed)
-    if (!here) return
-    Object.assign(this, { target: here, axis, was: { held, before: hand.before } })
-    hand.tell({ point: true })
-  }
-
-  go() {
-    const { fan, axis, from: { here }, hand } = this, { replay, player } = hand, { plane } = player.plots
-    const [low, high] = chord(fan, here, axis), begin = performance.now()
-    const step = (now) => {
-      if (fan !== this.fan) return
-      const part = Math.max(0, now - begin) / SWEEP_MS, swing = Math.sin(2 * Math.PI * part)
-      if (part >= 1 || replay !== hand.replay || plane !== player.plots.plane) return this.halt()
-      const along = STILL.matches ? Math.sign(swing) : swing
-      this.target = here.map((v, k) => (k === axis ? v + along * (along > 0 ? high : -low) : v))
-      this.set()
-      requestAnimationFrame(step)
-    }
-    step(begin)
-  }
-
-  /** What went by itself stops, and all is as it was before. */
-  halt() {
-    const { axis, was, hand, fan } = this
-    if (axis === null) return
-    this.drop()
-    if (!fan) return void hand.still()
-    hand.before = was.before
-    if (was.held) hand.keep(was.held)
-    else hand.forget()
-    hand.still()
+    if (this.flung) this.leave()
   }
 
   /** The network at the target, or at the nearest point of the polygon. */
@@ -122,22 +75,9 @@ export class PointHand {
   }
 
   describe(x, y) {
-    if (this.axis !== null) return this.hand.player.say(SWEPT)
     this.hand.player.say(`The point in force space pulled to ` +
       `(${x.toFixed(2)}, ${y.toFixed(2)}), in mean forces; orange carries more than before, blue less`)
   }
-}
-
-/** How far a polygon goes from a point within it along an axis: down to a number ≤ 0, up to one ≥ 0. */
-function chord({ x, y }, [px, py], axis) {
-  let [low, high] = [-Infinity, Infinity]
-  for (let k = 0; k < x.length; k++) {
-    const next = (k + 1) % x.length, ex = x[next] - x[k], ey = y[next] - y[k]
-    const room = Math.max(0, ex * (py - y[k]) - ey * (px - x[k])), slope = axis ? ex : -ey
-    if (slope > 0) low = Math.max(low, -room / slope)
-    if (slope < 0) high = Math.min(high, -room / slope)
-  }
-  return [low, high]
 }
 
 /** A point, or the nearest one of the polygon's edge where it lies outside (corners run left about). */

@@ -53,7 +53,7 @@ function flickering({ normal, tangential, radius, mu }, palettes, scales) {
     const part = mu > 0 && value > CARRYING ? tangential[c] / (mu * value) : 0
     return Math.round(last * Math.max(0, Math.min(1, 0.5 + part / 2)))
   })
-  return { width, bin, colours, alpha: 1, strong: null, loose: null }
+  return { width, bin, colours }
 }
 
 /** A walk of one frame with room for those to come: `number` tells how many there are. */

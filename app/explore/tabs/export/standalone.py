@@ -89,7 +89,7 @@ def html(
     between = view["between"]
     if len(kept.normal) < len(replay.normal):
         frame, between = 0, None
-    same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale", "paused")
+    same = ("contact", "colour", "thickness", "full", "stretch", "scale", "paused")
     own = set(Player.param) - set(Scripted.param)
     given = {name: Player.param[name].default for name in own}
     given |= {name: view[name] for name in same}

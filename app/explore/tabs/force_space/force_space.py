@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import panel as pn
-import panel_material_ui as pmui
 
 from granforce.records import InputError
 
@@ -14,7 +13,7 @@ from ....results.planes import Outlined, Plane
 from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....state.view_settings import PLANES
-from ....widgets.parts import TabView, folded, note, one_of_several, plotted, question
+from ....widgets.parts import TabView, folded, note, plotted, question
 from ....widgets.progress import Progress
 from . import sentences
 from .other_states import MARKED, OtherStates
@@ -27,10 +26,6 @@ ASPECT, WIDE_ASPECT = 1.6, 1.15
 COMING = "Networks appear as they are sampled."
 GROWS = "Networks appear as they are sampled; the exact outline of S follows."
 ONE_POINT = "At h = 0 the forces are determined: S is one point."
-# The point goes along an axis by itself, see drag_point.js.
-SWEEPS = ("Sweep across ↔", "Sweep up ↕")
-SWEEPS_OF_A_PAIR = ("Sweep green ↔", "Sweep violet ↕")
-SWEEP = 'button.document.get_model_by_name("player").player.hand.spot.sweep(axis)'
 
 
 class View(TabView):
@@ -46,7 +41,6 @@ class View(TabView):
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.others = OtherStates(state, self._show_others)
         self.lead, self.finding, self.told = note("Placing the networks …"), note(), note()
-        self.sweeps = [_sweep(label, axis) for axis, label in enumerate(SWEEPS)]
         for task in (self.placing, self.task):
             task.param.watch(self.failed, "message")
         self.planes.param.watch(self.refresh, "value")
@@ -62,7 +56,7 @@ class View(TabView):
         return pn.Column(
             self.lead,
             plotted(self.drawing.figure),
-            pn.FlexBox(self.planes, *self.sweeps, **wide),
+            self.planes,
             self.finding,
             Progress(self.placing, self.task),
             self.told,
@@ -78,10 +72,6 @@ class View(TabView):
         state, replay = self.state, self.state.seen
         if replay is None:
             return
-        free = replay.summary["dimension"]
-        labels = SWEEPS_OF_A_PAIR if self.kind == "pair" else SWEEPS
-        for button, label in zip(self.sweeps, labels, strict=True):
-            button.param.update(label=label, visible=free > 0 and not state.growing)
         wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -233,13 +223,6 @@ class View(TabView):
             called = MARKED[self.others.kind]
         self.finding.object = sentences.finding(found, replay, others, called)
         self.told.object = folded(sentences.computed(found, replay))
-
-
-def _sweep(label: str, axis: int) -> pmui.Button:
-    """A button by which the point goes along an axis and back; pressed again, it stops."""
-    button = one_of_several(label)
-    button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
-    return button
 
 
 def _loosest(replay: Replay) -> int:

@@ -31,18 +31,13 @@ class Line(NamedTuple):
 class AgainstFriction:
     """Lines of the study against μ; `mark` puts rings where the page's packings lie."""
 
-    def __init__(
-        self, name: str, label: str, lines: Sequence[Line], *, log: bool = False, **options: Any
-    ) -> None:
+    def __init__(self, name: str, label: str, lines: Sequence[Line], **options: Any) -> None:
         """name: of the file that the figure is saved as; label: of the axis of values."""
-        kind = "log" if log else "linear"
-        fig = figure(
-            name, None, "friction μ", label, x_axis_type="log", y_axis_type=kind, **options
-        )
+        fig = figure(name, None, "friction μ", label, x_axis_type="log", **options)
         fig.xaxis.ticker = FixedTicker(ticks=DECADES)
         fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
         fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
-        self.figure, self.log = fig, log
+        self.figure = fig
         self.points: list[GlyphRenderer] = []
         self.own: list[ColumnDataSource] = []
         self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
@@ -55,7 +50,7 @@ class AgainstFriction:
 
     def _draw(self, k: int, line: Line) -> None:
         fig, colour, marker = self.figure, COLOURS[k], MARKERS[k % len(MARKERS)]
-        x, y, error = shown(line.points, self.log)
+        x, y, error = shown(line.points)
         own = ColumnDataSource({"x": [], "y": []})
         self.own.append(own)
         rings = fig.scatter(
@@ -66,8 +61,7 @@ class AgainstFriction:
         if not len(x):
             return
         fig.line(x, y, color=colour, line_width=1.6, line_dash=line.dash, legend_label=line.label)
-        low = np.maximum(y - error, 0.1 * y) if self.log else y - error
-        fig.segment(x, low, x, y + error, color=colour, line_width=1.4)
+        fig.segment(x, y - error, x, y + error, color=colour, line_width=1.4)
         source = ColumnDataSource({"x": x, "y": y, "error": error})
         dots = fig.scatter(
             "x", "y", source=source, color=colour, size=6, marker=marker, legend_label=line.label
@@ -79,9 +73,9 @@ class AgainstFriction:
     def mark(self, own: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
         """Open symbols at `own` points, of each line, and rings at `here`, (μ, value)."""
         for source, points in zip(self.own, own, strict=True):
-            x, y, _ = shown(points, self.log)
+            x, y, _ = shown(points)
             source.data = {"x": x, "y": y}
-        x, y, _ = shown([(mu, value, 0.0) for mu, value in here], self.log)
+        x, y, _ = shown([(mu, value, 0.0) for mu, value in here])
         self.here.data = {"x": x, "y": y}
 
     def choosable(self, choose: Callable[[float], object]) -> None:
@@ -99,7 +93,7 @@ class AgainstFriction:
         self.figure.add_tools(TapTool(renderers=self.points))
 
 
-def shown(points: Points, log: bool) -> Floats:
-    """Columns x, y, error of those points that logarithmic axes of μ, and of values, can show."""
-    kept = [p for p in points if p[0] > 0 and np.isfinite(p[1]) and (not log or p[1] > 1e-12)]
+def shown(points: Points) -> Floats:
+    """Columns x, y, error of those points that a logarithmic axis of μ can show."""
+    kept = [p for p in points if p[0] > 0 and np.isfinite(p[1])]
     return np.array(kept, dtype=float).reshape(-1, 3).T

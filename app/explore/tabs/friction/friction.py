@@ -12,8 +12,7 @@ from ....results.distributions import Row
 from ....results.library import Cell, Library
 from ....results.replays import Replay
 from ....state.app_state import AppState
-from ....state.view_settings import AXES
-from ....widgets.parts import TabView, choice, folded_away, linked, note, plotted
+from ....widgets.parts import TabView, folded_away, note, plotted
 from ....widgets.progress import Progress
 from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
@@ -52,9 +51,8 @@ class View(TabView):
     name = "statistics"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "replay", "exact", "catalogue", looks=["axis"])
+        super().__init__(state, "replay", "exact", "catalogue")
         self.task = state.work.task(reading)
-        self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
         self.first = note("Reading and drawing Figures 1, 4 and 6 …")
         self.fourth, self.sixth, self.told = note(), note(), note()
         self.figures = [pn.Column(**WIDE) for _ in range(3)]
@@ -73,7 +71,7 @@ class View(TabView):
         folds = folded_away(*pairs)
         self.looks.keep_active(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
-            Progress(self.task), self.first, first, self.scale, self.fourth, fourth, self.sixth,
+            Progress(self.task), self.first, first, self.fourth, fourth, self.sixth,
             sixth, folds, self.told, **WIDE,
         )  # fmt: skip
 
@@ -90,9 +88,8 @@ class View(TabView):
 
     def _show(self, replay: Replay, rows: Rows) -> Iterator[None]:
         """Figure 1 first; a generator of pieces."""
-        log = self.looks.axis == "log"
-        if self.indeterminacy is None or self.indeterminacy.etas.log != log:
-            self.indeterminacy = Indeterminacy(log)
+        if self.indeterminacy is None:
+            self.indeterminacy = Indeterminacy()
             self._place(self.indeterminacy)
         self.first.object = self.indeterminacy.sentence()
         self.indeterminacy.mark(rows.own, rows.here)

@@ -36,19 +36,17 @@ ROOM = 1.5  # of the largest η: above the rising curve is the inset
 class Indeterminacy:
     """Figure 1: η1, η2 and 0.15 η3 against μ; in the inset z."""
 
-    def __init__(self, log: bool) -> None:
+    def __init__(self) -> None:
         walks = study_data.rows("walk")
         lines = [
             Line(label, statistics.means(walks, name, factor=factor))
             for name, label, factor in MEASURES
         ]
         self.etas = AgainstFriction(
-            "indeterminacy", "indeterminacy η", lines, log=log, height=340, min_border_left=62
+            "indeterminacy", "indeterminacy η", lines, height=340, min_border_left=62
         )
         most = max((y + error for line in lines for _, y, error in line.points), default=1.0)
-        self.etas.figure.y_range = DataRange1d(
-            end=30 * most if log else ROOM * most, **({} if log else {"start": 0})
-        )
+        self.etas.figure.y_range = DataRange1d(start=0, end=ROOM * most)
         self.z = AgainstFriction(
             "coordination", "z", [Line("z", statistics.means(walks, "coordination"))], height=130,
             min_border_left=28, min_border_right=6, tools="",
