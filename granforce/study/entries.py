@@ -213,7 +213,9 @@ def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
 def _identity(folder: Path) -> tuple[int, int, int] | None:
     """Which folder has this name just now, or None; renaming one changes it."""
     try:
-        found = folder.stat()
+        found = (
+            folder.stat() if folder.exists() else folder.lstat()
+        )  # a link to nothing is no entry
     except OSError:
         return None
     return found.st_dev, found.st_ino, found.st_ctime_ns
