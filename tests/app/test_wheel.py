@@ -7,6 +7,7 @@ import subprocess
 import sys
 import urllib.request
 import zipfile
+from pathlib import Path
 
 import pytest
 from serving import CHROMIUM, FLAGS, MANY, PATIENCE, free_port, painted, wait_until_served
@@ -64,7 +65,7 @@ def installed(wheel):
 
 @pytest.mark.slow
 def test_every_module_is_in_the_wheel_and_no_picture_of_a_readme(wheel):
-    """Those of the app are mapped into granforce."""
+    """Those of the app are mapped into granforce; the documentation shows those of data."""
     found = [
         path.relative_to(ROOT) for room in ("app", "granforce") for path in (ROOT / room).rglob("*")
     ]
@@ -72,7 +73,11 @@ def test_every_module_is_in_the_wheel_and_no_picture_of_a_readme(wheel):
     expected = {name if name.startswith("granforce") else f"granforce/{name}" for name in python}
     held = set(zipfile.ZipFile(wheel).namelist())
     assert expected - held == set()
-    assert not [name for name in held if name.endswith(("README.md", ".png", ".webp"))]
+    pictures = {name for name in held if name.endswith((".png", ".webp"))}
+    shown = {path.name for path in (ROOT / "data" / "figures").glob("*.png")} | {"bench.png"}
+    assert pictures == {name for name in pictures if name.startswith("granforce/data/")}
+    assert {Path(name).name for name in pictures} == shown
+    assert not [name for name in held if name.endswith("README.md")]
 
 
 @pytest.mark.slow
