@@ -77,23 +77,23 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"
 
 
-# Number of the summary → key of the glossary, and words.
+# Number of the summary → key of the glossary, a noun, and what follows it.
 LEFT_OUT = {
-    "rattlers": ("rattler", "loose disks"),
-    "unloaded_contacts": ("unloaded", "contacts without force"),
-    "tangential_unknowns": ("no_friction", "forces along contacts"),
-    "skipped": ("determined", "networks identical to the others"),
-    "held": ("held_components", "forces that cannot vary"),
-    "dropped": ("dropped", "networks on the way to the sample"),
+    "rattlers": ("rattler", "loose disk", ""),
+    "unloaded_contacts": ("unloaded", "contact", " without force"),
+    "tangential_unknowns": ("no_friction", "force", " along contacts"),
+    "skipped": ("determined", "network", " identical to the others"),
+    "held": ("held_components", "force", " that cannot vary"),
+    "dropped": ("dropped", "network", " on the way to the sample"),
 }
 
 
 def left_out(summary: Summary) -> str:
     """One line on work that was skipped and attempts that failed, as HTML."""
     counts = [
-        f"{summary[key]} {term(key_of_term, words)}"
-        for key, (key_of_term, words) in LEFT_OUT.items()
-        if summary.get(key)
+        f"{count} {term(key_of_term, noun + 's' * (count != 1) + rest)}"
+        for key, (key_of_term, noun, rest) in LEFT_OUT.items()
+        if (count := summary.get(key))
     ]
     line = f"Not counted: {', '.join(counts) or 'nothing'}."
     if summary.get("rejected") or summary.get("unconverged"):

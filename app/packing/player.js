@@ -181,7 +181,7 @@ class Player {
   mark() {
     if (!this.replay || this.live.moves) return
     this.select()
-    this.scene.drawMarks(this.look.style)
+    this.scene.drawMarks()
     this.split.paint()
   }
 
@@ -349,7 +349,7 @@ class Player {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
-      pins: loaded(() => { this.recover(); scene.drawMarks(this.look.style) }),
+      pins: loaded(() => { this.recover(); scene.drawMarks() }),
       contact: loaded(() => { this.recover(); this.mark() }),
     }
   }

@@ -78,7 +78,7 @@ def rest(
         for _ in range(draws)
     ]
     ends: dict[int, Outcome] = {}
-    # Side by side these few flows take as long, and a first packing another 15 s to compile.
+    # Side by side these few flows gain little, and a first packing would wait for more kernels.
     follow(step, [_one(_from(start)) for start in starts], ends.__setitem__, lanes=ONE)
     outcomes = [ends[k] for k in range(len(starts))]
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)

@@ -59,8 +59,8 @@ def follow(
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
     finished(number, value) is called, by one thread at a time, as a work returns its value; if it
     raises, it is still called for what other threads have ended by then. lanes: ONE or MANY, by
-    default as suits the number of works. No outcome depends on the
-    number of threads, nor on what it is carried beside, bit for bit.
+    default as suits the number of works. No outcome depends on the number of threads, nor on what
+    it is carried beside, bit for bit.
     """
     waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 

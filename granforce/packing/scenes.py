@@ -347,5 +347,5 @@ SCENES = {
         "Thirteen disks under pressure", 0.3,
         partial(_pressed, disks=13, packed_mu=0.1, dimension=8), packed=True,
     ),
-    "many": _Scene("400 disks under pressure", 0.1, _many),
+    "many": _Scene("Disks under pressure", 0.1, _many),
 }  # fmt: skip

@@ -195,7 +195,7 @@ export class Scene {
     this.counts = { segments: contact.length, drawn, outside, thin }
     this.begin(chains)
     this.stroke(order.slice(0, drawn), style.colours)
-    this.drawMarks(style)
+    this.drawMarks()
     if (!this.painted++) performance.mark("packing painted") // how long opening took
   }
 
@@ -225,7 +225,7 @@ export class Scene {
   }
 
   /** The selected contact, the axes of force space, and what others add. */
-  drawMarks(style) {
+  drawMarks() {
     const { marks, palette } = this
     this.begin(marks)
     if (this.selected !== null) markSelected(marks, this, this.selected)
@@ -274,7 +274,7 @@ export class Scene {
   point(disk) {
     if (disk === this.pointed) return
     this.pointed = disk
-    if (this.style && this.geometry && !this.frozen) this.drawMarks(this.style)
+    if (this.style && this.geometry && !this.frozen) this.drawMarks()
   }
 
   /** The contact that a pointer takes in hand, or null where it moves the view.

@@ -30,7 +30,7 @@ export class Pushed {
     this.tellMotion()
     if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
       if (this.held) this.end()
-      return scene.style && scene.drawMarks(scene.style)
+      return scene.style && scene.drawMarks()
     }
     if (replay.position) player.show(0)
     player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
