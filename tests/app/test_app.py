@@ -88,7 +88,7 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
 
 def test_missing_stores_leave_a_note_not_an_error(tmp_path, visited):
     library = Library(tmp_path / "nowhere", tmp_path / "cache")
-    assert "not in any open store" in library.notes[0]
+    assert "there is no store at" in library.notes[0]
     state = visited(library=library)
     assert state.replay is None and state.work.message == ""
 

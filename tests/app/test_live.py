@@ -60,7 +60,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     browser, old = Browser(state), state.replay
     tab = View(state)
     state.ask(asked(0.23), at_once=True)
-    assert state.asked.startswith("asked for: μ = 0.23") and browser.player.asked == state.asked
+    assert state.asked.startswith("requested: μ = 0.23") and browser.player.asked == state.asked
     assert browser.player.live and state.seen is old
     browser.run(lambda: state.growing)
     pictures = browser.parts("picture")

@@ -202,5 +202,5 @@ def test_wrong_planes_of_an_outline_are_refused(tmp_path):
     with pytest.raises(InputError, match="two components, or by states"):
         kinds.OUTLINE.parameters(made)
     named = kinds.OUTLINE.parameters(made, components=[(10**6, 0), (0, 1)])
-    with pytest.raises(InputError, match="contact 1000000 is none of"):
+    with pytest.raises(InputError, match="contact 1000000 is not one of"):
         study.get(open_store(tmp_path / "store"), kinds.OUTLINE, named)

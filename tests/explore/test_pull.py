@@ -107,7 +107,7 @@ def test_values_outside_are_refused_with_the_interval(S, beyond):
 
 def test_a_contact_that_carries_nothing_cannot_be_pulled(S):
     idle = np.setdiff1d(np.arange(len(S.packing.contacts.i)), S.index)[0]
-    with pytest.raises(gf.InputError, match="none of the 159 that carry"):
+    with pytest.raises(gf.InputError, match="not one of the 159 that carry"):
         gf.pull(S, idle, 1.0)
 
 

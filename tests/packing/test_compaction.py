@@ -159,7 +159,7 @@ def test_radii_are_drawn_as_asked(rng):
         ({"pressure": 1e300}, "pressure"),
         ({"pressure": 1e-300}, "pressure"),
         ({"radii": [1e200] * 20}, "radii"),
-        ({"mu": 1e6}, "take at most 10000"),
+        ({"mu": 1e6}, "use at most 10000"),
         ({"dt": -1}, "dt"),
         ({"sweeps": 0}, "sweeps"),
         ({"accuracy": 1e300}, "accuracy"),
