@@ -23,6 +23,7 @@ from small_store import KEPT, ROOT
 # 1: Back and Forward
 
 
+@pytest.mark.slow
 def test_back_and_forward_restore_views_and_copied_links(visit):
     page = visit()
     shows(page, 0.1)

@@ -172,6 +172,7 @@ def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
     assert page.locator(".stage.pale").count() == 0
 
 
+@pytest.mark.slow
 def test_two_pages_see_the_same_walk(visit):
     query = "?mu=0.42&n=30&states=20000&relax=nearest"
     one = visit(query)

@@ -234,7 +234,7 @@ CHANGED_EARLY = """() => {
 def test_a_change_that_comes_before_a_component_listens_is_seen(visit):
     page = visit("")
     page.evaluate(CHANGED_EARLY)
-    page.get_by_role("tab", name="Export").click()
+    page.get_by_role("tab", name="Your packing").click()
     page.get_by_text("told early").first.wait_for(state="attached")
 
 

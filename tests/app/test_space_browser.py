@@ -120,6 +120,7 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     searched(page, "~")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""
@@ -157,6 +158,7 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     page.wait_for_function(f"() => {MODEL}('path').get_column('x').every(Number.isFinite)")
 
 
+@pytest.mark.slow
 def test_two_networks_side_by_side_with_one_player(visit):
     page = visit("?frame=3&reference=1")
     more(page).locator("button.split").click()
