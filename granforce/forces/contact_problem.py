@@ -219,8 +219,8 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
     if ensemble.reference is not None:
         states.append(_coordinates(ensemble, ensemble.reference))
     if states:
-        # Multipliers of rows that follow from others may be large: what a state's unbalance, up to
-        # BALANCED, contradicts there would pass for a bound. The best balanced state decides.
+        # Multipliers of redundant rows may be large: a state's residual, up to BALANCED, would
+        # give a false bound there. The state with the smallest residual is used.
         offs = np.abs(np.stack([A @ y for y in states]) - b)
         offs[:, sides] = 0.0
         least = int(np.argmin(offs.max(axis=1, initial=0.0)))

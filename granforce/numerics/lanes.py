@@ -43,31 +43,18 @@ tell_when_compiling(lambda: _log.info("compiling kernels, once per machine"))
 # former need to be called, a third of the time to compile is saved.
 # Where the compiler is off (NUMBA_DISABLE_JIT) they run as they are written, slowly, with the same
 # results; that numpy warns of what compiled code leaves at NaN or infinity is then switched off.
-compiled = (
-    np.errstate(all="ignore")
-    if config.DISABLE_JIT
-    else njit(cache=True, nogil=True, error_model="numpy")
-)
-within = njit(
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-    pipeline_class=PartCompiler,
-)
+_KERNEL = {"cache": True, "nogil": True, "error_model": "numpy"}
+_PART = _KERNEL | {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": PartCompiler,
+}
+compiled = np.errstate(all="ignore") if config.DISABLE_JIT else njit(**_KERNEL)
+within = njit(**_PART)
 # What must become part of those that call it: small ones, or their numbers pass through memory, and
 # whatever is called for each contact with a network, which is a hundred numbers to hand over (a
 # step of one interior-point method takes 0.15 ms in place of 0.27, with the same bits).
-inline = njit(
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-    forceinline=True,
-    pipeline_class=PartCompiler,
-)
+inline = njit(**_PART, forceinline=True)
 
 # What kernels take as their last argument: its length is known to the compiler.
 # Of numpy's numbers: kernels would be compiled once more for a constant that Python's numbers are.

@@ -297,7 +297,7 @@ def test_play_changes_the_chains_without_the_server(page):
     page.locator("input.speed").fill("2")
     before = scene(page, "[scene.painted, Array.from(scene.style.width)]")
     page.locator("button.play").click()
-    page.wait_for_timeout(400)  # that it plays is told once
+    page.wait_for_timeout(400)  # the page reports once that it plays
     page.evaluate("""() => {
         window.told = 0
         const send = WebSocket.prototype.send

@@ -132,7 +132,7 @@ def _draw_grains(fig: Figure, frame: Frame) -> None:
 
 
 def _mark(fig: Figure, frame: Frame) -> None:
-    """Suspects, contacts that certain to carry force, and what was mended."""
+    """Suspects, contacts that certainly carry force, and what was mended."""
     middle = frame.lines.mean(axis=1)
     for label, places, marker, colour in (
         ("suspect", middle[frame.suspects], "triangle", AMBER),

@@ -207,7 +207,7 @@ def listed(frame: Frame) -> str:
         (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
         (
             len(frame.certain),
-            "Contacts that were not measured and certain to carry force, by 2 σ",
+            "Contacts that were not measured but certainly carry force, by 2 σ",
             certain,
         ),
     ):
