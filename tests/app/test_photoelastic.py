@@ -129,7 +129,7 @@ def test_the_picture_shows_measured_inferred_and_differences(state):
     assert tuple(one.visible for one in picture.renderers) == seen["measured"]
     labels = {item.label.value for item in picture.legend[0].items}
     assert {"listed", "added", "certain"} <= labels
-    assert "certain to carry force" in body[5].object
+    assert "certainly carry force" in body[5].object
 
 
 def test_widths_and_lengths_have_scales():
