@@ -28,7 +28,7 @@ def pytest_configure(config):
     if is_worker or not count or config.option.collectonly or are_kept("flow.until_one_ends"):
         return
     begin = "from packings import reference\nfrom granforce.study.scan import kinds, warm_up\n"
-    paths = os.pathsep.join(str(config.rootpath / folder) for folder in (".", "tests"))
+    paths = os.pathsep.join(str(config.rootpath / folder) for folder in (".", "tests/shared"))
     both = [
         subprocess.Popen(
             [sys.executable, "-c", begin + half], env=os.environ | {"PYTHONPATH": paths}

@@ -9,6 +9,7 @@ import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from small_store import ROOT
 
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
@@ -188,3 +189,58 @@ def picture(page, name, **options):
     """What is seen of a page, as artefacts/NAME.png, where PICTURES is set: to be looked at."""
     if "PICTURES" in os.environ:
         page.screenshot(path=ROOT / "artefacts" / f"{name}.png", **options)
+
+
+def chain(page):
+    """(contact, x, y): the middle of the strongest chain well inside the picture, on the page."""
+    return page.locator(".scene").evaluate(
+        """e => {
+            const {scene} = e, {geometry: g, size} = scene, box = e.getBoundingClientRect()
+            let best, most = 0
+            for (let k = 0; k < g.contact.length; k++) {
+                const [x, y] = scene.toPixel((g.x0[k] + g.x1[k]) / 2, (g.y0[k] + g.y1[k]) / 2)
+                const inside = [x, y].every((v) => v > 0.3 * size && v < 0.7 * size)
+                if (inside && scene.width[k] > most) {
+                    most = scene.width[k]
+                    best = [g.contact[k], box.x + x, box.y + y]
+                }
+            }
+            return best
+        }"""
+    )
+
+
+def normal(page):
+    return np.array(scene(page, "Array.from(scene.mixed.normal)"))
+
+
+def pulled(page, up=60):
+    """Drag the strongest chain upwards; returns it and what was there before."""
+    contact, x, y = chain(page)
+    before = normal(page)
+    frames = scene(page, "scene.hand.frames")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 5)
+    until(page, "scene.hand.rail !== null")
+    for k in range(6):
+        page.mouse.move(x, y - 5 - up * (k + 1) / 6)
+    until(page, f"scene.hand.frames > {frames}")
+    return contact, before
+
+
+def place(page, x, y):
+    """Where a point of force space is on the page."""
+    return page.evaluate(
+        """([x, y]) => {
+            const page = Bokeh.documents[0]
+            const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
+            const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
+            return [box.x + x_scale.compute(x), box.y + y_scale.compute(y)]
+        }""",
+        [x, y],
+    )
+
+
+def here(page):
+    return [column(page, "here", name)[0] for name in "xy"]

@@ -8,16 +8,19 @@ from serving import (
     at_rest,
     bars_drawn,
     column,
+    here,
     laid_out,
     more,
     no_more,
+    normal,
+    place,
+    pulled,
     scene,
     searched,
     shows,
     until,
     zoomed,
 )
-from test_live_browser import normal, pulled
 
 # The outermost element of force space that is ever made pale.
 VIEW_ABOVE = """(() => {
@@ -30,23 +33,6 @@ VIEW_ABOVE = """(() => {
     }
     return pale
 })()"""
-
-
-def place(page, x, y):
-    """Where a point of force space is on the page."""
-    return page.evaluate(
-        """([x, y]) => {
-            const page = Bokeh.documents[0]
-            const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
-            const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
-            return [box.x + x_scale.compute(x), box.y + y_scale.compute(y)]
-        }""",
-        [x, y],
-    )
-
-
-def here(page):
-    return [column(page, "here", name)[0] for name in "xy"]
 
 
 def ready(page):

@@ -1,6 +1,6 @@
 """Measures the app in Debian's chromium and prints what it found.
 
-    python tests/app/measure.py [PART …]
+    python tests/app/measurements/measure.py [PART …]
 
 Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
 crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, tests, and above
+sys.path[:0] = [str(Path(__file__).parents[k]) for k in (1, 3)]  # tests/app, and the repository
 
 from playwright.sync_api import sync_playwright  # noqa: E402
 from serving import (  # noqa: E402
@@ -26,14 +26,15 @@ from serving import (  # noqa: E402
     MANY,
     MODEL,
     ask,
+    chain,
+    here,
     how_it_is_made,
     painted,
+    place,
     scene,
     serve,
     until,
 )  # fmt: skip
-from test_live_browser import chain  # noqa: E402
-from test_space_browser import here, place  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
 # A place in the packing where a drag moves the view, and pulls nothing.

@@ -9,7 +9,7 @@ from granforce.packing.compaction import pack
 from granforce.packing.importers import load_packing
 from granforce.records import make_contacts, make_packing
 
-REFERENCE = Path(__file__).parent / "reference"
+REFERENCE = Path(__file__).parents[1] / "reference"
 
 
 @functools.cache

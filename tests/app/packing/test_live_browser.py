@@ -8,11 +8,14 @@ from serving import (
     ask,
     at_rest,
     bars_drawn,
+    chain,
     column,
     how_it_is_made,
     laid_out,
     no_more,
+    normal,
     picture,
+    pulled,
     scene,
     searched,
     shows,
@@ -53,29 +56,6 @@ def ask_for_many_states(page):
     """So many that the walk cannot end before the browser has seen it grow."""
     how_it_is_made(page).get_by_label("States").first.fill("20000")
     page.get_by_label("States").first.press("Enter")
-
-
-def chain(page):
-    """(contact, x, y): the middle of the strongest chain well inside the picture, on the page."""
-    return page.locator(".scene").evaluate(
-        """e => {
-            const {scene} = e, {geometry: g, size} = scene, box = e.getBoundingClientRect()
-            let best, most = 0
-            for (let k = 0; k < g.contact.length; k++) {
-                const [x, y] = scene.toPixel((g.x0[k] + g.x1[k]) / 2, (g.y0[k] + g.y1[k]) / 2)
-                const inside = [x, y].every((v) => v > 0.3 * size && v < 0.7 * size)
-                if (inside && scene.width[k] > most) {
-                    most = scene.width[k]
-                    best = [g.contact[k], box.x + x, box.y + y]
-                }
-            }
-            return best
-        }"""
-    )
-
-
-def normal(page):
-    return np.array(scene(page, "Array.from(scene.mixed.normal)"))
 
 
 # Seen while it is computed
@@ -205,21 +185,6 @@ def test_a_hidden_tab_is_sent_nothing(visit):
 
 
 # In the hand
-
-
-def pulled(page, up=60):
-    """Drag the strongest chain upwards; returns it and what was there before."""
-    contact, x, y = chain(page)
-    before = normal(page)
-    frames = scene(page, "scene.hand.frames")
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x, y - 5)
-    until(page, "scene.hand.rail !== null")
-    for k in range(6):
-        page.mouse.move(x, y - 5 - up * (k + 1) / 6)
-    until(page, f"scene.hand.frames > {frames}")
-    return contact, before
 
 
 def test_a_dragged_chain_follows_the_hand_and_stays(page):

@@ -1,6 +1,6 @@
 """Records the page in Debian's chromium: a packing jams, a walk explores it, forces are pulled.
 
-    python tests/app/record.py [FILE.webp]
+    python tests/app/measurements/record.py [FILE.webp]
 
 By default app/page.webp, the picture of the README. The app is served with the shipped store and a
 cache of its own, so that the packing has to be made.
@@ -13,14 +13,26 @@ import tempfile
 from itertools import pairwise
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, tests, and above
+sys.path[:0] = [str(Path(__file__).parents[k]) for k in (1, 3)]  # tests/app, and the repository
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, KNOW, MANY, MODEL, ask, painted, scene, serve, until  # noqa: E402
+from serving import (  # noqa: E402
+    CHROMIUM,
+    FLAGS,
+    KNOW,
+    MANY,
+    MODEL,
+    ask,
+    chain,
+    here,
+    painted,
+    place,
+    scene,
+    serve,
+    until,
+)
 from small_store import ROOT  # noqa: E402
-from test_live_browser import chain  # noqa: E402
-from test_space_browser import here, place  # noqa: E402
 
 SIZE = {"width": 1500, "height": 880}
 WIDTH = 900  # px of the file
