@@ -1,1 +1,1 @@
-"""How grains move: contact dynamics, its exact step, overdamped motion, and whether grains rest."""
+"""How grains move: contact dynamics, its exact step, overdamped motion, and the test of rest."""

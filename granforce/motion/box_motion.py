@@ -1,20 +1,19 @@
-"""How the box moves: at one rate λ, or at three where both sides and the tilt follow the stress.
+"""How the box moves: at one rate λ, or at three if both sides and the tilt follow the stress.
 
-A square box grows at one dilation rate λ, which the pressure drives. A cell free in its shape has a
+A square box grows at one dilation rate λ, driven by the pressure. A cell with a free shape has a
 strain rate
 
     D = ( e_x  g  ),    x → (1 + D Δt) x,
         (  0  e_y )
 
-which keeps its side **a** along x. A contact force **F** over the branch ℓ **n** works at the rate
-ℓ (e_x F_x n_x + e_y F_y n_y + g F_x n_y) on it. Its inertia ½ V M_λ (e_x² + e_y² + g²/2) prefers no
-direction, so that
+which keeps its side **a** along x. A contact force **F** over the branch ℓ **n** does work on it at
+the rate ℓ (e_x F_x n_x + e_y F_y n_y + g F_x n_y). Its inertia ½ V M_λ (e_x² + e_y² + g²/2) is
+isotropic, so that
 
     e_x ← e_x + (σ_xx − P0) Δt/M_λ,   e_y likewise,   g ← g + 2 σ_xy Δt/M_λ,
 
-and (e_x + e_y)/2 is the λ of a square box. Each function has two bodies, of which one is taken
-by the type of the rate: a number λ (or lanes of it), or a tuple (e_x, e_y, g). So the square box
-pays nothing for the other.
+and (e_x + e_y)/2 is the λ of a square box. Each function has two bodies, chosen by the type of the
+rate: a number λ (or lanes of it), or a tuple (e_x, e_y, g). So the square box has no overhead.
 """
 
 import functools
@@ -22,17 +21,17 @@ import functools
 from numba import types
 from numba.extending import overload
 
-# Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
-# less than 10 % for μ from 0.01 to 10.
+# Inertia M_λ of the box in masses ρ r_max²: from 1 to 100 it changes the number of sweeps by less
+# than 10 % for μ from 0.01 to 10.
 BOX_MASS = 10.0
 _OPTIONS = {"forceinline": True, "error_model": "numpy"}
 
 
 def by_type(choose):
-    """The function whose body `choose` gives, by the types of the arguments.
+    """The function whose body `choose` returns for the types of the arguments.
 
-    The compiler asks for it once for each types; where it is off (NUMBA_DISABLE_JIT), values stand
-    for their types, at every call.
+    The compiler calls `choose` once per combination of types; with the compiler off
+    (NUMBA_DISABLE_JIT) it is called with the values at every call.
     """
 
     @functools.wraps(choose)
@@ -49,7 +48,7 @@ def _several(rate):
 
 @by_type
 def rate_in(kept):
-    """The rate that an array keeps: λ in (1,), or e_x, e_y, g in (1, 3)."""
+    """The rate stored in an array: λ in (1,), or e_x, e_y, g in (1, 3)."""
     if kept.ndim == 2:
         return lambda kept: (kept[0, 0], kept[0, 1], kept[0, 2])
     return lambda kept: kept[0]
@@ -57,7 +56,7 @@ def rate_in(kept):
 
 @by_type
 def keep_rate(rate, kept):
-    """Keep a rate in an array."""
+    """Store a rate in an array."""
     if not _several(rate):
 
         def keep(rate, kept):
@@ -81,7 +80,7 @@ def stretched(rate, n_x, n_y):
 
 @by_type
 def sheared(rate, v_t, length, n_x, n_y):
-    """Tangential velocity v_t of a contact with what the box adds, ℓ t·D n; λ adds nothing."""
+    """Tangential velocity v_t of a contact plus that of the box, ℓ t·D n; λ adds nothing."""
     if _several(rate):
         return lambda rate, v_t, length, n_x, n_y: (
             v_t + length * ((rate[1] - rate[0]) * n_x - rate[2] * n_y) * n_y
@@ -91,7 +90,7 @@ def sheared(rate, v_t, length, n_x, n_y):
 
 @by_type
 def pushed(rate, compliance, f_n, f_t, n_x, n_y):
-    """The rate after a contact pushed; compliance: change of λ per unit f_n."""
+    """The rate after a contact force acts on it; compliance: change of λ per unit f_n."""
     if not _several(rate):
         return lambda rate, compliance, f_n, f_t, n_x, n_y: rate + compliance * f_n
 
@@ -109,7 +108,7 @@ def pushed(rate, compliance, f_n, f_t, n_x, n_y):
 
 @by_type
 def driven(rate, velocity, mass, pressure, volume, dt, box_mass):
-    """The rate after one step under the pressure outside and the moving grains inside."""
+    """The rate after one step, driven by the external pressure and the moving grains inside."""
     if not _several(rate):
 
         def drive(rate, velocity, mass, pressure, volume, dt, box_mass):
@@ -139,13 +138,13 @@ def driven(rate, velocity, mass, pressure, volume, dt, box_mass):
 
 @by_type
 def soften(rate, problem):
-    """Add to the inverse stiffness of each contact how it moves the shape of the box itself."""
+    """Add to the inverse stiffness of each contact its effect on the shape of the box."""
     if not _several(rate):
         return lambda rate, problem: None
 
     def add(rate, problem):
         for c in range(problem.i.shape[0]):
-            # The trace is in stiff_n already; e_x − e_y and g double it for n, whatever its angle.
+            # stiff_n contains the trace; e_x − e_y and g double it for n at any angle.
             box = problem.box_compliance * problem.length[c] ** 2
             shear = 4.0 * box * problem.n_y[c] ** 2
             problem.stiff_n[c] = 1.0 / (1.0 / problem.stiff_n[c] + box)
@@ -156,7 +155,7 @@ def soften(rate, problem):
 
 @by_type
 def fastest(rate):
-    """Largest relative rate at which a length may change, from above."""
+    """Upper bound on the relative rate at which a length may change."""
     if _several(rate):
         return lambda rate: abs(rate[0]) + abs(rate[1]) + abs(rate[2])
     return lambda rate: abs(rate)
@@ -164,7 +163,7 @@ def fastest(rate):
 
 @by_type
 def carried(rate, x, y, dt):
-    """Where the box carries a point in one step."""
+    """Where the box moves a point in one step."""
     if _several(rate):
         return lambda rate, x, y, dt: (
             x * (1.0 + rate[0] * dt) + y * (rate[2] * dt),

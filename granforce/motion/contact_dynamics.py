@@ -1,10 +1,10 @@
-"""Contact dynamics of rigid disks in a box of adjustable size: one contact, one sweep, one step.
+"""Contact dynamics of rigid disks in a box of variable size: one contact, one sweep, one step.
 
 Implicit Euler with the intrinsic velocities v of the grains and the dilation rate λ of the box
 (arXiv:0803.3566, Eqs. 17–32). Velocities are rows (v_x, v_y, ω). Contact forces are found by
-Gauss–Seidel sweeps in which λ follows every single contact update, so that it is consistent with
-the forces at the end. Relaxation on a fixed geometry is one such step with all gaps zero and
-grains and box initially at rest. A sweep goes over one set of forces, or over eight side by side.
+Gauss–Seidel sweeps in which λ is updated with every contact, so that it agrees with the final
+forces. Relaxation on a fixed geometry is one such step with all gaps zero and grains and box
+initially at rest. A sweep updates one set of forces, or eight in parallel.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ class StepProblem(NamedTuple):
     length: Floats
     arm_i: Floats
     arm_j: Floats
-    closing: Floats  # gap/Δt: approach velocity that just closes it; < 0 pushes overlap out
+    closing: Floats  # gap/Δt: approach velocity that just closes the gap; < 0 pushes overlaps apart
     stiff_n: Floats  # Δf_n per normal velocity to be stopped
     stiff_t: Floats  # Δf_t per tangential velocity to be stopped
     inverse_mass: Floats  # Δt/m
@@ -58,7 +58,7 @@ class StepProblem(NamedTuple):
 
 @compiled
 def set_stiffness(problem):
-    """Fill stiff_n and stiff_t: inverses of the velocity that a unit force changes in one step."""
+    """Fill stiff_n and stiff_t, the inverses of the velocity change by a unit force in one step."""
     i, j = problem.i, problem.j
     w, u = problem.inverse_mass, problem.inverse_inertia
     for c in range(i.shape[0]):
@@ -71,7 +71,7 @@ def set_stiffness(problem):
 
 @compiled
 def add_forces(problem, force, velocity, dilation):
-    """Velocities (N, 3) after the given contact forces acted for one step; returns the new λ."""
+    """Velocities (N, 3) after the contact forces act for one step; returns the new λ."""
     for c in range(problem.i.shape[0]):
         if force[c, 0] != 0.0 or force[c, 1] != 0.0:
             dilation = _push(problem, c, force[c, 0], force[c, 1], velocity, dilation, ONE)
@@ -100,11 +100,11 @@ def _push(problem, c, f_n, f_t, velocity, dilation, lanes):
 
 @compiled
 def sweep(problem, order, mu, force, velocity, dilation, lanes):
-    """Update every contact once, in the given order (N_c,), in each of the lanes.
+    """Update every contact once, in the given order (N_c,), in each lane.
 
-    A contact whose predicted gap would be negative gets the f_n that makes it zero and the f_t
+    A contact whose predicted gap would be negative gets the f_n that makes the gap zero and the f_t
     that stops sliding, clipped to |f_t| ≤ μ f_n; force (N_c, 2, lanes) and velocity (N, 3, lanes)
-    change in place. Returns the new λ, the sum of |Δf_n| + |Δf_t| and the sum of f_n over contacts.
+    change in place. Returns the new λ, Σ (|Δf_n| + |Δf_t|) and Σ f_n over contacts.
     """
     zero = same(lanes, 0.0)
     change = total = zero
@@ -147,54 +147,54 @@ class Motion(NamedTuple):
     r: Floats  # (N,)
     mass: Floats  # (N,) π r²
     box: Floats  # (2,)
-    tilt: Floats  # (1,) of the cell
-    dilation: Floats  # (1,) λ; or (1, 3) e_x, e_y, g of a cell that is free in its shape
+    tilt: Floats  # (1,) tilt of the cell
+    dilation: Floats  # (1,) λ; or (1, 3) e_x, e_y, g of a cell with a free shape
     i: Integers  # (P,) neighbour list
     j: Integers  # (P,)
     shift: Integers  # (P, 2)
     force: Floats  # (P, 2) of the last step, the warm start of the next
     drift: Floats  # (1,) bound on the approach of any pair since the list was built
-    pace: Floats  # (2,) Δt of the next step, and the relaxation factor of its sweeps
+    pace: Floats  # (2,) Δt of the next step, relaxation factor of its sweeps
 
 
 class Pace(NamedTuple):
-    """How steps are made: how long they are, and how accurately they are solved."""
+    """The length and accuracy of steps."""
 
     box_mass: float  # M_λ
     shortest: float  # Δt
     longest: float
-    stride: float  # largest displacement of a grain that carries, in a step, that Δt grows up to
+    stride: float  # displacement of the fastest carrying grain in a step that Δt grows up to
     sweeps: int  # at most, in a step
-    settling: int  # the last so many of them correct by LEAST_RELAXATION only
-    accuracy: float  # largest breach of the contact laws that ends a step, of the fastest grain
+    settling: int  # how many of the last of them use LEAST_RELAXATION only
+    accuracy: float  # largest violation of the contact laws after a step, of the fastest grain
 
 
-# What advance() tells: index of each number in its counters.
+# Index of each of advance()'s counters.
 STEPS, SWEEPS, UPDATES, UNFINISHED = range(4)
-# Sweeps between two looks at what they have reached.
+# Sweeps between two checks of convergence.
 LOOK = 10
-# A breach that has not fallen to this part of the least one after so many looks has stalled: then
-# sweeps go in circles, and correct by this part of what they did. It grows again step by step.
+# If the violation has not fallen below FALLEN times its minimum after STALLED checks, the sweeps
+# cycle: the relaxation factor is multiplied by CAUTION, then grows by COURAGE per step.
 FALLEN, STALLED, CAUTION, COURAGE = 0.7, 20, 0.8, 1.03
-# Bounds of the relaxation factor, the least being 1.6 − μ where that is more. At small μ sweeps
-# that over-correct converge six times sooner (Young's over-relaxation), and never in circles; at
-# μ = 10 they converge at 0.7 only.
+# Bounds of the relaxation factor; the lower bound is 1.6 − μ if that is larger. At small μ
+# over-relaxation (Young) converges six times faster and never cycles; at μ = 10 only 0.7 converges.
 LEAST_RELAXATION, MOST_RELAXATION = 0.7, 1.7
-# Part of an overlap that a step pushes out again, and at most that length.
+# Fraction of an overlap that a step pushes out, and the largest such length.
 PUSHED, FARTHEST = 0.5, 1e-3
-# Pairs farther apart than this (in largest radii) are not looked at; neighbour lists hold all
-# that are nearer.
+# Pairs farther apart than this (in largest radii) are skipped; neighbour lists hold all closer
+# pairs.
 REACH = 0.1
 # Growth of Δt from step to step.
 GROWTH = 1.3
-# Breach (velocity times Δt, length) below which rounding is all that is left.
+# Violation (velocity times Δt, a length) below which only rounding remains.
 ROUNDING = 1e-14
 
 
 @compiled
 def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
-    """Do up to `steps` time steps; stop early once two grains may have moved closer by `moved`,
-    when the neighbour list must be made anew, or once stop[0] is raised.
+    """Do up to `steps` time steps, ending early when the neighbour list has to be rebuilt.
+
+    That is when two grains may have approached by `moved`. Also returns once stop[0] is set.
 
     Returns the last step's mean overlap of carrying contacts (in largest radii) and unbalance: the
     largest change of momentum of a grain per step, in units of the mean contact force.
@@ -239,12 +239,12 @@ def _step(motion, mu, pressure, pace, counters, stop):
 
 @within
 def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
-    """Sweep until the breach is small enough; returns λ.
+    """Sweep until the violation of the contact laws is small enough; return λ.
 
-    Where it does not get there, the step takes the forces that breached least on the way: at large
-    μ a few contacts go on opening and closing, and where sweeps happen to end is worse. Sweeps that
-    over-correct move slow modes soonest, but keep those contacts going; what is left settles in the
-    last, cautious ones. Otherwise the jitter shakes the packing and it comes to rest far later.
+    If that is not reached, the step uses the forces with the smallest violation: at large μ a few
+    contacts keep opening and closing, and the last sweep may be worse. Over-relaxed sweeps move
+    slow modes fastest but keep those contacts cycling, so the last sweeps are under-relaxed.
+    Otherwise the jitter would shake the packing and delay rest.
     """
     count = force.shape[0]
     order, factor, lasting = np.arange(count), motion.pace[1], motion.pace[1]
@@ -287,7 +287,7 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
 
 @within
 def _copy(values, given):
-    """values ← given, number by number: an array set as a whole takes seconds to compile."""
+    """values ← given, element by element: a slice assignment takes seconds to compile."""
     for k in range(values.shape[0]):
         for a in range(values.shape[1]):
             values[k, a] = given[k, a]
@@ -302,7 +302,7 @@ def _scale(problem, factor):
 
 @within
 def _breach(problem, mu, force, velocity, dilation, factor):
-    """Largest breach of Signorini's and Coulomb's laws: the velocity that one more update stops."""
+    """Largest violation of Signorini's and Coulomb's laws: the velocity an update would stop."""
     worst = 0.0
     for c in range(force.shape[0]):
         i, j = problem.i[c], problem.j[c]
@@ -335,12 +335,12 @@ def _fastest(problem, force, velocity):
 
 @within
 def _near_contacts(motion, dt, box_inertia):
-    """The pairs that may touch during this step, as a StepProblem; and the mean overlap."""
+    """The pairs that may touch during this step, as a StepProblem, and the mean overlap."""
     x, r, box = motion.x, motion.r, motion.box
     speed = 0.0
     for k in range(x.shape[0]):
         speed = max(speed, motion.velocity[k, 0] ** 2 + motion.velocity[k, 1] ** 2)
-    # Twice the fastest free approach, and the way that forces may push grains in this step.
+    # Twice the fastest free approach, and the distance that forces may push grains in this step.
     margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * fastest(rate_in(motion.dilation)) * r.max())
     margin = min(margin + (2e-3 + 4.0 * dt * dt) * r.max(), REACH * r.max())
     pairs = motion.i.shape[0]
@@ -401,7 +401,7 @@ def _move(motion, dilation, dt):
         quickest = max(quickest, v_x * v_x + v_y * v_y)
     motion.box[0], _ = carried(dilation, motion.box[0], 0.0, dt)
     motion.tilt[0], motion.box[1] = carried(dilation, motion.tilt[0], motion.box[1], dt)
-    # Two grains at twice the largest radius approach by at most this much.
+    # Two grains at a distance of twice the largest radius approach by at most this much.
     approach = fastest(dilation) * dt * 3.0 * motion.r.max()
     motion.drift[0] += 2.0 * np.sqrt(quickest) * dt + approach
 

@@ -1,21 +1,21 @@
 """One step of contact dynamics from rest, solved to rounding: rest, or steady motion.
 
 Gauss–Seidel sweeps from a given network, f_c ← Π(f_c − D A_cᵀ U) contact after contact with D the
-effective masses, follow f' = −D Aᵀ U at the pace of one unit per sweep (M, D and Π as in `step`).
-Here the same flow is integrated implicitly for a whole network at a time, with steps of any length
-τ,
+effective masses, follow f' = −D Aᵀ U at a rate of one unit of time per sweep (M, D and Π as in
+`step`). Here the same flow is integrated implicitly for the whole network at once, with steps of
+any length τ,
 
     f⁺ = Π(f − τ D Aᵀ U⁺),    M U⁺ = A f⁺ − b,
 
-each by Newton's method on the states of the contacts (sticking, sliding either way, open). That is
-independent of any order of the contacts, and ends at rounding error.
+each by Newton's method on the states of the contacts (sticking, sliding either way, open). The
+result does not depend on any order of the contacts and is exact to rounding.
 
-Friction has a memory: which of the networks at rest a flow ends in, and whether it comes to rest at
-all, depends on the τ of its steps. So does the critical force: with full Newton steps, without the
-search for a length, other steps fail and are made shorter, and it changes by up to 0.1 ⟨f_n⟩.
+Friction has a memory: which network at rest a flow ends in, and whether it comes to rest at all,
+depends on the τ of its steps. So does the critical force: without the line search other steps fail
+and are shortened, and it changes by up to 0.1 ⟨f_n⟩.
 
-LANES of flows go side by side (see `lanes`), each with its own network, load, pace and Newton step;
-none changes a bit of another.
+LANES of flows run in parallel (see `lanes`), each with its own network, load, τ and Newton step,
+and bit-identical to a single flow.
 """
 
 from __future__ import annotations
@@ -43,39 +43,39 @@ from granforce.numerics.lanes import (
 from granforce.tolerances import BALANCED
 from granforce.types import Floats, Integers, Mask
 
-# Pace τ: the first step's, its growth after a step, and its cut where Newton's method failed.
+# Step length τ: first value, growth after a step, and cut if Newton's method failed.
 FIRST, GROWTH, CUT = 1e2, 4.0, 0.2
 LONGEST, SHORTEST = 1e7, 1e-2
-# Linear systems a step may take, and halvings of a Newton step.
+# Most linear systems per step, and halvings of a Newton step.
 NEWTON, HALVINGS = 12, 8
-# Part of the squared unbalance by which a whole Newton step must lower it.
+# Fraction by which a full Newton step must reduce the squared unbalance.
 DECREASE = 0.1
-# Error of velocities relative to the fastest; contacts turn it into forces τ times as large.
+# Error of velocities relative to the fastest; contacts convert it into forces τ times as large.
 ROUNDING = 1e-14
-# Steady motion: what contacts still breach Coulomb's law by, relative to the fastest contact.
+# Steady motion: remaining violation of Coulomb's law, relative to the fastest contact.
 STEADY = 1e-7
 
 OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
-# How a Newton step ended: no equation is left, the unbalance fell, or neither.
+# How a Newton step ended: equations solved, unbalance reduced, or neither.
 SOLVED, FELL, FAILED = range(3)
 
 
 class RowVector(NamedTuple):
-    """Rows of W flows: velocities, or what is out of balance."""
+    """Rows of W flows: velocities or unbalanced forces."""
 
     rows: Floats  # (rows, W)
     border: Floats  # (m, W)
 
 
 class Flows(NamedTuple):
-    """Where W flows stand, and what a Newton step needs. Numbers are (1, W), counters (W,)."""
+    """The state of W flows and of their Newton steps. Numbers are (1, W), counters (W,)."""
 
     factors: Factors
     load: RowVector  # b, the pair included
     forces: Floats  # (2 N_c, W) f
     following: Floats  # (2 N_c, W) f⁺
     state: Floats  # (N_c, W) OPEN, STICKING, ±SLIDING
-    before: Floats  # (N_c, W) the states that the last linear system was made for
+    before: Floats  # (N_c, W) the states of the last linear system
     velocity: RowVector  # U
     base: RowVector  # U before the Newton step
     kept: RowVector  # U before the implicit step
@@ -92,7 +92,7 @@ class Flows(NamedTuple):
     steady: Floats  # breach at which motion counts as steady
     newton: Integers  # linear systems of the implicit step
     steps: Integers  # implicit steps
-    most: Integers  # implicit steps that are allowed
+    most: Integers  # most implicit steps
     iterations: Integers  # linear systems
     found: Integers  # SOLVED, FELL, FAILED
     going: Mask  # bool
@@ -100,30 +100,30 @@ class Flows(NamedTuple):
 
 
 class Push(NamedTuple):
-    """What is asked of a flow: from forces, under a pair of `load` on a contact (its position)."""
+    """A flow to compute: from forces, under a pair of `load` on a contact (its position)."""
 
     forces: Floats  # (N_c, 2) ⟨f_n⟩
     contact: int
     load: float  # ⟨f_n⟩
     max_steps: int
-    steady: float  # breach of Coulomb's law, relative to the fastest contact, of steady motion
+    steady: float  # violation of Coulomb's law in steady motion, relative to the fastest contact
 
 
 class Outcome(NamedTuple):
-    """Where the forces went."""
+    """The result of a flow."""
 
     forces: Floats  # (N_c, 2) ⟨f_n⟩
-    velocity: Floats  # (rows,) U, by the ensemble's rows; 0 at rest
+    velocity: Floats  # (rows,) U, in the order of the ensemble's rows; 0 at rest
     at_rest: bool
     converged: bool  # at rest, or in steady motion
     breach: float  # of Coulomb's law, relative to the fastest contact; 0 at rest
     steps: int  # implicit steps of the flow
     iterations: int  # linear systems solved
-    seconds: float  # its part of those that it was carried for beside others
+    seconds: float  # its share of the time of the flows computed together
 
 
 def make_flows(step: Step, width: int) -> Flows:
-    """The Flows of `width` lanes that rest."""
+    """The Flows of `width` lanes, all at rest."""
     contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
 
     def vector() -> RowVector:
@@ -167,7 +167,7 @@ def make_flows(step: Step, width: int) -> Flows:
 
 
 def start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
-    """Put what is asked into a lane."""
+    """Start a Push in a lane."""
     flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
     pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
     border = np.ascontiguousarray(flows.load.border[:, [lane]])
@@ -187,7 +187,7 @@ def _pushed(network, contact, force, rows, border):
 
 
 def outcome_of(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
-    """Where the flow of a lane has ended; seconds: its part of what its lanes took."""
+    """The Outcome of a lane; seconds: its share of the time of all lanes."""
     rows = np.concatenate([flows.velocity.rows[:, lane], flows.velocity.border[:, lane]])
     ended, breach = bool(flows.ended[lane]), float(flows.lately[0, lane])
     return Outcome(
@@ -204,7 +204,7 @@ def outcome_of(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
 
 @compiled
 def until_one_ends(step, flows, rest, stop, lanes):
-    """Newton steps of all flows, until one that is going has ended."""
+    """Do Newton steps of all flows until one that is going has ended."""
     while not stop[0]:
         answer(step, flows, lanes)
         contact_matrix.copy(flows.merit, flows.least, lanes)
@@ -222,7 +222,7 @@ def until_one_ends(step, flows, rest, stop, lanes):
 
 @within
 def _judge(flows, lane, rest):
-    """What comes after a lane's Newton step: the next, the next implicit step, or the end."""
+    """Choose what follows a lane's Newton step: the next, the next implicit step, or the end."""
     flows.iterations[lane] += 1
     flows.newton[lane] += 1
     found = flows.found[lane]
@@ -268,7 +268,7 @@ def _clear_lane(values, lane):
 def _search(step, flows, lanes):
     """Halve each lane's Newton step until the squared unbalance (over masses) falls.
 
-    It is solved where a whole one leaves every contact in its state: the equations are linear
+    If a full step leaves every contact in its state, the step is solved: the equations are linear
     there.
     """
     undecided = 0
@@ -301,13 +301,13 @@ def _search(step, flows, lanes):
 
 @within
 def _wanted(flows, lane):
-    """The squared unbalance below which a Newton step is taken."""
+    """The squared unbalance below which a Newton step is accepted."""
     return (1.0 - DECREASE * flows.length[0, lane]) * flows.merit[0, lane]
 
 
 @within
 def _is_solved(flows, lane):
-    """Whether rounding of the velocities, and no more, is left."""
+    """Whether only rounding of the velocities is left."""
     fastest, rows, border = 0.0, flows.velocity.rows, flows.velocity.border
     for k in range(len(rows)):
         fastest = max(fastest, abs(rows[k, lane]))
@@ -326,7 +326,7 @@ def step_along(values, given, length, direction, lanes):
 
 @within
 def _measure(step, flows, lanes):
-    """Largest |M U|, and the relative velocities that forces still answer over the fastest one."""
+    """Largest |M U|; largest relative velocity at changing forces over the fastest."""
     velocity, pace = flows.velocity, load(flows.pace, 0, lanes)
     heaviest = answered = fastest = same(lanes, 0.0)
     for k in range(len(step.mass)):
@@ -346,7 +346,7 @@ def _measure(step, flows, lanes):
 
 @within
 def find_direction(step, flows, stop, lanes):
-    """The Newton direction from the velocities, which become the base, by the last `answer`."""
+    """The Newton direction from the velocities, which become the base, using the last `answer`."""
     direction = flows.direction
     contact_matrix.copy(flows.before, flows.state, lanes)
     for to, given in ((flows.base, flows.velocity), (direction, flows.rest)):
@@ -358,7 +358,7 @@ def find_direction(step, flows, stop, lanes):
 
 @within
 def _factor(step, flows, stop, lanes):
-    """Factor M + A (∂Π) τ D Aᵀ, not symmetric, as f_t of a sliding contact follows f_n."""
+    """Factor M + A (∂Π) τ D Aᵀ, unsymmetric because f_t of a sliding contact follows f_n."""
     network, m, factors = step.network, len(step.mass_border), flows.factors
     contact_matrix.begin(network, step.mass, factors, lanes)
     for a in range(m):
@@ -379,7 +379,7 @@ def _factor(step, flows, stop, lanes):
 
 @within
 def answer(step, flows, lanes):
-    """Forces Π(f − τ D Aᵀ U), states of the contacts and A f⁺ − b − M U; the latter's Σ /M."""
+    """Forces Π(f − τ D Aᵀ U), states of contacts, A f⁺ − b − M U, and Σ of its squares over M."""
     velocity, rest = flows.velocity, flows.rest
     for k in range(len(step.mass)):
         moved = step.mass[k] * load(velocity.rows, k, lanes)
@@ -403,7 +403,7 @@ def answer(step, flows, lanes):
 
 @inline
 def _next_forces(step, flows, c, lanes):
-    """f⁺ of one contact; sets that, its state, and whether it changed."""
+    """f⁺ of one contact; also sets its state and whether it changed."""
     pace = load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border
     w_n, w_t = contact_matrix.pull(step.network, c, rows, border, lanes)

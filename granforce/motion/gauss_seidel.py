@@ -30,16 +30,16 @@ def gauss_seidel(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Relaxation:
-    """One step of contact dynamics from rest, swept until it has ended; a Relaxation.
+    """One step of contact dynamics from rest, by sweeps until it has ended; a Relaxation.
 
-    start (N_c, 2): first guess, force. order: "sequential" or "random" (a fresh permutation each
+    start (N_c, 2): first guess, force. order: "sequential" or "random" (a new permutation each
     sweep, from seed). options: tolerance (BALANCED), the residual in ⟨f_n⟩ that counts as balance;
-    rest (AT_REST), the one from which the nearest network takes the last digits, None to sweep
-    down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also True for
-    grains that are seen to move steadily: no equilibrium is near, and the residual says so.
-    cancel() returning True raises Cancelled.
+    rest (AT_REST), the residual from which the nearest network replaces further sweeps, None to
+    sweep down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also
+    True if grains move steadily: then no equilibrium is near, and the residual shows it. cancel()
+    returning True raises Cancelled.
 
-    Raises InputError where the whole stress is prescribed, or forces are known.
+    Raises InputError if the whole stress is prescribed or forces are known.
     """
     order = choice(order, ("sequential", "random"), "order")
     start = ensemble.network(start, "start")
@@ -52,12 +52,12 @@ def gauss_seidel(
 
 
 class SideBySide:
-    """Relaxations of one ensemble, each begun when another has ended; none knows of the others.
+    """Relaxations of one ensemble in lanes, each started when another has ended, all independent.
 
-    Each sweeps until the residual (in ⟨f_n⟩) is below `rest`, until grains are seen to move
-    steadily (``converged`` with a residual above the tolerance: no equilibrium), or until
-    max_iterations. Once at rest the nearest admissible network takes the last digits, down to the
-    tolerance. rest=None leaves that out and sweeps to the tolerance.
+    Each sweeps until the residual (in ⟨f_n⟩) is below `rest`, until grains move steadily
+    (``converged`` with a residual above the tolerance: no equilibrium), or until max_iterations. At
+    rest, the nearest admissible network replaces further sweeps down to the tolerance. With
+    rest=None it sweeps down to the tolerance.
     """
 
     def __init__(
@@ -84,13 +84,13 @@ class SideBySide:
             least=np.zeros(width),
             earlier=np.zeros(width),
             back=np.zeros(width, dtype=np.int64),
-            state=np.full(width, sweeps.ENDED),  # nothing was begun
+            state=np.full(width, sweeps.ENDED),  # nothing started
         )
         self.sweeps = np.zeros(width, dtype=np.int64)
         self.begun = np.zeros(width)
 
     def begin(self, lane: int, start: Floats) -> None:
-        """Relax the given forces (N_c, 2) from now on, in a lane in which nothing goes on."""
+        """Relax the given forces (N_c, 2) in an idle lane."""
         self.begun[lane] = time.perf_counter()
         force = np.ascontiguousarray(start, dtype=np.float64) / self.ensemble.force_scale
         velocity = self.at_rest.copy()
@@ -102,7 +102,7 @@ class SideBySide:
         self.sweeps[lane] = 0
 
     def ended(self) -> list[tuple[int, Relaxation]]:
-        """Sweep until one relaxation or more has ended: [(lane, Relaxation)]."""
+        """Sweep until at least one relaxation has ended: [(lane, Relaxation)]."""
         before = self.looks.state.copy()
         sweeps.relax(
             self.problem,
@@ -141,11 +141,11 @@ class SideBySide:
 
 
 def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
-    """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
+    """The step problem in units of r_max and ⟨f_n⟩, and the velocities without contact forces.
 
-    The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
-    grains and on the box besides the unknown contact forces. Δt = 1 throughout. Grains whose
-    balance is left open stay where they are: they share a last row, of no inverse mass.
+    The right-hand side b of the balance (loads, frozen contacts, pressure) is the force on grains
+    and box apart from the unknown contact forces. Δt = 1 throughout. Grains whose balance is not
+    required do not move: they share a last row with zero inverse mass.
     """
     if ensemble.prescribed == "stress" or ensemble.known is not None:
         raise InputError(
@@ -189,7 +189,7 @@ def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
         inverse_inertia=np.append(1 / inertia, np.zeros(held)),
         box_compliance=compliance,
     )
-    # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
+    # Converts velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
     box_unit = 1 / (compliance * length.sum()) if compliance else 0.0
     weight = np.column_stack([mass, mass, inertia / r]).ravel()
     unit = np.concatenate([weight, np.zeros(3 * held), [box_unit]])

@@ -13,7 +13,7 @@ from granforce.types import Floats
 def make_step(ensemble: Ensemble) -> Step:
     """The step problem of an ensemble with the inertia of contact dynamics: m, I and box.
 
-    Raises InputError where forces are known: contact dynamics does not hold to that.
+    Raises InputError if forces are known, because contact dynamics cannot keep them.
     """
     if ensemble.known is not None:
         raise InputError(
@@ -21,7 +21,7 @@ def make_step(ensemble: Ensemble) -> Step:
             "without them (limit loads accept known forces)"
         )
     network, b, b_border, _, place = balance_of(ensemble)
-    # Rows that nothing acts on (torques without friction) may have any mass.
+    # Rows without forces (torques without friction) may have any mass.
     inertia = np.ones(len(b) + len(b_border))
     inertia[place] = _inertia(ensemble)
     mass, mass_border = inertia[: len(b)], inertia[len(b) :]
@@ -33,13 +33,13 @@ def make_step(ensemble: Ensemble) -> Step:
 def _inertia(ensemble: Ensemble) -> Floats:
     packing, size = ensemble.packing, 1 + ensemble.per_contact
     longest = float(packing.r.max())
-    # The velocity that goes with a torque/r is r ω: its inertia is I/r² = m/2.
+    # The velocity conjugate to a torque/r is r ω, with inertia I/r² = m/2.
     grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
     mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
     if not ensemble.has_pressure_row:
         return mass
-    # The one that goes with the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ; where the whole stress is
-    # prescribed the box may shear as well, with the same inertia.
+    # That conjugate to the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ; with the whole stress
+    # prescribed the box may also shear, with the same inertia.
     box = 2 * packing.volume * BOX_MASS / ensemble.contacts.length.sum() ** 2
     return np.append(mass, np.full(ensemble.A.shape[0] - ensemble.pressure_row, box))
 

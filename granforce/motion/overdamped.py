@@ -1,22 +1,22 @@
 """Overdamped motion of stiff disks: the flow of contact dynamics while grains move.
 
 On a fixed geometry the forces of contact dynamics follow f' = −D AᵀU with M U = A f − b (see
-`flow`), whatever the geometry would do meanwhile. Let the grains move with their velocities,
-x' = ε U, and a closed contact is a spring of stiffness D/ε: its overlap is ε f_n/D, which the
-softness ε makes as small as one likes, and f_t grows with the tangential displacement until it
-slides. U is proportional to what is out of balance, so nothing overshoots, and grains without
-contacts stay where they are. The motion ends where every grain is in balance.
+`flow`), regardless of how the geometry would change. If grains move with their velocities, x' = ε
+U, a closed contact is a spring of stiffness D/ε: its overlap is ε f_n/D, as small as desired by the
+choice of the softness ε, and f_t grows with the tangential displacement until it slides. U is
+proportional to the unbalanced force, so nothing overshoots, and grains without contacts do not
+move. The motion ends when every grain is in balance.
 
-The normal force is −(D/ε) gap, also where the gap is open: there it is negative, no force acts, and
-as it grows to 0 the disks touch. With this one number for both an implicit step of length τ is
+The normal force is −(D/ε) gap. For an open gap this is negative and no force acts; when it reaches
+0 the disks touch. With this one number for both, an implicit step of length τ is
 
     φ⁺ = φ − τ D Aᵀ U⁺,    f⁺ = Π(φ⁺),    M U⁺ = A f⁺ − b,
 
-piecewise linear in U⁺, and is solved by Newton's method on the states of the contacts. Full Newton
-steps find the states in two or three systems or not at all: a step that fails is made shorter. A
-search along the Newton direction takes five times as many systems, as sliding contacts sit on the
-kink of Π. Steps need not be solved to rounding while grains move: what a step leaves unbalanced is
-in the velocities of the next one.
+which is piecewise linear in U⁺ and solved by Newton's method on the states of the contacts. Full
+Newton steps find the states in two or three systems or not at all; a step that fails is shortened.
+A line search takes five times as many systems, as sliding contacts lie on the kink of Π. Steps need
+not be solved to rounding while grains move: the remaining unbalance of a step enters the velocities
+of the next one.
 """
 
 from typing import NamedTuple
@@ -30,33 +30,33 @@ from granforce.numerics.lanes import ONE, compiled, within
 from granforce.tolerances import BALANCED
 from granforce.types import Floats
 
-# Growth of τ after a step, its cut after one that failed, and its bounds.
+# Growth of τ after a step, its cut after a failed one, and its bounds.
 GROWTH, CUT = 3.0, 0.1
 LONGEST, SHORTEST = 1e7, 1e-2
-# Newton steps of an implicit step.
+# Most Newton steps per implicit step.
 NEWTON = 5
-# Part of the norm of velocities by which an implicit step may be out of balance.
+# Unbalance of an implicit step, as a fraction of the norm of velocities.
 INEXACT = 0.03
-# How a motion ended: grains have moved by the stride, or enough steps were made; all is balanced;
-# no step is short enough.
+# How a motion ended: grains moved by the stride or the steps were used up; balance; no step was
+# short enough.
 MOVED, AT_REST, STUCK = range(3)
-# What is counted.
+# Indices of the counters.
 SYSTEMS, STEPS, REPEATED = range(3)
 
 
 class Overdamped(NamedTuple):
-    """Where the motion stands; rows and places as in its Step. Arrays change in place."""
+    """State of the motion; rows and places as in its Step. Arrays change in place."""
 
     flows: Flows  # of one lane: `forces` holds φ_n, f_t, `following` the forces f
     gap: Floats  # (N_c,) linear in the displacements
-    moved: Floats  # (rows,) displacements since the geometry was known
-    strain: Floats  # (m,) those of the box
+    moved: Floats  # (rows,) displacements since the geometry was updated
+    strain: Floats  # (m,) strain of the box
 
 
 def make_overdamped(
     step: Step, forces: Floats, gap: Floats, softness: float, pace: float
 ) -> Overdamped:
-    """The motion from forces (N_c, 2) that act, and gaps (N_c,), with the first τ."""
+    """The motion from acting forces (N_c, 2) and gaps (N_c,), with the first τ."""
     flows = make_flows(step, 1)
     flows.load.rows[:, 0], flows.load.border[:, 0] = step.b, step.b_border
     acting = forces[:, 0] > 0
@@ -69,9 +69,9 @@ def make_overdamped(
 
 @compiled
 def move(step, motion, softness, stride, steps, counts, stop):
-    """Up to so many implicit steps; returns MOVED, AT_REST or STUCK.
+    """Do up to `steps` implicit steps; return MOVED, AT_REST or STUCK.
 
-    Ends once a grain has moved by `stride` (in largest radii), or stop[0] is raised.
+    Ends once a grain has moved by `stride` (in largest radii), or once stop[0] is set.
     """
     flows = motion.flows
     for _ in range(steps):
@@ -98,7 +98,7 @@ def move(step, motion, softness, stride, steps, counts, stop):
 
 @within
 def _solved(step, flows, counts, stop):
-    """Newton's method on the states of the contacts; whether they agree with the forces."""
+    """Newton's method on the states of the contacts; returns whether they agree with the forces."""
     rows, border, direction = flows.velocity.rows, flows.velocity.border, flows.direction
     contact_matrix.copy(flows.kept.rows, rows, ONE)
     contact_matrix.copy(flows.kept.border, border, ONE)
@@ -127,7 +127,7 @@ def _energy(step, flows):
 
 @within
 def _carried(step, motion, softness):
-    """Move grains, gaps and φ by a step; largest |M U|, |U| and displacement of a grain."""
+    """Move grains, gaps and φ by a step; return largest |M U|, |U| and displacement of a grain."""
     flows, pace = motion.flows, motion.flows.pace[0, 0]
     rows, border = flows.velocity.rows, flows.velocity.border
     for c in range(len(step.stiffness)):

@@ -1,11 +1,10 @@
-"""Rest: whether contact dynamics leaves a packing where it is.
+"""Rest: whether contact dynamics leaves a packing at rest.
 
-A network in S shows that balance and friction allow rest. It does not show that grains stay:
-sliding contacts do not dilate, so that the same contacts and loads may allow motion as well, and
-which of the two happens depends on the forces from which one starts. A packing is at rest where the
-exact step of contact dynamics (`step`, `flow`), all velocities zero before it, ends without motion
-from the packing's own forces, and again from the network that it ended in, with noise on every
-force.
+A network in S shows that balance and friction allow rest, not that the grains stay at rest: sliding
+contacts do not dilate, so that the same contacts and loads may also allow motion, and the initial
+forces decide between the two. A packing is at rest if the exact step of contact dynamics (`step`,
+`flow`), with all velocities initially zero, ends without motion from the packing's own forces, and
+again from the resulting network with noise on every force.
 """
 
 from collections.abc import Generator
@@ -25,9 +24,9 @@ from granforce.records import InputError, Packing, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask
 
-# Standard deviation of the noise on each force (in ⟨f_n⟩), and draws of each.
+# Standard deviations of the noise on each force (in ⟨f_n⟩), and number of draws for each.
 NOISE, DRAWS = (1e-4, 1e-2), 3
-# Implicit steps in which a network comes to rest or is said not to.
+# Implicit steps within which a network must come to rest.
 MOST_STEPS = 500
 
 
@@ -35,12 +34,11 @@ MOST_STEPS = 500
 class Rest(NamedTuple):
     """The certificate of rest of a packing; see `rest`."""
 
-    at_rest: bool  # from the packing's own forces, and with noise in every draw
-    distance: float  # ⟨f_n⟩, of its own forces from the network they end in; NaN without rest
+    at_rest: bool  # from the packing's own forces and, with noise, in every draw
+    distance: float  # ⟨f_n⟩, from its own forces to the network reached; NaN without rest
     noise: tuple[float, ...]  # ⟨f_n⟩, standard deviations
-    stayed: Mask  # (len(noise), draws) bool, which draws came to rest; none without rest before
-    # (contacts, 2) the network that its own forces end in; if something sets off, the forces with
-    # which it moves
+    stayed: Mask  # (len(noise), draws) bool, draws that came to rest; all False if not at rest
+    # (contacts, 2) the network reached from its own forces; if grains move, the forces while moving
     forces: Floats
 
 
@@ -57,10 +55,10 @@ def rest(
     """Whether contact dynamics leaves a packing at rest, from its own forces and with noise.
 
     packing: a Packing with forces, of any origin, or its Ensemble. noise: standard deviations of
-    the normal noise on every component, in ⟨f_n⟩; draws of each, by seed. conditions: as for
-    `ensemble`. cancel() returning True raises Cancelled.
+    the normal noise on every component, in ⟨f_n⟩; draws: number of draws of each, from seed.
+    conditions: as for `ensemble`. cancel() returning True raises Cancelled.
 
-    Raises NotJammedError where S is empty, InputError for a packing without forces of its own.
+    Raises NotJammedError if S is empty, InputError if the packing has no forces.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, **conditions)
     draws = whole(draws, "draws", least=1)
@@ -78,7 +76,8 @@ def rest(
         for _ in range(draws)
     ]
     ends: dict[int, Outcome] = {}
-    # Side by side these few flows gain little, and a first packing would wait for more kernels.
+    # These few flows gain little from lanes, and a first packing would have to compile more
+    # kernels.
     follow(step, [_one(_from(start)) for start in starts], ends.__setitem__, lanes=ONE)
     outcomes = [ends[k] for k in range(len(starts))]
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)

@@ -1,19 +1,19 @@
-"""The step of contact dynamics that a perturbation solves: inertia, and what it makes of A and b.
+"""The step of contact dynamics that a perturbation solves: A and b with inertia.
 
-With the geometry fixed, a step of implicit Euler from rest asks for contact forces f and
-velocities U with
+With the geometry fixed, an implicit Euler step from rest determines contact forces f and velocities
+U from
 
     M U = A f − b,    f = Π(f − D Aᵀ U)
 
 where A f = b is the balance of S, M holds the masses of the grains and of the box, Aᵀ U are the
 relative velocities at the contacts, and Π is Coulomb's law: f_n ← max(f_n, 0), then f_t clipped to
-±μ f_n. Any D > 0 gives the same law; the effective masses of the contacts, 1/D = Aᵀ M⁻¹ A of one
-contact alone, are what a Gauss–Seidel sweep uses.
+±μ f_n. Any D > 0 gives the same law; D is chosen as the effective masses of single contacts, 1/D =
+Aᵀ M⁻¹ A, as in a Gauss–Seidel sweep.
 
-It is not the projection onto the cone: a sliding contact does not dilate, so the problem is no
-convex program, and several solutions may exist side by side: networks at rest (U = 0, any f in S),
-and motion, which goes on with constant acceleration because the law is homogeneous in U. Which one
-is reached depends on where one comes from (see `flow`).
+Π is not the projection onto the cone: a sliding contact does not dilate, so the problem is not a
+convex program and may have several solutions: networks at rest (U = 0, any f in S), and motion with
+constant acceleration, as the law is homogeneous in U. Which one is reached depends on the initial
+forces (see `flow`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from granforce.types import Floats, Integers
 class Step(NamedTuple):
     """The step problem of one ensemble, in units of ⟨f_n⟩ and r_max; Δt = 1.
 
-    Rows of grains are in order of elimination; those of the pressure (m = 1, or 0) come apart.
+    Rows of grains are in order of elimination; those of the pressure (m = 1 or 0) are separate.
     """
 
     network: Network
@@ -39,13 +39,13 @@ class Step(NamedTuple):
     mass: Floats  # (rows,) M
     mass_border: Floats  # (m,)
     stiffness: Floats  # (N_c, 2) D: effective masses of the contacts
-    closing: Floats  # (N_c,) approach velocity that just closes a contact's gap
+    closing: Floats  # (N_c,) approach velocity that just closes the gap
     mu: float
-    place: Integers  # (rows of the ensemble,) where they are among rows and border
+    place: Integers  # (rows of the ensemble,) their place among rows and border
 
 
 def effective_masses(network: Network, mass: Floats, mass_border: Floats) -> Floats:
-    """D (N_c, 2), 1/D = Aᵀ M⁻¹ A of each contact alone; 1 where nothing yields."""
+    """D (N_c, 2), 1/D = Aᵀ M⁻¹ A of each contact alone; 1 if nothing can move."""
     rows = 3 * np.stack([network.high, network.low], axis=1)[:, :, None] + np.arange(3)
     columns = network.columns.reshape(-1, 2, 2, 3)
     yielding = np.einsum("cpgk,cgk->cp", columns**2, 1 / mass[rows])

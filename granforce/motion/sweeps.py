@@ -8,13 +8,13 @@ from granforce.motion.contact_dynamics import sweep
 from granforce.numerics.lanes import compiled, larger, load, same, size, store, within
 from granforce.types import Floats, Integers
 
-# Sweeps between two looks at the residual, which costs about as much as a sweep.
+# Sweeps between two checks of the residual, each of which costs about as much as a sweep.
 LOOK_EVERY = 20
-# Forces that change by less than this part of the residual in a sweep have settled while grains
-# still move: contacts slide or open for good, and the state is no equilibrium.
+# Forces that change by less than this fraction of the residual in a sweep have settled while grains
+# still move: contacts slide or open permanently, and the state is not an equilibrium.
 SETTLED = 1e-6
-# The same is concluded where the least residual falls by less than a third while the number of
-# sweeps doubles, at 32,000 sweeps or later: relaxations that end at rest are far faster by then.
+# The same is concluded if the least residual falls by less than a third while the number of sweeps
+# doubles, from 32,000 sweeps on: relaxations that reach rest are far faster.
 STALL_AFTER = 32_000
 STALLED = 0.7
 
@@ -22,7 +22,7 @@ UNDER_WAY, SETTLED_DOWN, ENDED = range(3)  # at rest or moving steadily; ended w
 
 
 class Looks(NamedTuple):
-    """What is remembered of the relaxation in each lane, between two looks at its residual."""
+    """Record of the relaxation in each lane, between two checks of its residual."""
 
     dilation: Floats  # λ
     least: Floats  # residual so far
@@ -33,7 +33,7 @@ class Looks(NamedTuple):
 
 @compiled
 def relax(problem, velocity, unit, mu, force, tolerance, most, sweeps, looks, rng, stop, lanes):
-    """Sweep in all lanes until a relaxation that was under way has ended."""
+    """Sweep in all lanes until a relaxation in progress has ended."""
     order = np.arange(problem.i.shape[0])
     dilation = load(looks.dilation, 0, lanes)
     change = total = same(lanes, 0.0)
@@ -62,7 +62,7 @@ def relax(problem, velocity, unit, mu, force, tolerance, most, sweeps, looks, rn
 
 @within
 def _until_a_look(looks, sweeps, most):
-    """Sweeps until one of the relaxations is looked at."""
+    """Number of sweeps until the next check."""
     least = LOOK_EVERY
     for lane in range(sweeps.shape[0]):
         if looks.state[lane] == UNDER_WAY:
@@ -73,7 +73,7 @@ def _until_a_look(looks, sweeps, most):
 
 @within
 def _look(looks, lane, done, residual, settled, tolerance, most):
-    """Whether a relaxation has ended after so many sweeps."""
+    """Whether a relaxation has ended after this many sweeps."""
     if done % LOOK_EVERY == 0:
         looks.least[lane] = min(looks.least[lane], residual)
         if residual <= tolerance or settled:

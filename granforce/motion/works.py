@@ -1,11 +1,11 @@
-"""Works that ask for one flow after another, carried side by side: a scheduler of lanes.
+"""Searches that need one flow after another, run in lanes: a scheduler.
 
-A search for a critical force is a chain: which flow it asks for next depends on where the last one
-went. Chains of many contacts are independent, so they share the lanes of a kernel (see `lanes`).
-Each is a generator that yields a Push and is sent its Outcome. A thread fills its lanes with works
-that wait, advances all of them until one flow has ended, and sends on the work of that lane, or
-puts the next one there: no lane waits for another. As lanes never mix, no outcome depends on what
-else was carried.
+A search for a critical force is a chain: the flow it needs next depends on the result of the last.
+Chains of different contacts are independent, so they share the lanes of a kernel (see `lanes`).
+Each is a generator that yields a Push and is sent its Outcome. A thread fills its lanes with
+waiting generators, advances all until one flow has ended, and resumes the generator of that lane or
+starts the next one there: no lane waits for another. As lanes never mix, no outcome depends on the
+others.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from granforce.numerics.lanes import lanes_for
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 
-# What asks for one flow after another: it is sent the outcome of each.
+# A generator that yields one flow after another and is sent the outcome of each.
 Work = Generator[Push, Outcome, Any]
 
 
 def relax(step: Step, asked: Push) -> Outcome:
-    """The Outcome of the flow that a Push asks for."""
+    """The Outcome of the flow for a Push."""
 
     def one() -> Generator[Push, Outcome, Outcome]:
         return (yield asked)
@@ -54,13 +54,13 @@ def follow(
     workers: int = 1,
     lanes: Any = None,
 ) -> None:
-    """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
+    """Run works in lanes on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
     finished(number, value) is called, by one thread at a time, as a work returns its value; if it
-    raises, it is still called for what other threads have ended by then. lanes: ONE or MANY, by
-    default as suits the number of works. No outcome depends on the number of threads, nor on what
-    it is carried beside, bit for bit.
+    raises, it is still called for works that other threads have finished by then. lanes: ONE or
+    MANY, by default chosen from the number of works. Outcomes are bit-identical for any number of
+    threads and lanes.
     """
     waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 
@@ -72,7 +72,7 @@ def follow(
         try:
             _carry(step, waiting, finish, failed, lanes)
         except BaseException:
-            failed.set()  # the other threads end as well
+            failed.set()  # stop the other threads
             raise
 
     if workers == 1:
@@ -90,7 +90,7 @@ def _carry(
     failed: threading.Event,
     lanes: Any,
 ) -> None:
-    """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
+    """One thread: fill lanes with works and run each to its end."""
     if not waiting:
         return
     lanes = lanes_for(len(waiting)) if lanes is None else lanes
@@ -120,9 +120,9 @@ def _go_on(
     waiting: deque[tuple[int, Work]],
     finished: Callable[[int, Any], object],
 ) -> tuple[int, Work] | None:
-    """Send a lane's work its outcome and start what it asks for next, or else what waits first.
+    """Send a lane's work its outcome and start its next flow, or else the next waiting work.
 
-    carried: number and work of the lane; it and what is sent are None without. Returns the same.
+    carried: number and work of the lane; None, as is `sent`, in an idle lane. Returns the same.
     """
     while True:
         try:

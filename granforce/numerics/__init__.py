@@ -1,1 +1,1 @@
-"""Linear algebra and optimisation on contact networks: knows matrices and cones, no physics."""
+"""Linear algebra and optimisation on contact networks: matrices and cones, no physics."""

@@ -1,31 +1,32 @@
-"""Products of 3×3 blocks, and sweeps through a triangle of them: what every factorisation is of.
+"""Products of 3×3 blocks and triangular sweeps over them: the operations of every factorisation.
 
-A matrix that couples grains is kept as blocks of nine numbers, row by row, one block for each pair
-of grains that elimination brings together (`elimination.Pattern`): place 9 b + 3 i + j of the array
-has entry (i, j) of block b. A factor L has a column of blocks per grain: its own, the diagonal one,
-first, then those below. Three things are done with a column k once its diagonal block is factored:
+A matrix that couples grains is stored in blocks of nine numbers, row by row, with one block for
+each pair of grains that elimination couples (`elimination.Pattern`): entry (i, j) of block b is at
+place 9 b + 3 i + j of the array. A factor L has one column of blocks per grain: the diagonal block
+first, then those below. Once its diagonal block is factored, column k takes part in three
+operations:
 
 - the blocks below are divided by it, x ← x d⁻ᵀ (`divide`);
-- their products are taken from later columns, z ← z − x yᵀ (`subtract_column` within a panel of
-  columns with the same rows below, `subtract_panel` from all columns beyond it at once);
-- a vector is swept through it, downwards by `forward` (x ← L⁻¹ x), upwards by `backward` (L⁻ᵀ x).
+- their products are subtracted from later columns, z ← z − x yᵀ (`subtract_column` within a panel
+  of columns with the same rows below, `subtract_panel` from all later columns at once);
+- a triangular sweep over a vector, down by `forward` (x ← L⁻¹ x) or up by `backward` (L⁻ᵀ x).
 
-Diagonal blocks have their diagonal inverted, so that sweeps multiply. Of the other six numbers the
-three below it are read (LOWER) where L is a Cholesky factor, those above (UPPER) where the block
-holds the L and U of `lu`, whose U is kept transposed.
+The diagonal of a diagonal block is stored inverted, so that sweeps multiply. Of its other six
+numbers, the three below the diagonal are read (LOWER) if L is a Cholesky factor, and the three
+above (UPPER) if the block holds both L and U of `lu`, whose U is stored transposed.
 """
 
 from granforce.numerics.lanes import fma, inline, load, store, within
 
-# A pivot that rounding has driven to zero or below belongs to a direction without weight.
+# A pivot that rounding drives to zero or below belongs to a direction without weight.
 NO_PIVOT = 1e-40
-# Where a 3×3 block has the numbers 10, 20, 21 of a lower triangle, and of an upper one transposed.
+# Places of entries 10, 20, 21 of a lower triangle in a 3×3 block, and of a transposed upper one.
 LOWER, UPPER = (3, 6, 7), (1, 2, 5)
 
 
 @within
 def divide(L, x, d, side, lanes):
-    """x ← x d⁻ᵀ for a block x of L, and the triangle on one side of its diagonal block d."""
+    """x ← x d⁻ᵀ for a block x of L and the triangle on one side of the diagonal block d."""
     r0, r1, r2 = load(L, d, lanes), load(L, d + 4, lanes), load(L, d + 8, lanes)
     l10, l20 = load(L, d + side[0], lanes), load(L, d + side[1], lanes)
     l21 = load(L, d + side[2], lanes)
@@ -40,7 +41,7 @@ def divide(L, x, d, side, lanes):
 
 @inline
 def subtract_column(Z, z, X, x, count, Y, y, lanes):
-    """z ← z − x yᵀ for `count` blocks z and x in a row; y stays in registers."""
+    """z ← z − x yᵀ for `count` consecutive blocks z and x; y stays in registers."""
     by = _block(Y, y, lanes)
     for k in range(0, 9 * count, 9):
         block = _less_product_of_blocks(_block(Z, z + k, lanes), X, x + k, by, lanes)
@@ -49,10 +50,11 @@ def subtract_column(Z, z, X, x, count, Y, y, lanes):
 
 @inline
 def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
-    """z ← z − x yᵀ, for all columns of panel p at once and blocks x that are `beyond` y or later.
+    """z ← z − x yᵀ for all columns of panel p at once and blocks x that are `beyond` y or later.
 
-    Where there are several columns, z stays in registers: what exceeds the caches takes two thirds
-    of the time. With one, y does. The number of pairs of blocks is added to the given one.
+    In a panel of several columns z stays in registers, because memory traffic beyond the caches
+    takes two thirds of the time; with one column, y does. Returns `number` plus the pairs of blocks
+    done.
     """
     start, target, begin, end = layout.start, layout.target, layout.panel[p], layout.panel[p + 1]
     below = start[end] - start[end - 1] - 1
@@ -79,7 +81,7 @@ def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
 
 @inline
 def _less_product_of_blocks(block, X, x, by, lanes):
-    """A block less x yᵀ, y given by its entries."""
+    """A block minus x yᵀ, with y given by its entries."""
     z0, z1, z2 = _less_row_product(block[0], block[1], block[2], X, x, by, lanes)
     z3, z4, z5 = _less_row_product(block[3], block[4], block[5], X, x + 3, by, lanes)
     z6, z7, z8 = _less_row_product(block[6], block[7], block[8], X, x + 6, by, lanes)
@@ -119,9 +121,9 @@ def _set_block(X, x, block, lanes):
 
 @within
 def forward(layout, begin, end, D, side, L, x, first, lanes):
-    """x ← L⁻¹ x by columns `begin` to `end`, for the rows of x from `first` on.
+    """x ← L⁻¹ x with columns `begin` to `end`; rows of x count from `first`.
 
-    Of L's diagonal blocks one side is in D.
+    D holds one side of L's diagonal blocks.
     """
     start = layout.start
     for k in range(begin, end):
@@ -135,7 +137,7 @@ def forward(layout, begin, end, D, side, L, x, first, lanes):
 
 @inline
 def spread(layout, k, L, v0, v1, v2, x, first, lanes):
-    """Set rows k of x to v, and subtract column k of L times v below."""
+    """Set rows k of x to v and subtract column k of L times v from the rows below."""
     start, row = layout.start, layout.row
     v = first + 3 * k
     store(x, v, lanes, v0)
@@ -153,7 +155,7 @@ def spread(layout, k, L, v0, v1, v2, x, first, lanes):
 
 @within
 def backward(layout, D, side, L, x, lanes):
-    """x ← L⁻ᵀ x; of L's diagonal blocks one side is in D."""
+    """x ← L⁻ᵀ x; D holds one side of L's diagonal blocks."""
     for k in range(len(layout.start) - 2, -1, -1):
         d, v = 9 * layout.start[k], 3 * k
         v0, v1, v2 = _gathered(layout, k, L, x, lanes)
@@ -167,7 +169,7 @@ def backward(layout, D, side, L, x, lanes):
 
 @inline
 def _gathered(layout, k, L, x, lanes):
-    """Rows k of x less those below times column k of L."""
+    """Rows k of x minus the rows below times column k of L."""
     start, row = layout.start, layout.row
     v0, v1, v2 = load(x, 3 * k, lanes), load(x, 3 * k + 1, lanes), load(x, 3 * k + 2, lanes)
     for a in range(start[k] + 1, start[k + 1]):
@@ -183,7 +185,7 @@ def _gathered(layout, k, L, x, lanes):
 
 @within
 def less_product(value, x, first, y, other, count, lanes):
-    """value − x·y for `count` numbers from `first` of x and `other` of y on."""
+    """value − x·y over `count` numbers, from `first` in x and `other` in y."""
     for k in range(count):
         value = fma(-load(x, first + k, lanes), load(y, other + k, lanes), value)
     return value

@@ -1,12 +1,12 @@
-"""What is known of S = {y ≥ 0 : A y = b}, by proofs that trust no solver.
+"""Facts about S = {y ≥ 0 : A y = b} with proofs that do not rely on any solver.
 
     S is empty       λ with Aᵀλ ≤ 0 and b·λ > 0 (Farkas)
-    S is not bounded d ≥ 0, d ≠ 0 with A d = 0
+    S is unbounded   d ≥ 0, d ≠ 0 with A d = 0
     S is bounded     π with Aᵀπ > 0
     g·y is small     λ with Aᵀλ ≥ g and b·λ small (duality)
 
-Solvers only propose; every proof is checked here against A and b. What one solver does not settle
-is tried by others, and what none settles is said to be undecided.
+ Solvers only propose; every proof is checked here against A and b. If one solver fails, others are
+tried; if all fail, the question is reported as undecided.
 """
 
 from collections.abc import Iterator
@@ -19,11 +19,11 @@ from granforce.records import InputError, NotJammedError, UndecidedError
 from granforce.tolerances import BALANCED, CARRYING
 from granforce.types import Floats
 
-# Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks in spite of rounding.
+# Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks despite rounding.
 _LARGEST_MEAN = 1e4
 # Largest |A d| of a direction d with Σ d = 1, rows of A of order 1.
 _BALANCED_DIRECTION = 1e-13
-# Mean of y (in ⟨f_n⟩) up to which a contact is shown to carry nothing: it is 1 in S.
+# Mean of y (in ⟨f_n⟩) up to which a contact is proved to carry no force: the mean is 1 in S.
 _USUAL_MEAN = 2.0
 UNBOUNDED = (
     "the forces on these contacts are not bounded: prescribe a pressure or a load, give bounds on "
@@ -38,7 +38,7 @@ def why_unsolved(
     *,
     slack: Floats | float = BALANCED,
 ) -> InputError:
-    """The exception to raise where a program over S has no optimum, by what can be proved.
+    """The exception to raise if a program over S has no optimum, from what can be proved.
 
     A sparse (m, n), rows of order 1; b (m,). empty: the message for an empty S. slack: as in
     `proves_empty`.
@@ -54,10 +54,9 @@ def why_unsolved(
 
 
 def empty_ray(A: sparse.csr_matrix, b: Floats, slack: Floats | float = BALANCED) -> Floats | None:
-    """λ (m,) that proves S to be empty, None where no proof was found.
+    """λ (m,) that proves S empty, or None if no proof was found.
 
-    From the duals of the least Σ |A y − b|, and from the least |A y − b|², whose own unbalance is
-    such a λ.
+    Candidates are the duals of the least Σ |A y − b| and the residual of the least |A y − b|².
     """
     cost = np.concatenate([np.zeros(A.shape[1]), np.ones(2 * len(b))])
     unit = sparse.identity(len(b))
@@ -74,9 +73,9 @@ def empty_ray(A: sparse.csr_matrix, b: Floats, slack: Floats | float = BALANCED)
 def proves_empty(
     A: sparse.csr_matrix, b: Floats, multiplier: Floats, slack: Floats | float = BALANCED
 ) -> bool:
-    """Whether Aᵀλ ≤ 0 < b·λ, beyond what rounding, and what is admitted, could hide.
+    """Whether Aᵀλ ≤ 0 < b·λ by more than rounding and the accepted slack could explain.
 
-    slack (m,) or one number: |A y − b| of forces that judges admit, more where rows are scaled up.
+    slack (m,) or one number: |A y − b| accepted for given forces, larger where rows are scaled up.
     """
     if not np.all(np.isfinite(multiplier)):
         return False
@@ -86,7 +85,7 @@ def proves_empty(
 
 
 def recession(A: sparse.csr_matrix) -> Floats | None:
-    """d ≥ 0 (n,) with A d = 0 and Σ d = 1: S, if not empty, is not bounded along it. Or None."""
+    """d ≥ 0 (n,) with A d = 0 and Σ d = 1, along which a nonempty S is unbounded, or None."""
     both, one = _with_sum(A)
     for d, _ in _proposals(both, one, np.zeros(A.shape[1])):
         d = np.maximum(d, 0.0)
@@ -96,7 +95,7 @@ def recession(A: sparse.csr_matrix) -> Floats | None:
 
 
 def bounding_rows(A: sparse.csr_matrix) -> Floats | None:
-    """π (m,) with Aᵀπ > 0, so that Aᵀπ · y = b·π bounds every y in S. None where none was found."""
+    """π (m,) with Aᵀπ > 0, so that Aᵀπ · y = b·π bounds every y in S; None if not found."""
     ray = empty_ray(*_with_sum(A))
     if ray is None:
         return None
@@ -105,7 +104,7 @@ def bounding_rows(A: sparse.csr_matrix) -> Floats | None:
 
 
 def proves_small(A: sparse.csr_matrix, b: Floats, gains: Floats, multiplier: Floats) -> bool:
-    """Whether gains · y ≤ CARRYING for every y in S of usual size, by λ with Aᵀλ ≥ gains."""
+    """Whether gains · y ≤ CARRYING for every y in S of usual size, proved by λ with Aᵀλ ≥ gains."""
     short = (gains - A.T @ multiplier).max(initial=0.0)
     return bool(b @ multiplier + short * _USUAL_MEAN * A.shape[1] <= CARRYING)
 
@@ -117,7 +116,7 @@ def _with_sum(A: sparse.csr_matrix) -> tuple[sparse.csc_matrix, Floats]:
 
 
 def _proposals(A: sparse.csr_matrix, b: Floats, cost: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """Points and multipliers of one program over {y ≥ 0 : A y = b} by one method after another."""
+    """Yield points and multipliers of a program over {y ≥ 0 : A y = b}, method after method."""
     model = programs.standard_form(A, b)
     programs.set_cost(model, cost)
     for _, y in programs.solutions(model):

@@ -1,12 +1,13 @@
-"""Values of linear programs over S with certificates that trust no solver.
+"""Values of linear programs over S with certificates that do not rely on any solver.
 
 A certificate is a state that attains the value, with its own unbalance, and multipliers λ that
 bound the value from the other side. For any λ and slack s = c − Aᵀλ,
 
     c·y = b·λ + s·y ≥ b·λ − W max_k(−s_k/w_k)₊   for all y ≥ 0 in S,
 
-where w > 0 is a fixed combination of the rows of A (the pressure row, if there is one) and W the
-value it prescribes. What the interior-point method leaves open is solved from scratch by HiGHS.
+where w > 0 is a fixed combination of the rows of A (the pressure row, if there is one) and W its
+prescribed value. Programs that the interior-point method does not finish are solved from scratch by
+HiGHS.
 """
 
 import threading
@@ -27,19 +28,19 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 from granforce.types import Floats, Progress
 
-# HiGHS takes a vertex for the optimum where no slack is below −10⁻¹⁰ of its costs: times as many
-# forces as there are, that may be more than INTERVAL_GAP.
+# HiGHS accepts a vertex as the optimum if no slack is below −10⁻¹⁰ of its costs; summed over all
+# forces this can exceed INTERVAL_GAP.
 _DEARER = 1e3
 
 
 class System(NamedTuple):
-    """A y = b in cone coordinates and units of ⟨f_n⟩, and what bounds y."""
+    """A y = b in cone coordinates and units of ⟨f_n⟩, with a bound on y."""
 
     problem: Problem
     middle: Centre
     A: sparse.csc_matrix  # (rows, n)
     b: Floats
-    loads: sparse.csc_matrix  # (rows, N_c) what F = 1 on each contact adds to A y
+    loads: sparse.csc_matrix  # (rows, N_c) added to A y by F = 1 on each contact
     weight: Floats  # (n,) w > 0
     total: float  # W: w·y = W for every y in S; a load F on contact c adds F gains[c]
     gains: Floats  # (N_c,)
@@ -55,11 +56,11 @@ def make_system(
 ) -> System:
     """The System of a Problem and its centre.
 
-    bounding: the row of A that bounds y > 0, None without one. A has the rows of the Problem's
-    balance, then those of its sides and pinned components.
+    bounding: the row of A that bounds y > 0, or None. The rows of A are the Problem's balance, then
+    its sides and pinned components.
 
-    Raises NotJammedError where S is empty, InputError where it is not bounded, UndecidedError where
-    neither could be shown.
+    Raises NotJammedError if S is empty, InputError if it is unbounded, UndecidedError if neither
+    can be proved.
     """
     if bounding is not None:
         combination = np.zeros(len(b))
@@ -87,7 +88,7 @@ def make_system(
 
 
 def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
-    """π with Aᵀπ > 0: the duals of max Σ y, which exist where S is bounded and not empty."""
+    """π with Aᵀπ > 0: the duals of max Σ y, which exist if S is bounded and not empty."""
     model = highs.standard_form(A, b)
     highs.set_cost(model, -np.ones(A.shape[1]))
     for status, _ in highs.solutions(model):
@@ -101,7 +102,7 @@ def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
 
 
 class _Asked(NamedTuple):
-    """Programs that are solved together, and what is known of them."""
+    """Programs that are solved together, with their results so far."""
 
     keys: Sequence[Any]
     tasks: Sequence[Program]
@@ -109,15 +110,15 @@ class _Asked(NamedTuple):
     points: dict[Any, Floats] | None  # {key: y (n,) at which the value is attained}
 
     def open(self, numbers: Iterable[int]) -> list[int]:
-        """Those of the numbers without a value and bound as close as they are to be."""
+        """The numbers whose value and bound are not yet within INTERVAL_GAP."""
         none = np.inf, -np.inf
         known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
-        # A value below its bound is of a state whose unbalance, small as it is, weighs too much.
+        # A value below its bound comes from a state whose unbalance, though small, costs too much.
         return [k for k, value, bound in known if not abs(value - bound) <= INTERVAL_GAP]
 
 
 class Solver:
-    """Solves and certifies programs over one System; keeps count of what it did."""
+    """Solves and certifies programs over one System, and counts them."""
 
     def __init__(
         self,
@@ -130,10 +131,10 @@ class Solver:
         done: int = 0,
         found: Callable[[Any, float, float], object] | None = None,
     ) -> None:
-        """seen(key, y): called with each y (n,) of S without load at which a value is attained.
+        """seen(key, y): called with each load-free y (n,) of S at which a value is attained.
 
-        found(key, attained, bound): called as each program ends, and progress(done, total), which
-        counts on from `done`. All come from one thread at a time.
+        found(key, attained, bound) is called as each program ends, progress(done, total) counts
+        from `done`. All are called from one thread at a time.
         """
         self.system, self.workers = system, worker_count(workers)
         self.seen, self.progress, self.total, self.done = seen, progress, total, done
@@ -144,10 +145,10 @@ class Solver:
     def solve(
         self, keys: Sequence[Any], tasks: Sequence[Program], points: dict[Any, Floats] | None = None
     ) -> dict[Any, tuple[float, float]]:
-        """{key: (value attained in S, value that bounds it from below)} of those reached.
+        """{key: (value attained in S, value that bounds it from below)} of the finished programs.
 
-        points: a dict to fill with the y (n,) at which each key's value is attained. Once
-        cancelled, those that were reached are given.
+        points: a dict to fill with the y (n,) at which each key's value is attained. After
+        cancelling, the programs finished so far are returned.
         """
         asked = _Asked(keys, tasks, {}, points)
         with suppress(Cancelled):
@@ -157,7 +158,7 @@ class Solver:
     def _solve(self, asked: _Asked, every: Sequence[int]) -> None:
         if self.system.middle.reached:
             self._carry(asked, every, refined=False)
-            # Of thousands of contacts, rounding may leave the bound of one or two short.
+            # Among thousands of contacts, rounding may leave the bound of one or two too loose.
             self._carry(asked, asked.open(every), refined=True)
         else:
             for outcome in one_after_another(self.system, asked.tasks):
@@ -171,7 +172,7 @@ class Solver:
                     break
 
     def _carry(self, asked: _Asked, numbers: Sequence[int], refined: bool) -> None:
-        """Take what the interior-point method makes of the tasks of these numbers."""
+        """Solve the programs of these numbers by the interior-point method."""
         if len(numbers):
             linear_programs.run(
                 *(self.system.problem, self.system.middle, asked.tasks, numbers),
@@ -181,7 +182,7 @@ class Solver:
             )
 
     def _take(self, asked: _Asked, outcomes: Sequence[ProgramOutcome]) -> None:
-        """Certify outcomes; of a key's outcomes keep the better value and the better bound."""
+        """Certify outcomes, keeping the better value and the better bound of each key."""
         bounds, points = asked.bounds, asked.points
         attained, bound = certify(self.system, outcomes, asked.tasks)
         with self.lock:
@@ -204,7 +205,7 @@ class Solver:
 
 
 def _nearer(one: float, other: float, bound: float) -> float:
-    """The better of two values: the smaller, or the nearer to the bound where it lies below it."""
+    """The better of two values: the smaller, or the one nearer the bound if below it."""
     return min(one, other, key=lambda value: (abs(value - bound), value))
 
 
@@ -213,10 +214,10 @@ def certify(
 ) -> tuple[Floats, Floats]:
     """Value attained by each outcome, and a bound on the minimum from A, b and c alone (⟨f_n⟩).
 
-    The value is inf where the state is not one of S to BALANCED; the bound is −inf where the
-    multipliers bound nothing.
+    The value is inf if the state is not in S to BALANCED; the bound is −inf if the multipliers give
+    no bound.
     """
-    with np.errstate(invalid="ignore", over="ignore"):  # of outcomes that are no numbers
+    with np.errstate(invalid="ignore", over="ignore"):  # outcomes that are not numbers
         return _certify(system, outcomes, tasks)
 
 
@@ -243,7 +244,7 @@ def _certify(
             gain[k] = max(0.0, system.gains[task.loaded])
     slack = cost - system.A.T @ multiplier
     short = np.maximum(np.max(-slack / system.weight[:, None], axis=0), 0.0)
-    # One by one: a product of matrices would round by the company that a program came in.
+    # One by one: the rounding of a matrix product would depend on the other programs.
     bound = np.array([system.b @ one for one in multiplier.T.copy()]) - system.total * short
     # w·y may grow with the load: −F ≥ bound − short · gain · F.
     bound = np.where(short * gain < 1, bound / (1 - short * gain), -np.inf)
@@ -252,10 +253,10 @@ def _certify(
 
 
 def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[ProgramOutcome]:
-    """Yield the outcomes of the programs without a load by HiGHS's simplex method.
+    """Yield the outcomes of the load-free programs by HiGHS's simplex method.
 
-    Each goes on from the vertex of the one before, which takes a tenth of the time: for S without
-    an inside, where some contacts can do nothing but slide or open.
+    Each starts from the vertex of the previous one, which takes a tenth of the time. For S without
+    an interior, where some contacts can only slide or open.
     """
     scale = _row_scale(system.A)
     model = highs.going_on(sparse.diags(scale) @ system.A, scale * system.b)
@@ -270,9 +271,9 @@ def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[Prog
 
 
 def from_scratch(system: System, number: int, task: Program) -> Iterator[ProgramOutcome]:
-    """Yield the outcomes of one program by one of HiGHS's methods after another, without a start.
+    """Yield the outcomes of one program by HiGHS's methods in turn, each without a start.
 
-    The first takes presolve and tightest tolerances.
+    The first uses presolve and the tightest tolerances.
     """
     A, cost = system.A, _cost_of(system, task)
     if task.loaded >= 0:
@@ -288,7 +289,7 @@ def from_scratch(system: System, number: int, task: Program) -> Iterator[Program
 
 
 def _row_scale(A: sparse.csr_matrix) -> Floats:
-    """What makes the largest entry of each row 1: feasibility is asked of rows of that size."""
+    """Factors that scale the largest entry of each row to 1, the row size of the tolerances."""
     largest = abs(A).max(axis=1).toarray().ravel()
     return 1 / np.where(largest > 0, largest, 1.0)
 
@@ -309,11 +310,11 @@ def _outcome(
     number: int,
     task: Program,
 ) -> ProgramOutcome:
-    """What HiGHS made of a program whose rows were scaled, from its basis, if any, to rounding."""
+    """The outcome of a program solved by HiGHS with scaled rows, to rounding if it has a basis."""
     multiplier = scale * np.array(model.getSolution().row_dual) / _DEARER
     basis = highs.basis(model)
     if basis is not None:
-        with suppress(RuntimeError):  # it is singular to rounding
+        with suppress(RuntimeError):  # singular basis
             y, multiplier = highs.vertex(A, system.b, cost, *basis)
     y = np.maximum(y, 0.0)
     load = float(y[-1]) if task.loaded >= 0 else 0.0

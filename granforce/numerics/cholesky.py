@@ -1,25 +1,25 @@
-"""L Lᵀ = A K Aᵀ + δ for conductances K that are symmetric, and what follows from it.
+"""L Lᵀ = A K Aᵀ + δ for symmetric conductances K: factors, solutions and left-out rows.
 
-Panel by panel: each column's diagonal block is factored, what is below is divided by it, and the
-products are taken from later columns (see `blocks`).
+Panel by panel: each column's diagonal block is factored, the blocks below are divided by it, and
+their products are subtracted from later columns (see `blocks`).
 
-One grain alone, with rows x, y and torque, shows what becomes of nine numbers:
+For one grain, with rows x, y and torque, the nine numbers become:
 
-    4 2 0        the root of the first pivot, 4, is 2, and what is below is divided by it: 1, 0;
-    2 5 4        the second pivot has lost 1·1 by then: 5 − 1 = 4, its root is 2; below it
-    0 4 5        (4 − 0·1)/2 = 2; the third, 5 − 0·0 − 2·2 = 1, is its own root.
+    4 2 0        the root of the first pivot, 4, is 2; the numbers below are divided by it: 1, 0;
+    2 5 4        the second pivot has become 5 − 1·1 = 4, with root 2; below it is
+    0 4 5        (4 − 0·1)/2 = 2; the third pivot is 5 − 0·0 − 2·2 = 1, with root 1.
 
-So L = (2; 1 2; 0 2 1) by rows. The diagonal is kept inverted: ½, ½, 1. To solve for (6, 11, 9) is
-to go down, 6·½ = 3, (11 − 1·3)·½ = 4, (9 − 0·3 − 2·4)·1 = 1, and up again: 1·1 = 1, (4 − 2·1)·½ =
-1, (3 − 1·1 − 0·1)·½ = 1. The solution is (1, 1, 1).
+So L = (2; 1 2; 0 2 1) by rows. Its diagonal is stored inverted: ½, ½, 1. To solve for (6, 11, 9),
+sweep down: 6·½ = 3, (11 − 1·3)·½ = 4, (9 − 0·3 − 2·4)·1 = 1, and up: 1·1 = 1, (4 − 2·1)·½ = 1, (3 −
+1·1 − 0·1)·½ = 1. The solution is (1, 1, 1).
 
-Global rows s, of the pressure or the stress, meet every contact: eliminated first they would fill
-everything. They come last, as a border. With B = L Lᵀ that of the grains and C the corner,
+The global rows s, of the pressure or the stress, meet every contact; eliminated first they would
+fill the matrix. They come last, as a border. With B = L Lᵀ for the grains and C the corner,
 
     (B s; sᵀ C) = (L 0; tᵀ R) (Lᵀ t; 0 Rᵀ),    t = L⁻¹ s,    R Rᵀ = C − tᵀ t,
 
-so that the border is one more sweep (`sides` ← t) and R the factor of a matrix of three rows at
-most (`corner`).
+so that the border needs one more sweep (`sides` ← t) and R is the factor of a matrix with at most
+three rows (`corner`).
 """
 
 import numpy as np
@@ -38,16 +38,16 @@ from granforce.numerics.contact_matrix import Factors, Network
 from granforce.numerics.lanes import compiled, fma, load, pick, root, store, within
 from granforce.types import Integers, Mask
 
-# What stands for a pivot that is none: its row gets no weight.
+# Replaces a missing pivot: its row gets no weight.
 _NO_WEIGHT = 1e64
 
 
 @compiled
 def factor(network, least, factors, stop, lanes):
-    """Cholesky factors of the matrix in place, and of the global rows' Schur complement.
+    """Factor the matrix in place by Cholesky, and the Schur complement of the global rows.
 
-    Rows with a pivot up to `least` (rows,) are left out; see `left_out`. Ends early, with the
-    matrix half done, once stop[0] is raised.
+    Rows with a pivot up to `least` (rows,) are left out; see `left_out`. Returns early, with the
+    matrix half factored, once stop[0] is set.
     """
     layout, L, sides, corner = network.layout, factors.lower, factors.sides, factors.corner
     start, panel = layout.start, layout.panel
@@ -65,7 +65,7 @@ def factor(network, least, factors, stop, lanes):
             for q in range(k + 1, end):
                 a = start[k] + q - k
                 subtract_column(L, 9 * start[q], L, 9 * a, last - a, L, 9 * a, lanes)
-        # Now, while these columns are at hand: what is larger than the caches takes its time.
+        # Now, while these columns are in the cache: for large matrices memory traffic dominates.
         for a in range(m):
             forward(layout, panel[p], end, L, LOWER, L, sides, rows * a, lanes)
         number = subtract_panel(layout, p, number, L, L, 0, L, lanes)
@@ -79,13 +79,13 @@ def factor(network, least, factors, stop, lanes):
 
 @within
 def _pivot(value, least):
-    """One over the root of a pivot."""
+    """One over the square root of a pivot."""
     return 1.0 / root(pick(value, least, value, _NO_WEIGHT))
 
 
 @within
 def _factor_diagonal(L, d, least, k, lanes):
-    """Cholesky factor of the diagonal block of rows k to k + 2; its own diagonal is inverted."""
+    """Cholesky factor of the diagonal block of rows k to k + 2, with its diagonal inverted."""
     r0 = _pivot(load(L, d, lanes), least[k])
     l10 = load(L, d + 3, lanes) * r0
     l20 = load(L, d + 6, lanes) * r0
@@ -116,7 +116,7 @@ def _factor_corner(corner, m, lanes):
 
 @within
 def solve(network, factors, x, y, lanes):
-    """x, y ← (L Lᵀ)⁻¹ (x, y) for factored L; x (rows, W), y (m, W) of the global rows."""
+    """x, y ← (L Lᵀ)⁻¹ (x, y) with the factor L; x (rows, W), y (m, W) for the global rows."""
     layout = network.layout
     m, rows = network.border.shape[1] // 2, 3 * (len(layout.start) - 1)
     forward(layout, 0, rows // 3, factors.lower, LOWER, factors.lower, x, 0, lanes)
@@ -137,10 +137,10 @@ def solve(network, factors, x, y, lanes):
 
 
 def diagonals(network: Network) -> Integers:
-    """Places (grains, 3) of the diagonal among the entries of the lower factor."""
+    """Places (grains, 3) of the diagonal entries in the lower factor."""
     return 9 * network.layout.start[:-1, None] + np.array([0, 4, 8])
 
 
 def left_out(network: Network, factors: Factors) -> Mask:
-    """Mask (rows,) of the rows that the last factorisation of the first lane left out."""
+    """Mask (rows,) of the rows left out by the last factorisation of the first lane."""
     return (factors.lower[diagonals(network), 0] <= 1.01 / np.sqrt(_NO_WEIGHT)).ravel()

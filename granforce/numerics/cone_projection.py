@@ -1,16 +1,16 @@
-"""The nearest network from v alone: the projection onto each cone, and its slope.
+"""The nearest network from v alone: the projection onto each cone, and its derivative.
 
-For w = 1 and c·y = −f·target the optimum of a contact program has f = Π(target + Aᵀ v), Π the
-projection onto the Coulomb cone of each contact on its own. So the balance A Π(target + Aᵀ v) = b
-is a system for v alone, piecewise linear, and Newton's method on it ends exactly: once no contact
-changes from inside to sliding or open, the step solves it. With forces (f_n, f_t/μ), and p = the
-normal part of target + Aᵀ v, q = μ times its tangential part:
+ For w = 1 and c·y = −f·target the optimum of a contact program has f = Π(target + Aᵀ v), where Π
+projects onto the Coulomb cone of each contact. So the balance A Π(target + Aᵀ v) = b is a piecewise
+linear system for v alone. Newton's method on it terminates exactly: once every contact keeps its
+state (inside, sliding or open), the step is the solution. With forces (f_n, f_t/μ), p the normal
+part of target + Aᵀ v and q = μ times its tangential part:
 
     inside, |q| ≤ μ² p:     f = (p, q/μ²),                K = (1 0; 0 1/μ²);
     sliding otherwise:      f = (p + |q|) (1, ±1)/(1 + μ²),   K = (1 ±1; ±1 1)/(1 + μ²);
     open where p + |q| ≤ 0: f = 0,                        K = 0.
 
-The slopes K are the conductances that `interior_point.advance` puts into A K Aᵀ (PROJECTED).
+The derivatives K are the conductances that `interior_point.advance` puts into A K Aᵀ (PROJECTED).
 """
 
 from granforce.numerics.contact_matrix import pull
@@ -20,16 +20,15 @@ from granforce.numerics.lanes import compiled, larger, load, pick, same, size, s
 
 @compiled
 def project(problem, at, work, lanes):
-    """y ← that of the point of each cone nearest to target + Aᵀv, its slope K, and unbalance.
+    """y ← the nearest point of each cone to target + Aᵀ v, with the derivative K and the unbalance.
 
-    For w = 1 and no sides: once those forces are balanced they are the optimum, exactly in their
-    cones.
+    For w = 1 and no sides: once balanced, these forces are the optimum, exactly in their cones.
     """
     mu2 = problem.mu * problem.mu
     flat, soft = 1.0 / (1.0 + mu2), 1.0 / max(mu2, 1e-300)
     for k in range(0, len(problem.w), 2):
         normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
-        # f_n, and μ f_t, of target + Aᵀv.
+        # f_n and μ f_t of target + Aᵀ v.
         normal = normal - load(at.c, k, lanes) - load(at.c, k + 1, lanes)
         tangential = tangential - load(at.c, k, lanes) + load(at.c, k + 1, lanes)
         across = size(tangential)
@@ -43,7 +42,7 @@ def project(problem, at, work, lanes):
         if problem.w[k] >= PINNED or problem.w[k + 1] >= PINNED:
             _project_pinned(problem, k, normal, soft * tangential, at, work, lanes)
             continue
-        # The tip comes last: without friction a pull without tangential part would pass as inside.
+        # The tip last: without friction a purely normal tension would count as inside.
         tip = pick(across, -normal, 1.0, 0.0)
         store(work.K, 3 * (k // 2), lanes, tip * nn)
         store(work.K, 3 * (k // 2) + 1, lanes, tip * nt)
@@ -57,7 +56,7 @@ def project(problem, at, work, lanes):
 
 @within
 def _project_pinned(problem, k, normal, tangential, at, work, lanes):
-    """The same for a contact of which f_n, f_t or both stay: the nearest point of a line."""
+    """The same for a contact with f_n, f_t or both pinned: the nearest point of a line."""
     y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
     f_n, f_t = 0.5 * (y0 + y1), 0.5 * (y0 - y1)
     nn = tt = same(lanes, 0.0)

@@ -1,16 +1,16 @@
-"""A K Aᵀ + δ, the stiffness of a contact network, put together contact by contact in 3×3 blocks.
+"""A K Aᵀ + δ, the stiffness of a contact network, assembled contact by contact in 3×3 blocks.
 
-Each contact joins the three degrees of freedom of its two grains by a conductance K, 2×2 and
-symmetric or not. Let E (3, 2) be what unit f_n and unit f_t do to the rows of the grain that is
-eliminated later, E′ to those of the earlier one: the contact adds E K Eᵀ and E′ K E′ᵀ to the
-diagonal blocks of both, and E K E′ᵀ to the block between them. Up to three global rows (pressure,
-or stress) meet every contact, and are kept apart as a border. `cholesky` factors the matrix where
-K is symmetric, `lu` where it is not. Kernels work on one matrix or on LANES of them side by side
-(see `lanes`); matrices never mix.
+Each contact couples the three degrees of freedom of its two grains by a 2×2 conductance K,
+symmetric or not. Let E (3, 2) be the action of unit f_n and unit f_t on the rows of the grain
+eliminated later, and E′ on those of the other grain: the contact adds E K Eᵀ and E′ K E′ᵀ to the
+diagonal blocks of the two, and E K E′ᵀ to the block between them. Up to three global rows (pressure
+or stress) meet every contact and are stored apart as a border. `cholesky` factors the matrix if K
+is symmetric, `lu` if not. Kernels work on one matrix or on LANES of them side by side (see
+`lanes`); matrices never mix.
 
-A is given by `columns` (N_c, 12): what unit f_n (first six numbers) and unit f_t do to the rows of
-the grain that is eliminated later (three) and earlier (three), and `border` (N_c, 2 m): what they
-do to the m global rows.
+A is given by `columns` (N_c, 12), the action of unit f_n (first six numbers) and unit f_t on the
+rows of the grain eliminated later (three) and earlier (three), and by `border` (N_c, 2 m), the
+action on the m global rows.
 """
 
 from typing import NamedTuple
@@ -23,23 +23,23 @@ from granforce.types import Floats, Integers
 
 
 class Network(NamedTuple):
-    """A, and where its products go."""
+    """A, and where its products are stored."""
 
     layout: Pattern
-    high: Integers  # (N_c,) place of the grain that is eliminated later
-    low: Integers  # (N_c,) of the other one
+    high: Integers  # (N_c,) place of the grain eliminated later
+    low: Integers  # (N_c,) place of the other grain
     block: Integers  # (N_c,) block that couples them
     columns: Floats  # (N_c, 12)
     border: Floats  # (N_c, 2 m)
 
 
 class Factors(NamedTuple):
-    """Memory of one factorisation; W is 1 or LANES."""
+    """Storage for one factorisation; W is 1 or LANES."""
 
     lower: Floats  # (blocks · 9, W)
-    upper: Floats  # (blocks · 9, W) transposed; no room where the matrix is symmetric
+    upper: Floats  # (blocks · 9, W) transposed; empty if the matrix is symmetric
     sides: Floats  # (m · rows, W) L⁻¹ of the global rows
-    tops: Floats  # (m · rows, W) the same of the global columns; no room where symmetric
+    tops: Floats  # (m · rows, W) the same for the global columns; empty if symmetric
     corner: Floats  # (m · m, W) factors of the global rows' Schur complement
 
 
@@ -48,8 +48,8 @@ def make_network(
 ) -> Network:
     """The Network of grains at x (M, 2) in contact i, j (N_c,).
 
-    first, second (N_c, 3, 2): what unit f_n, f_t do to the rows of grains i and j; border
-    (N_c, m, 2): to the global rows.
+    first, second (N_c, 3, 2): action of unit f_n, f_t on the rows of grains i and j; border (N_c,
+    m, 2): on the global rows.
     """
     return turned(pattern(x, i, j), i, j, first, second, border)
 
@@ -57,7 +57,7 @@ def make_network(
 def turned(
     layout: Pattern, i: Integers, j: Integers, first: Floats, second: Floats, border: Floats
 ) -> Network:
-    """The Network of contacts whose pattern is known; arguments as for `make_network`."""
+    """The Network of contacts whose pattern is known; arguments as in `make_network`."""
     at_i, at_j = layout.position[i], layout.position[j]
     later = (at_i > at_j)[:, None, None]
     columns = np.concatenate(
@@ -77,7 +77,7 @@ def turned(
 
 
 def make_factors(network: Network, width: int, symmetric: bool = True) -> Factors:
-    """Room for the factors of `width` matrices side by side."""
+    """Storage for the factors of `width` matrices side by side."""
     blocks, rows = len(network.layout.row), 3 * len(network.layout.position)
     m = network.border.shape[1] // 2
     other = 0 if symmetric else 1
@@ -92,7 +92,7 @@ def make_factors(network: Network, width: int, symmetric: bool = True) -> Factor
 
 @inline
 def pull(network, c, x, y, lanes):
-    """(Aᵀ x)_n and (Aᵀ x)_t of contact c; x (rows, W), and y (m, W) of the global rows."""
+    """(Aᵀ x)_n and (Aᵀ x)_t of contact c; x (rows, W), y (m, W) for the global rows."""
     normal = tangential = same(lanes, 0.0)
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
         e = _columns_of(network, c, first)
@@ -111,7 +111,7 @@ def pull(network, c, x, y, lanes):
 
 @inline
 def push(network, c, normal, tangential, x, y, lanes):
-    """x, y ← x, y + A f for the forces f of contact c; shapes as for `pull`."""
+    """x, y ← x, y + A f for the forces f of contact c; shapes as in `pull`."""
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
         e = _columns_of(network, c, first)
         x0 = fma(e[0], normal, fma(e[3], tangential, load(x, 3 * grain, lanes)))
@@ -129,14 +129,14 @@ def push(network, c, normal, tangential, x, y, lanes):
 
 @within
 def clear(values, lanes):
-    """values ← 0, number by number: arrays set to slices take numba half a second to compile."""
+    """values ← 0, element by element: a slice assignment takes numba half a second to compile."""
     for k in range(len(values)):
         store(values, k, lanes, 0.0)
 
 
 @within
 def copy(values, given, lanes):
-    """values ← given, likewise."""
+    """values ← given, element by element."""
     for k in range(len(values)):
         store(values, k, lanes, load(given, k, lanes))
 
@@ -164,7 +164,7 @@ def add(network, c, nn, nt, tt, factors, lanes):
 
 @inline
 def add_skew(network, c, nn, nt, tn, tt, factors, lanes):
-    """Add contact c with the conductance K = [nn nt; tn tt] to a matrix that is not symmetric."""
+    """Add contact c with the conductance K = [nn nt; tn tt] to an unsymmetric matrix."""
     _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes)
     _add_between(network, c, nn, nt, tn, tt, factors.lower, factors.sides, lanes)
     _add_between(network, c, nn, tn, nt, tt, factors.upper, factors.tops, lanes)
@@ -172,7 +172,7 @@ def add_skew(network, c, nn, nt, tn, tt, factors, lanes):
 
 @inline
 def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
-    """E K Eᵀ to the blocks of both grains and to the corner."""
+    """Add E K Eᵀ to the blocks of both grains and to the corner."""
     start = network.layout.start
     for first, grain in ((0, network.high[c]), (3, network.low[c])):
         e = _columns_of(network, c, first)
@@ -187,7 +187,7 @@ def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
 
 @inline
 def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
-    """E K Eᵀ to the block of the later by the earlier grain, and of global rows by both."""
+    """Add E K E′ᵀ to the block between the grains, and the products with global rows."""
     high, low = _columns_of(network, c, 0), _columns_of(network, c, 3)
     by_low = _times(nn, nt, tn, tt, low)
     _add_block(blocks, 9 * network.block[c], high, by_low, lanes)
@@ -203,7 +203,7 @@ def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
 
 @within
 def _columns_of(network, c, first):
-    """What unit f_n, then unit f_t do to the three rows of a contact's later or earlier grain."""
+    """Action of unit f_n and unit f_t on the three rows of a contact's later or earlier grain."""
     e = network.columns[c]
     return e[first], e[first + 1], e[first + 2], e[first + 6], e[first + 7], e[first + 8]
 
@@ -244,7 +244,7 @@ def _add_three(values, place, e_n, e_t, by, lanes):
 
 @within
 def add_one(network, c, K, factors, lane):
-    """Add a normal conductance K of contact c to the matrix of one lane."""
+    """Add a normal conductance K of contact c to the matrix in one lane."""
     e, g, start = network.columns[c], network.border[c], network.layout.start
     at_high, at_low = 9 * start[network.high[c]], 9 * start[network.low[c]]
     between, m, grains = 9 * network.block[c], len(g) // 2, len(start) - 1

@@ -1,19 +1,19 @@
-"""Contact programs: what is minimised over the networks of S, and where an iterate stands.
+"""Contact programs: the function minimised over S, and the state of an iteration.
 
-In cone coordinates y ≥ 0, two a contact, with f_n = (y₁ + y₂)/2 and f_t = μ (y₁ − y₂)/2, a contact
-program is
+In cone coordinates y ≥ 0, two per contact, with f_n = (y₁ + y₂)/2 and f_t = μ (y₁ − y₂)/2, a
+contact program is
 
     minimise  ½ Σ w f² + c·y − F   subject to   A f + a F = b,  E f + s = d,  y, s ≥ 0,  F ≥ 0.
 
 Bounds and limit loads are programs with w = 0, nearest networks with w = 1 and c·y = −f·target; a,
-the column of f_n of one contact, is there where a load F is sought. E f ≤ d are bounds on single
-components of f beside those of the cones ("sides", with their slacks s), if there are any; a
-component that is known exactly stays (PINNED). Forces are in units of order 1, tangential ones are
-kept as f_t/μ.
+the column of f_n of one contact, is present if a load F is maximised. E f ≤ d are bounds on single
+components of f in addition to the cones ("sides", with slacks s), if there are any; a component
+with a known value is fixed (PINNED). Forces are in units of order 1, and tangential forces are
+stored as f_t/μ.
 
-A `Problem` is plain data that all programs over one set of networks share, an `Iterate` is where
-one or LANES of them stand side by side, and `unbalance` judges that for every solver:
-`interior_point` and `cone_projection`.
+A `Problem` is the data that all programs over one set of networks share, an `Iterate` the current
+point of one or of LANES of them, and `unbalance` is the measure that both solvers, `interior_point`
+and `cone_projection`, use.
 """
 
 from typing import NamedTuple
@@ -36,9 +36,9 @@ from granforce.numerics.lanes import (
 from granforce.system import cancelling
 from granforce.types import Floats, Integers, Mask
 
-# What d − E f − s may be off by rounding, for forces of order 1.
+# Rounding error of d − E f − s for forces of order 1.
 _ROUNDING = 1e-13
-# Stiffness of a component that stays where it is: its conductance is below any pivot.
+# Stiffness of a fixed component: its conductance is below any pivot.
 PINNED = 1e60
 
 
@@ -52,29 +52,29 @@ class Problem(NamedTuple):
     mu: float
     place: Integers  # (rows of A,) where they are among the rows, then the border
     w: Floats  # (2 N_c,) weights of f_n, f_t/μ in ½ Σ w f²; PINNED for those that stay
-    start: Floats  # (n,) first y; it has the pinned components where they are to stay
+    start: Floats  # (n,) first y; contains the values of pinned components
     side: Integers  # (sides,) component that each side bounds, in order of w
     sign: Floats  # (sides,) E: 1 for a bound from above, −1 from below
     limit: Floats  # (sides,) d
 
 
 class Iterate(NamedTuple):
-    """Where W programs stand: y of n = 2 N_c + sides coordinates, then F. Arrays (…, W)."""
+    """The points of W programs: y with n = 2 N_c + sides coordinates, then F. Arrays (…, W)."""
 
     y: Floats  # (n + 1, W) cone coordinates, slacks of the sides, F
     z: Floats  # (n + 1, W)
     c: Floats  # (n + 1, W)
     v: Floats  # (rows, W)
     v_border: Floats  # (m, W)
-    loaded: Integers  # (W,) contact that carries F, −1 without
+    loaded: Integers  # (W,) contact that carries F, or −1
 
 
 class Workspace(NamedTuple):
-    """Scratch arrays of W programs, and numbers (1, W) that tell how far each has come."""
+    """Scratch arrays of W programs, and numbers (1, W) that measure their progress."""
 
     factors: Factors
-    stop: Mask  # (1,) bool, raised where the work is cancelled
-    least: Floats  # (rows,) pivots up to this are none
+    stop: Mask  # (1,) bool, set when the work is cancelled
+    least: Floats  # (rows,) smaller pivots count as zero
     K: Floats  # (3 N_c, W) nn, nt, tt
     h: Floats  # (n + 1, W)
     dy: Floats  # (n + 1, W)
@@ -93,11 +93,11 @@ class Workspace(NamedTuple):
     primal: Floats  # length of the step of y
     dual: Floats  # of v and z
     target: Floats  # τ
-    going: Floats  # 1, or 0 for programs that stay where they are
+    going: Floats  # 1, or 0 for programs that do not move
 
 
 def make_iterate(problem: Problem, width: int) -> Iterate:
-    """An Iterate of trivial programs that take any step."""
+    """An Iterate of trivial programs, for which any step is valid."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     return Iterate(
         y=side_by_side(np.append(problem.start, 1.0), width),
@@ -110,7 +110,7 @@ def make_iterate(problem: Problem, width: int) -> Iterate:
 
 
 def make_workspace(problem: Problem, width: int) -> Workspace:
-    """The Workspace of `width` programs side by side."""
+    """The Workspace for `width` programs side by side."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     forces, sides = len(problem.w), len(problem.side)
     return Workspace(
@@ -148,9 +148,9 @@ def make_problem(
     mu: float,
     shift: float,
 ) -> Problem:
-    """The Problem with `shift`, relative to that of A Aᵀ, on the diagonal of A K Aᵀ.
+    """The Problem with `shift`, relative to the diagonal of A Aᵀ, added to that of A K Aᵀ.
 
-    idle (rows,): 1 for rows that no contact meets. All weights are 1, and there are no sides.
+    idle (rows,): 1 for rows without a contact. All weights are 1, and there are no sides.
     """
     diagonal = diagonal_of(network)
     typical = diagonal[idle == 0].mean() if (idle == 0).any() else 0.0
@@ -174,7 +174,7 @@ def make_problem(
 
 
 def without_rows(problem: Problem, idle: Floats, out: Mask) -> Problem:
-    """The problem, linear, without shift and the rows (rows,) that are out."""
+    """The linear problem without shift and without the rows (rows,) in the mask `out`."""
     network = problem.network
     columns = np.where(out[_rows(network)], 0.0, network.columns.reshape(-1, 2, 2, 3))
     return linear(problem, idle)._replace(
@@ -189,7 +189,7 @@ def linear(problem: Problem, idle: Floats) -> Problem:
 
 
 def _rows(network: Network) -> Integers:
-    """Rows (N_c, 2, 2, 3) that the entries of `columns` belong to, by component and grain."""
+    """Rows (N_c, 2, 2, 3) of the entries of `columns`, by component and grain."""
     first = 3 * np.stack([network.high, network.low], axis=1)
     return (first[:, None, :, None] + np.arange(3)).repeat(2, axis=1)
 
@@ -203,7 +203,7 @@ def diagonal_of(network: Network) -> Floats:
 
 @within
 def worst_of(values, worst, lanes):
-    """The largest |value|, or `worst`."""
+    """The larger of `worst` and the largest |value|."""
     for k in range(len(values)):
         worst = larger(size(load(values, k, lanes)), worst)
     return worst
@@ -220,7 +220,7 @@ def unbalance(problem, at, work, lanes):
     for a in range(len(problem.side)):
         limit, beside = problem.limit[a], load(at.y, len(problem.w) + a, lanes)
         rest = limit - beside - side_force(problem, a, at.y, lanes)
-        # Rounding of f is none of s, which may be much smaller.
+        # Not relative to s, which may be much smaller than the rounding error of f.
         least = _ROUNDING * (1.0 + abs(limit))
         store(work.rest, a, lanes, pick(size(rest), least, rest, 0.0))
 
@@ -249,7 +249,7 @@ def side_force(problem, a, y, lanes):
 
 @within
 def pull_one(network, x, x_border, c, lane):
-    """(Aᵀ x)_n of one contact and lane; 0 without contact."""
+    """(Aᵀ x)_n of one contact in one lane; 0 without a contact."""
     value = 0.0
     if c >= 0:
         e, g = network.columns[c], network.border[c]

@@ -1,10 +1,10 @@
-"""In which order the grains of a contact network are eliminated, and what fill that leaves.
+"""The order in which the grains of a contact network are eliminated, and the resulting fill.
 
-A packing's contact graph is planar: eliminating grains in order of their least degree leaves little
-fill (George, Liu, SIAM Review 31, 1 (1989)); 23,800 disks take 0.1 s. Ties decide much: of several
-numberings along straight lines across the packing the best is taken, which costs 5 to 25 % fewer
-operations than any one of them. Finally the tree of elimination is walked subtree by subtree, so
-that what belongs together stays in the cache.
+A packing's contact graph is planar, so minimum-degree elimination leaves little fill (George, Liu,
+SIAM Review 31, 1 (1989)); 23,800 disks take 0.1 s. Ties matter: the best of several numberings
+along straight lines across the packing is used, which takes 5 to 25 % fewer operations than any
+single one. Finally the elimination tree is traversed subtree by subtree, which keeps related
+columns in the cache.
 """
 
 from typing import NamedTuple
@@ -15,24 +15,24 @@ from granforce.numerics.lanes import compiled, within
 from granforce.system import cancelling
 from granforce.types import Floats, Integers
 
-# Columns of a panel: more of them do not fit into the fastest cache beside what they change.
+# Columns of a panel: more would not fit into the fastest cache with the blocks they update.
 _WIDEST = 8
 
 
 class Pattern(NamedTuple):
-    """Where the blocks of the lower factor L are; block numbers count along the columns of L."""
+    """Block structure of the lower factor L; blocks are numbered along the columns of L."""
 
     position: Integers  # (grains,) place of each grain in the order of elimination
     start: Integers  # (grains + 1,) first block of each column: the diagonal one
     row: Integers  # (blocks,) block row of each block, ascending in each column
     panel: Integers  # (panels + 1,) first column of each panel: columns with the same rows below
-    target: Integers  # (pairs,) int32, block that each product of two blocks below is taken from
+    target: Integers  # (pairs,) int32, block that a product of two blocks below is subtracted from
 
 
 def pattern(x: Floats, i: Integers, j: Integers) -> Pattern:
-    """The Pattern of a matrix with blocks on the diagonal and where grains i, j (N_c,) touch.
+    """The Pattern of a matrix with blocks on the diagonal and for each pair of grains i, j (N_c,).
 
-    x (grains, 2): centres, which are used to number the grains only.
+    x (grains, 2): centres, used only to number the grains.
     """
     x = np.asarray(x, dtype=np.float64)
     lines = (x[:, 0] - x[:, 1], x[:, 0], x[:, 1], x[:, 0] + x[:, 1])
@@ -48,7 +48,7 @@ def pattern(x: Floats, i: Integers, j: Integers) -> Pattern:
 
 
 def block_of(layout: Pattern, high: Integers, low: Integers) -> Integers:
-    """Numbers (n,) of the blocks in rows `high` of columns `low` (places, (n,)), high ≥ low."""
+    """Numbers (n,) of the blocks in rows `high` and columns `low` (places, (n,)), high ≥ low."""
     count = len(layout.position)
     column = np.repeat(np.arange(count), np.diff(layout.start))
     return np.searchsorted(column * count + layout.row, np.asarray(low) * count + high)
@@ -57,7 +57,7 @@ def block_of(layout: Pattern, high: Integers, low: Integers) -> Integers:
 def _eliminated(
     numbered: Integers, i: Integers, j: Integers
 ) -> tuple[Integers, Integers, Integers]:
-    """Elimination with the grains numbered so: their order, and the fill of each column."""
+    """Elimination for one numbering of the grains: their order, and the fill of each column."""
     place = np.empty(len(numbered), dtype=np.int64)
     place[numbered] = np.arange(len(numbered))
     start, other = neighbours(len(numbered), place[i], place[j])
@@ -67,7 +67,7 @@ def _eliminated(
 
 
 def neighbours(count: int, i: Integers, j: Integers) -> tuple[Integers, Integers]:
-    """Each grain's neighbours once, as (start (count + 1,), list), ascending."""
+    """Each grain's distinct neighbours, as (start (count + 1,), list), ascending."""
     low, high = np.minimum(i, j), np.maximum(i, j)
     pairs = np.unique(low * count + high) if count else np.zeros(0, dtype=np.int64)
     low, high = pairs // max(1, count), pairs % max(1, count)
@@ -78,19 +78,19 @@ def neighbours(count: int, i: Integers, j: Integers) -> tuple[Integers, Integers
 
 
 def _updates(begin: Integers) -> int:
-    """Pairs of blocks of the same column: as many products does the factorisation take."""
+    """Pairs of blocks in the same column, which is the number of products in the factorisation."""
     size = np.diff(begin)
     return np.sum(size * (size + 1) // 2)
 
 
 @compiled
 def _least_degree(start, other, stop):
-    """Order of elimination by least degree; column k has the grains below[begin[k]:begin[k + 1]].
+    """Order of minimum-degree elimination; column k has the grains below[begin[k]:begin[k + 1]].
 
-    `below` names grains by their rank in that order. Grains that were eliminated together with
-    their neighbours stand for the fill between those (quotient graph): a grain's neighbours are
-    those left of its own, and of all the cliques (named by rank) that it is part of. Ends early
-    once stop[0] is raised.
+    `below` names grains by their rank in that order. Cliques of eliminated grains represent the
+    fill between their neighbours (quotient graph): a grain's neighbours are the remaining ones of
+    its own list and of all cliques (named by rank) that contain it. Returns early once stop[0] is
+    set.
     """
     count = len(start) - 1
     own, owns = other.copy(), start[1:] - start[:-1]
@@ -148,7 +148,7 @@ def _least_degree(start, other, stop):
 
 @within
 def _enter(v, degree, head, after, before):
-    """Put a grain first in the list of its degree."""
+    """Insert a grain at the head of the list for its degree."""
     after[v], before[v] = head[degree], -1
     if head[degree] >= 0:
         before[head[degree]] = v
@@ -167,7 +167,7 @@ def _leave(v, degree, head, after, before):
 
 @within
 def _collect(v, rank, mark, stamp, below, end):
-    """Append a grain that is left and not marked yet; the new end."""
+    """Append a grain if it remains and is not yet marked; return the new end."""
     if rank[v] < 0 and mark[v] != stamp:
         mark[v] = stamp
         below[end] = v
@@ -177,7 +177,7 @@ def _collect(v, rank, mark, stamp, below, end):
 
 @within
 def _join(v, clique, rank, mark, inside, start, own, owns, cliques, joined, merged):
-    """Make v part of a new clique: it replaces merged ones, and neighbours that are in it too."""
+    """Add v to a new clique, which replaces merged ones and neighbours that are also in it."""
     left = start[v]
     for q in range(start[v], start[v] + owns[v]):
         if mark[own[q]] != inside and rank[own[q]] < 0:
@@ -212,11 +212,11 @@ def _outside(v, rank, mark, stamp, inside, start, own, owns, cliques, joined, be
 
 @compiled
 def _by_subtrees(begin, below):
-    """Columns of the tree of elimination, children before parents, subtree after subtree."""
+    """Columns of the elimination tree, children before parents, subtree by subtree."""
     count = len(begin) - 1
     child, sibling = np.full(count + 1, -1), np.full(count, -1)
     for k in range(count - 1, -1, -1):
-        parent = count  # of roots
+        parent = count  # for roots
         for m in range(begin[k], begin[k + 1]):
             parent = min(parent, below[m])
         sibling[k] = child[parent]
@@ -224,7 +224,7 @@ def _by_subtrees(begin, below):
     after, waiting = np.empty(count, np.int64), np.empty(count + 1, np.int64)
     number, top = count, 0
     waiting[0] = count
-    # Parents first and last children first, written from the end.
+    # Written from the end: parents first, last children first.
     while top >= 0:
         k = waiting[top]
         top -= 1
@@ -240,7 +240,7 @@ def _by_subtrees(begin, below):
 
 
 def _renumbered(begin: Integers, below: Integers, after: Integers) -> tuple[Integers, Integers]:
-    """Start of each column and rows of its blocks, when columns are taken in the order `after`."""
+    """Start of each column and rows of its blocks, with columns taken in the order `after`."""
     count = len(after)
     place = np.empty(count, dtype=np.int64)
     place[after] = np.arange(count)
@@ -252,9 +252,9 @@ def _renumbered(begin: Integers, below: Integers, after: Integers) -> tuple[Inte
 
 @compiled
 def _panels(start, row):
-    """First columns of the panels, and the number of columns.
+    """First columns of the panels, then the number of columns.
 
-    A column goes on a panel where it has the rows that are left below the one before.
+    A column joins a panel if its rows are those that remain below the previous column.
     """
     count = len(start) - 1
     panel, number = np.zeros(count + 1, np.int64), 0
@@ -270,7 +270,7 @@ def _panels(start, row):
 
 @compiled
 def _targets(start, row, panel, pairs):
-    """For every panel, each row q below, each row a from q on: the block of (a, q)."""
+    """For every panel, each row q below and each row a from q on: the block of (a, q)."""
     target = np.empty(pairs, np.int32)
     number = 0
     for p in range(len(panel) - 1):

@@ -1,6 +1,6 @@
 """Linear programs by HiGHS: minimise c·y subject to A y = b, y ≥ 0 (S in cone coordinates).
 
-And quadratic ones by PIQP. What a solver says of its own result proves nothing: see `certificates`.
+Also quadratic programs by PIQP. A solver's own status proves nothing: see `certificates`.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ from granforce.tolerances import PROGRAM
 from granforce.types import Floats, Integers
 
 OPTIMAL = highspy.HighsModelStatus.kOptimal
-_PRIMAL_SIMPLEX = 4  # HiGHS's number
+_PRIMAL_SIMPLEX = 4  # number of this strategy in HiGHS
 
-# Usual are less than 100; where {y ≥ 0 : A y = b} is empty they may go on for ever.
+# Usually below 100; if {y ≥ 0 : A y = b} is empty, the iteration may never end.
 MOST_INTERIOR_STEPS = 1000
-# How a program is tried again where it ended without an optimum.
+# Settings to retry a program with if it ended without an optimum.
 _OTHER_WAYS = (
     {"solver": "simplex"},
     {"solver": "simplex", "presolve": "off"},
@@ -38,7 +38,7 @@ def standard_form(
 
 
 def going_on(A: sparse.csr_matrix, b: Floats) -> highspy.Highs:
-    """A standard_form for the primal simplex method: a vertex stays one when costs change."""
+    """A standard_form for the primal simplex method: a vertex stays feasible when costs change."""
     model = standard_form(A, b, solver="simplex")
     model.setOptionValue("simplex_strategy", _PRIMAL_SIMPLEX)
     return model
@@ -54,8 +54,8 @@ def bounded(
 ) -> highspy.Highs:
     """A silent HiGHS model: minimise cost·y with A y and y between bounds.
 
-    A sparse (m, n); rows: lower and upper bounds (m,) of A y; columns: those (n,) of y; cost (n,).
-    granforce's tolerances, one thread.
+    A sparse (m, n); rows: lower and upper bounds (m,) of A y; columns: bounds (n,) of y; cost (n,).
+    Uses the tolerances of granforce and one thread.
     """
     A = sparse.csc_matrix(A)
     lp = highspy.HighsLp()
@@ -83,19 +83,19 @@ def bounded(
 
 
 def set_cost(model: highspy.Highs, cost: Floats) -> None:
-    """Replace the whole cost vector (n,) of a model, which keeps its basis."""
+    """Replace the whole cost vector (n,) of a model; its basis is preserved."""
     columns = np.arange(len(cost), dtype=np.int32)
     model.changeColsCost(len(cost), columns, np.asarray(cost, dtype=np.float64))
 
 
 def solve(model: highspy.Highs) -> tuple[highspy.HighsModelStatus, Floats]:
-    """Run the model; its status and the point y reached (n,)."""
+    """Run the model and return its status and the point y reached (n,)."""
     cancelling.apart(model.run, interrupt=lambda: _interrupt(model))
     return model.getModelStatus(), np.array(model.getSolution().col_value)
 
 
 def solutions(model: highspy.Highs) -> Iterator[tuple[highspy.HighsModelStatus, Floats]]:
-    """Status and point y (n,) of the model as it is set up, and then by other methods, in turn."""
+    """Yield status and point y (n,) of the model as set up, then of other methods in turn."""
     yield solve(model)
     own = {name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options}
     try:
@@ -110,28 +110,28 @@ def solutions(model: highspy.Highs) -> Iterator[tuple[highspy.HighsModelStatus, 
 
 
 def optimal(model: highspy.Highs) -> Floats | None:
-    """The first point (n,) that some method calls an optimum; None where none does."""
+    """The first point (n,) that some method reports as optimal, or None."""
     return next((y for status, y in solutions(model) if status == OPTIMAL), None)
 
 
 def points(A: sparse.csr_matrix, b: Floats) -> Iterator[Floats]:
-    """Points y (n,) ≥ 0 of {A y = b} as one method after another proposes them, rounding apart."""
+    """Yield points y (n,) ≥ 0 that solve A y = b up to rounding, as proposed by several methods."""
     model = standard_form(A, b, solver="simplex")
     for _, y in solutions(model):
         yield np.maximum(y, 0.0)
         found = basis(model)
         if found is not None:
-            with suppress(RuntimeError):  # the basis is singular to rounding
+            with suppress(RuntimeError):  # singular basis
                 yield np.maximum(vertex(A, b, np.zeros(A.shape[1]), *found)[0], 0.0)
 
 
 def multipliers(model: highspy.Highs, A: sparse.csr_matrix, cost: Floats) -> Floats:
-    """Multipliers λ (m,) of the rows of a solved model; from its basis, if any, to rounding."""
+    """Multipliers λ (m,) of the rows of a solved model, to rounding if it has a basis."""
     found = basis(model)
     if found is not None:
         try:
             return vertex(A, np.zeros(A.shape[0]), cost, *found)[1]
-        except RuntimeError:  # the basis is singular to rounding
+        except RuntimeError:  # singular basis
             pass
     return np.array(model.getSolution().row_dual)
 
@@ -139,7 +139,7 @@ def multipliers(model: highspy.Highs, A: sparse.csr_matrix, cost: Floats) -> Flo
 def vertex(
     A: sparse.csr_matrix, b: Floats, cost: Floats, rows: Integers, columns: Integers
 ) -> tuple[Floats, Floats]:
-    """y and λ of a basis by its own LU factors: rounding error in place of tolerances."""
+    """y and λ of a basis from its own LU factors: rounding error instead of tolerances."""
     return cancelling.apart(_vertex, A, b, cost, rows, columns)
 
 
@@ -156,18 +156,18 @@ def _vertex(
 
 
 def _interrupt(model: highspy.Highs) -> None:
-    """Have a running model end at its next step, to be called from another thread.
+    """Make a running model stop at its next step; called from another thread.
 
-    Only now does it call back: asked at every step it would wait for Python each time.
+    The callback is set only now: called at every step, it would wait for Python each time.
     """
     for event in (model.cbSimplexInterrupt, model.cbIpmInterrupt):
         event.subscribe(lambda step: step.interrupt())
 
 
 def basis(model: highspy.Highs) -> tuple[Integers, Integers] | None:
-    """Rows and columns (positions) of the square basis matrix of a solved model, None without.
+    """Rows and columns (positions) of the square basis matrix of a solved model, or None.
 
-    Rows whose own logical is basic are implied by the others and left out.
+    Rows whose logical variable is basic are implied by the others and left out.
     """
     found = model.getBasis()
     basic = highspy.HighsBasisStatus.kBasic
@@ -177,7 +177,7 @@ def basis(model: highspy.Highs) -> tuple[Integers, Integers] | None:
 
 
 def least_unbalanced(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Floats]:
-    """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
+    """y ≥ 0 (n,) that minimises |A y − b|², and the residual vector (m,)."""
     rows, columns = A.shape
     solver = quadratic_solver(200)
     quadratic = sparse.block_diag([1e-10 * sparse.eye(columns), sparse.eye(rows)], format="csc")
@@ -195,14 +195,14 @@ def least_unbalanced(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Floats]:
 
 
 def quadratic_solver(max_iterations: int) -> piqp.SparseSolver:
-    """A silent PIQP solver with granforce's tolerances."""
+    """A silent PIQP solver with the tolerances of granforce."""
     solver = piqp.SparseSolver()
     solver.settings.verbose = False
     solver.settings.max_iter = max_iterations
     solver.settings.eps_abs = 1e-12
     solver.settings.eps_rel = 1e-13
-    # At small μ, far starts and dependent rows the regularised systems alone, or those with the
-    # default's regularisation, end short of their target.
+    # At small μ, with distant starts or dependent rows, the systems without regularisation or with
+    # the default one stop short of their target.
     solver.settings.reg_lower_limit = 1e-14
     solver.settings.iterative_refinement_always_enabled = True
     return solver

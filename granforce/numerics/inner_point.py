@@ -1,9 +1,9 @@
 """A point inside a polytope {y ≥ 0 : A y = b} relative to its affine hull, however thin it is.
 
-Coordinates of a thin polytope may be as small as 10⁻¹², where solvers of linear programs balance
-to 10⁻¹⁰ only. So a program is solved in a unit of 1, and what was not seen above 0 there once more
-in a unit of 10⁻⁴, as the change from a point that is balanced to rounding (iterative refinement of
-linear programs: Gleixner, Steffy, Wolter, INFORMS J. Comput. 28, 449 (2016)).
+Coordinates of a thin polytope may be as small as 10⁻¹², but linear-programming solvers balance only
+to 10⁻¹⁰. So a program is solved in units of 1, and coordinates that stayed at 0 once more in units
+of 10⁻⁴, as a change from a point balanced to rounding (iterative refinement of linear programs:
+Gleixner, Steffy, Wolter, INFORMS J. Comput. 28, 449 (2016)).
 """
 
 from typing import NamedTuple
@@ -18,32 +18,31 @@ from granforce.system import cancelling
 from granforce.tolerances import FLAT
 from granforce.types import Floats, Mask
 
-# Units of the programs. In the last one, FLAT is what solvers tell from 0 beyond doubt.
+# Units of the programs. In the last one, solvers distinguish FLAT from 0 reliably.
 _UNITS = 1.0, 1e-4
-# What every coordinate is asked to reach, if it can, in each unit.
+# The value that every coordinate should reach, if it can, in each unit.
 _AWAY = 0.01
-# How often a balance is restored; what is added to the diagonal for rows that follow from others.
+# Number of balancing steps, and the shift of the diagonal for rows that follow from others.
 _BALANCING, _SHIFT = 6, 1e-14
-# The last of those steps are all rounding; so many times as much can be told from it.
+# The last of these steps measure rounding; the resolution is this many times as large.
 _LAST, _BEYOND = 3, 10.0
 
 
 class InnerPoint(NamedTuple):
-    """A point of a polytope, and which of its coordinates cannot move."""
+    """A point of a polytope, and the coordinates that cannot move."""
 
     y: Floats  # (n,)
     held: Mask  # (n,) bool, coordinates that stay below `resolution` in all of the polytope
-    resolution: float  # FLAT, or what rounding of the balance moves coordinates by, if that is more
+    resolution: float  # FLAT, or the rounding error of the balance in y if larger
 
 
 def inner_point(A: sparse.csr_matrix, b: Floats) -> InnerPoint:
-    """The InnerPoint of {y ≥ 0 : A y = b}, rows of A of order 1; y > 0 in all that is not held.
+    """The InnerPoint of {y ≥ 0 : A y = b}, rows of A of order 1; y > 0 for all that is not held.
 
-    Each program raises the sum of what was not seen above the resolution yet, each coordinate
-    counted up to a small value only. What counts as seen is read off points only that are balanced
-    to rounding.
+    Each program raises the sum of the coordinates not yet above the resolution, each counted up to
+    a small value only. Only points balanced to rounding count.
 
-    Raises NotJammedError where the polytope is empty, UndecidedError where no solver could tell.
+    Raises NotJammedError if the polytope is empty, UndecidedError if no solver succeeds.
     """
     A = sparse.csc_matrix(A)
     y, held, resolution = np.zeros(A.shape[1]), np.ones(A.shape[1], dtype=bool), FLAT
@@ -56,7 +55,7 @@ def inner_point(A: sparse.csr_matrix, b: Floats) -> InnerPoint:
 
 
 def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -> InnerPoint:
-    """The InnerPoint to which programs in this unit lead from one in a larger unit."""
+    """The InnerPoint reached by programs in this unit, from one in a larger unit."""
     held, resolution = start.held.copy(), start.resolution
     found: list[Floats] = []
     wanted, untried, last = held, held, unit == _UNITS[-1]
@@ -66,7 +65,7 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
             break
         point, noise = cancelling.apart(balanced, A, b, point)
         resolution = max(resolution, _BEYOND * noise)
-        # In the first unit all is seen that would reach the limit of the last one.
+        # The first unit covers everything that would reach the limit of the last one.
         least = resolution if last else max(resolution, _AWAY * _UNITS[-1])
         if last and point.min() < -least:
             break
@@ -78,7 +77,7 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
             continue
         if not last:
             break
-        # Both sides of a narrow band may be above the least together, each only alone.
+        # Both sides of a narrow band may be above the threshold together, but neither alone.
         untried = untried & ~wanted if wanted.sum() == 1 else untried
         rest = np.where(untried, point, 0.0)
         wanted = (np.arange(len(rest)) == np.argmax(rest)) & (rest.sum() > least)
@@ -89,14 +88,14 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
 def _raised(
     A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint, wanted: Mask
 ) -> Floats | None:
-    """A y, all but balanced, with the largest Σ min(y, _AWAY unit) over the coordinates wanted.
+    """A nearly balanced y with the largest Σ min(y, _AWAY unit) over the wanted coordinates.
 
-    Beyond the first unit y is looked for around the start, a balanced point that may be negative
-    by what solvers allow where coordinates are held; no other one falls to less than half. None
-    where none was found.
+    After the first unit y is searched around the start, a balanced point whose held coordinates may
+    be negative within the solvers' tolerance; no other coordinate falls below half its value. None
+    if not found.
     """
     first, n, some = unit == _UNITS[0], len(start.y), np.flatnonzero(start.held)
-    # Coordinates that are held count from 0, all others from the start.
+    # Held coordinates count from 0, all others from the start.
     origin = np.where(start.held, 0.0, start.y)
     lower = np.zeros(n) if first else -0.5 * origin / unit
     right = b if first else A[:, some] @ (start.y[some] / unit)
@@ -106,7 +105,7 @@ def _raised(
         np.append(np.full(n, np.inf), np.full(len(some), _AWAY)),
     )
     both = sparse.hstack([A, A[:, some]])
-    # Inner points are wanted, but beyond the first unit vertices alone are as near as asked for.
+    # Inner points are wanted, but after the first unit only vertices are accurate enough.
     model = programs.bounded(
         both, (right, right), columns, cost, solver="ipm" if first else "simplex"
     )
@@ -123,7 +122,7 @@ def _raised(
 
 
 def balanced(A: sparse.csc_matrix, b: Floats, y: Floats) -> tuple[Floats, float]:
-    """y (n,), what it lacks of A y = b added by the least change; how far rounding moves it."""
+    """y (n,) with A y = b restored by the least change, and the rounding error of y."""
     rows, n = A.shape
     if not rows:
         return y, 0.0

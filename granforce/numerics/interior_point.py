@@ -1,22 +1,22 @@
-"""The interior-point method for contact programs: steps of one program, or of LANES side by side.
+"""The interior-point method for contact programs: steps of one program, or of LANES in parallel.
 
 With f = T y, multipliers v of the balance, z of y ≥ 0 and ζ of s ≥ 0, a contact program (see
 `contact_program`) is at its optimum where τ = 0 in
 
     A T y + a F = b,   Tᵀ w T y + c − Tᵀ Aᵀ v + Tᵀ Eᵀ ζ = z,   y z = τ,   s ζ = τ.
 
-Newton's method gives steps δy = M (Tᵀ Aᵀ δv + h), and, put into the balance,
+Newton's method gives steps δy = M (Tᵀ Aᵀ δv + h); substituted into the balance,
 
     A K Aᵀ δv = b − A T y − A T M h,   M = (Tᵀ k T + z/y)⁻¹,   K = T M Tᵀ,
 
-with one symmetric 2×2 conductance K a contact, so that `cholesky` has all the work. k = w + Σ ζ/s
-is the stiffness of each component: sides make it stiffer, and a component that is known exactly is
-infinitely stiff (PINNED): it stays where the iterate has it. Mehrotra's predictor and corrector
-(SIAM J. Optim. 2, 575 (1992)) choose τ.
+with one symmetric 2×2 conductance K per contact, so that `cholesky` does the main work. k = w + Σ
+ζ/s is the stiffness of each component: sides add stiffness, and a component with a known value has
+infinite stiffness (PINNED) and keeps its value. Mehrotra's predictor and corrector (SIAM J. Optim.
+2, 575 (1992)) choose τ.
 
-`look` says how far each program has come, and `advance` takes one step; who calls them decides when
-to end. Other steps share the matrix: towards the centre, to the balance alone, and Newton's on v
-alone after `cone_projection.project`.
+`look` measures the progress of each program and `advance` takes one step; the caller decides when
+to stop. Other kinds of step use the same matrix: towards the centre, towards the balance alone, and
+Newton's step on v alone after `cone_projection.project`.
 """
 
 from granforce.numerics import cholesky, contact_matrix
@@ -49,18 +49,17 @@ from granforce.numerics.lanes import (
 from granforce.system import cancelling
 from granforce.types import Floats, Mask
 
-# Part of the way to the nearest wall that a step may go, and of one towards the centre.
+# Fraction of the way to the nearest wall that a step may take, and a step towards the centre.
 _INSIDE, _CENTRING = 0.9995, 0.95
-# A row whose pivot, relative to its diagonal, is below this follows from those eliminated before.
+# A row with a smaller pivot, relative to its diagonal, follows from rows eliminated before.
 _DEPENDENT = 1e-11
-# How often a step is solved again for what rounding left.
+# How often a step is refined for rounding.
 _REFINEMENTS = 3
-# Weight of y that are zero when the balance is restored (1: those of size ⟨f_n⟩).
+# Weight of zero y when the balance is restored (1: those of size ⟨f_n⟩).
 _LIGHT = 1e-10
 
-# What `advance` does: a step towards the optimum, towards y z = 1, to A T y + a F = b alone, one of
-# Newton's method on v alone, after `project`, or one towards the optimum that is solved again and
-# again for what rounding left of the unbalance.
+# Steps of `advance`: towards the optimum; towards y z = 1; towards A T y + a F = b alone; Newton's
+# step on v alone, after `project`; towards the optimum with iterative refinement of the unbalance.
 OPTIMUM, CENTRE, BALANCE, PROJECTED, REFINED = range(5)
 
 
@@ -78,7 +77,7 @@ def dependent_rows(problem: Problem, idle: Floats) -> Mask:
 
 @compiled
 def look(problem, loads, at, work, lanes):
-    """Unbalance, h of the predictor, and how far each program has come.
+    """Measure unbalance and progress of each program, and set h for the predictor.
 
     loads: whether F is one of the unknowns.
     """
@@ -88,7 +87,7 @@ def look(problem, loads, at, work, lanes):
     product = slackness = same(lanes, 0.0)
     for k in range(0, len(problem.w), 2):
         normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
-        # What stays is held by forces that cost nothing.
+        # Pinned components are held by forces without cost.
         w_n = problem.w[k] if problem.w[k] < PINNED else 0.0
         w_t = problem.w[k + 1] if problem.w[k + 1] < PINNED else 0.0
         stiff, cross = 0.25 * (w_n + w_t), 0.25 * (w_n - w_t)
@@ -126,7 +125,7 @@ def look(problem, loads, at, work, lanes):
 
 @compiled
 def advance(problem, loads, mode, at, work, lanes):
-    """One step of the programs that are `going`, after `look`; modes as named above."""
+    """One step of the programs that are `going`, after `look`; modes as listed above."""
     pairs = len(at.y) if loads else len(at.y) - 1
     _stiffen(problem, mode, at, work, lanes)
     if mode == BALANCE:
@@ -158,7 +157,7 @@ def advance(problem, loads, mode, at, work, lanes):
 
 @within
 def _add_side(problem, a, force, h, lanes):
-    """h ← h + Tᵀ Eᵀ of a force along side a."""
+    """h ← h + Tᵀ Eᵀ for a force along side a."""
     component = problem.side[a]
     first = component - component % 2
     part = 0.5 * problem.sign[a] * force
@@ -190,9 +189,9 @@ def _stiffen(problem, mode, at, work, lanes):
 
 @within
 def _stiffness(k, y, z, mode, lanes):
-    """z/y of one cone coordinate; when the balance is restored, what keeps y that are zero."""
+    """z/y of one cone coordinate; when the balance is restored, a stiffness that holds zero y."""
     if mode == BALANCE:
-        # Softer than 1/y where y is large: what is nearly zero must not be driven below it.
+        # Softer than 1/y for large y: coordinates near zero must not be driven below it.
         heavy = larger(load(y, k, lanes), _LIGHT)
         return 1.0 / (heavy * root(heavy))
     return load(z, k, lanes) / load(y, k, lanes)
@@ -200,7 +199,7 @@ def _stiffness(k, y, z, mode, lanes):
 
 @within
 def _load_stiffness(at, mode, lane):
-    """The same for F, the last."""
+    """The same for F, the last coordinate."""
     last = len(at.y) - 1
     if mode == BALANCE:
         return max(at.y[last, lane], _LIGHT) ** -1.5
@@ -209,7 +208,7 @@ def _load_stiffness(at, mode, lane):
 
 @within
 def _determinant(d0, d1, k_n, k_t):
-    # Tᵀ k T + diag(d) without the difference of its large parts, which cancel at small μ.
+    # Tᵀ k T + diag(d) without the difference of large terms, which cancel at small μ.
     return fma(0.25 * (k_n + k_t), d0 + d1, fma(d0, d1, 0.25 * k_n * k_t))
 
 
@@ -248,7 +247,7 @@ def _answer(p0, p1, d0, d1, k_n, k_t):
 
 @within
 def _towards(problem, mode, at, work, lanes):
-    """δv and δy of the step that h asks for; after `project`, δv alone."""
+    """δv and δy of the step given by h; after `project`, δv alone."""
     network, n, last = problem.network, len(problem.w), len(at.y) - 1
     pairs = 0 if mode == PROJECTED else n
     for k in range(len(work.r)):
@@ -287,9 +286,9 @@ def _towards(problem, mode, at, work, lanes):
 
 @within
 def _refine(problem, at, work, lanes):
-    """δy, δv ← with the steps added that take off what is left of the unbalance.
+    """Add to δy and δv the steps that remove the remaining unbalance.
 
-    Near a vertex y/z are so far apart that a step alone may leave more than it takes off.
+    Near a vertex y/z differ so much in size that one step may add more unbalance than it removes.
     """
     dy, dv, dv_border = work.dy.copy(), work.dv.copy(), work.dv_border.copy()
     clear(work.h, lanes)
@@ -307,7 +306,7 @@ def _refine(problem, at, work, lanes):
 
 @within
 def _step_beside(problem, a, mode, at, work, lanes):
-    """E δf of side a, to its own relative precision: δy, as a difference, would lose it."""
+    """E δf of side a, to its own relative precision, which a difference of δy would lose."""
     k = problem.side[a] - problem.side[a] % 2
     d0 = _stiffness(k, at.y, at.z, mode, lanes)
     d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)
@@ -325,7 +324,7 @@ def _step_beside(problem, a, mode, at, work, lanes):
 
 @within
 def _predict(pairs, at, work, lanes):
-    """How far the step towards τ = 0 may go, the τ that follows from that, and δy δz."""
+    """Longest step towards τ = 0, the τ that follows from it, and δy δz."""
     primal = dual = same(lanes, 1.0)
     z_dy = y_dz = both = same(lanes, 0.0)
     for k in range(pairs):
@@ -340,14 +339,14 @@ def _predict(pairs, at, work, lanes):
     product = load(work.product, 0, lanes)
     left = product + z_dy / primal + (y_dz + both / primal) / dual
     ratio = left / product
-    # The further the predictor gets, the lower the next barrier.
+    # The further the predictor gets, the smaller the next τ.
     target = ratio * ratio * ratio * product / (1.0 * pairs)
     store(work.target, 0, lanes, target)
 
 
 @within
 def _aim(problem, pairs, at, work, lanes):
-    """h ← h + (τ − turn)/y − Tᵀ Eᵀ (τ − turn)/s: from the predictor to the step itself."""
+    """h ← h + (τ − turn)/y − Tᵀ Eᵀ (τ − turn)/s: the corrector."""
     target = load(work.target, 0, lanes)
     for k in range(pairs):
         extra = (target - load(work.turn, k, lanes)) / load(at.y, k, lanes)
@@ -360,7 +359,7 @@ def _aim(problem, pairs, at, work, lanes):
 
 @within
 def _measure(pairs, inside, at, work, lanes):
-    """Lengths of the step, part `inside` of the way to the nearest wall at most, and δz."""
+    """Step lengths, at most the fraction `inside` of the way to the nearest wall, and δz."""
     primal = dual = same(lanes, inside)
     target = load(work.target, 0, lanes)
     for k in range(pairs):

@@ -1,16 +1,16 @@
-"""Lanes: a number of eight doubles side by side, so that one source serves one problem or eight.
+"""Lanes: a number of eight doubles side by side, so that one source handles one problem or eight.
 
-A kernel written with `load`, `store` and the arithmetic below works on plain doubles where it is
-called with `ONE`, and on LANES independent problems at a time where it is called with `MANY`; every
-operation is then one vector instruction. Lanes never mix, and products are added with a single
-rounding (`fma`) in either width: a problem gives the same result, bit for bit, alone or in any
-company. A double that meets lanes, in arithmetic or in `store`, `fma`, `pick` and `larger`, stands
-for itself in each of them (`same` makes lanes of it, where a sum begins). Arrays hold the lanes of
-one number next to each other: shape (…, 1) or (…, LANES).
+A kernel written with `load`, `store` and the arithmetic below works on plain doubles if called with
+`ONE`, and on LANES independent problems at a time if called with `MANY`; every operation is then
+one vector instruction. Lanes never mix, and products are added with a single rounding (`fma`) in
+either width: a problem gives bit-identical results alone or with any others. A double combined with
+lanes, in arithmetic or in `store`, `fma`, `pick` and `larger`, is used in each of them (`same`
+converts it to lanes, to begin a sum). Arrays hold the lanes of one number next to each other: shape
+(…, 1) or (…, LANES).
 
-Left to the compiler, loops over lanes spend most of their time proving that arrays do not overlap:
-a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes 0.028 ms (16 lanes
-are slower: eight factors fit into the cache and sixteen do not).
+Without explicit lanes, the compiler's loops spend most of their time proving that arrays do not
+overlap: a factorisation of 400 disks took 0.11 ms per matrix, compared with 0.028 ms in explicit
+lanes (16 lanes are slower: eight factors fit into the cache, sixteen do not).
 """
 
 import ctypes.util
@@ -34,15 +34,15 @@ from granforce.types import Floats
 skip_unreadable_indices()
 
 LANES = 8
-# Heard by those who ask for it: logging.basicConfig(level=logging.INFO).
+# To see these messages: logging.basicConfig(level=logging.INFO).
 _log = logging.getLogger("granforce")
 _log.addHandler(logging.NullHandler())
 tell_when_compiling(lambda: _log.info("compiling kernels, once per machine"))
 
-# Kernels that are called from Python, and those that are called by kernels only: without what the
-# former need to be called, a third of the time to compile is saved.
-# Where the compiler is off (NUMBA_DISABLE_JIT) they run as they are written, slowly, with the same
-# results; that numpy warns of what compiled code leaves at NaN or infinity is then switched off.
+# Options of kernels called from Python, and of those called only by kernels, which need no wrapper
+# and compile in two thirds of the time. With the compiler off (NUMBA_DISABLE_JIT) they run as
+# Python, slowly, with the same results; numpy's warnings about NaN and infinity are then switched
+# off.
 _KERNEL = {"cache": True, "nogil": True, "error_model": "numpy"}
 _PART = _KERNEL | {
     "no_cpython_wrapper": True,
@@ -51,32 +51,32 @@ _PART = _KERNEL | {
 }
 compiled = np.errstate(all="ignore") if config.DISABLE_JIT else njit(**_KERNEL)
 within = njit(**_PART)
-# What must become part of those that call it: small ones, or their numbers pass through memory, and
-# whatever is called for each contact with a network, which is a hundred numbers to hand over (a
-# step of one interior-point method takes 0.15 ms in place of 0.27, with the same bits).
+# Inlined into their callers: small kernels, whose numbers would otherwise pass through memory, and
+# kernels called for each contact with a network, which has a hundred fields to pass (a step of one
+# interior-point method takes 0.15 ms instead of 0.27, with the same bits).
 inline = njit(**_PART, forceinline=True)
 
-# What kernels take as their last argument: its length is known to the compiler.
-# Of numpy's numbers: kernels would be compiled once more for a constant that Python's numbers are.
+# The last argument of kernels, whose length the compiler knows. NumPy integers, because kernels
+# would be compiled again for Python constants.
 ONE, MANY = (np.int64(0),), (np.int64(0),) * LANES
-# So few problems are faster one after the other than beside idle lanes.
+# This few problems are faster one by one than with idle lanes.
 _FEW = 2
 
 
-# Doubles in a line of the cache.
+# Doubles in a cache line.
 _LINE = 8
 
 
 def lanes_for(count: int) -> Any:
-    """The lanes that so many waiting problems go in."""
+    """The lanes (ONE or MANY) for this many waiting problems."""
     return MANY if count > _FEW else ONE
 
 
 def room(*shape: int, value: float = 0.0) -> Floats:
-    """An array of one value that begins where a line of the cache does.
+    """An array filled with one value that starts at a cache line.
 
-    Lanes that lie across two lines take up to twice the time: a factorisation reaches 22 to 28
-    Gflop/s with the arrays of numpy, which begin anywhere, and 38 to 44 so.
+    Lanes that straddle two cache lines take up to twice the time: a factorisation reaches 22 to 28
+    Gflop/s with NumPy's arrays, which start anywhere, and 38 to 44 with these.
     """
     size = int(np.prod(shape))
     longer = np.zeros(size + _LINE - 1)
@@ -88,7 +88,7 @@ def room(*shape: int, value: float = 0.0) -> Floats:
 
 
 def side_by_side(values: npt.ArrayLike, width: int) -> Floats:
-    """Values (n,) in each of so many lanes: (n, width)."""
+    """Values (n,) repeated in each of `width` lanes: (n, width)."""
     values = np.asarray(values)
     found = room(len(values), width)
     found[:] = values[:, None]
@@ -113,28 +113,28 @@ class _Model(models.PrimitiveModel):
 
 
 def _number(lanes):
-    """The type of a number in so many lanes."""
+    """The type of a number in these lanes."""
     return types.float64 if lanes.count == 1 else Lanes(lanes.count)
 
 
 def _kinds(*kinds):
-    """(type of what numbers of these types give together, theirs in a signature).
+    """(common result type of numbers of these types, their types in a signature).
 
-    A plain number beside lanes stands for itself in each of them.
+    A plain number combined with lanes is used in each of them.
     """
     own = tuple(kind if isinstance(kind, Lanes) else types.float64 for kind in kinds)
     return next((kind for kind in own if isinstance(kind, Lanes)), types.float64), own
 
 
 def _alike(builder, kind, values):
-    """Values as numbers of one type."""
+    """Convert values to numbers of one type."""
     if not isinstance(kind, Lanes):
         return values
     return [_in_all(builder, v, kind.width) if v.type == _DOUBLE else v for v in values]
 
 
 def _place(context, builder, signature, args):
-    """Pointer to the lanes of one number of an array."""
+    """Pointer to the lanes of one array element."""
     array = context.make_array(signature.args[0])(context, builder, args[0])
     width = signature.args[2].count
     kind = _DOUBLE if width == 1 else ir.VectorType(_DOUBLE, width)
@@ -143,7 +143,7 @@ def _place(context, builder, signature, args):
 
 
 def instruction(plain):
-    """An intrinsic; `plain`, which does the same to numpy's numbers, where the compiler is off."""
+    """Make an intrinsic; with the compiler off, `plain` does the same with NumPy's numbers."""
     return (lambda typed: plain) if config.DISABLE_JIT else intrinsic
 
 
@@ -172,7 +172,7 @@ def _plain_larger(a, b):
 
 
 def _rounded_once():
-    """a b + c of doubles, rounded once: of Python (from 3.13 on), or of the C library."""
+    """a b + c of doubles, rounded once, from Python (3.13 or later) or the C library."""
     if hasattr(math, "fma"):
         return math.fma
     library = ctypes.CDLL(ctypes.util.find_library("m" if os.name == "posix" else "ucrtbase"))
@@ -191,18 +191,18 @@ def _plain_fma(a, b, c):
 _FMA = _rounded_once() if config.DISABLE_JIT else None
 
 
-# Axes of arrays whose numbers are the same in all lanes.
+# Axes of arrays whose numbers are shared by all lanes.
 _SHARED = 4
 
 
 def shared(values: Floats) -> Floats:
-    """Values (n, 1) as numbers that `load` gives to all lanes alike."""
+    """Values (n, 1) that `load` gives equally to all lanes."""
     return values.reshape(-1, *(1,) * (_SHARED - 1))
 
 
 @instruction(_plain_load)
 def load(typing, array, index, lanes):
-    """Number `index` of a contiguous array, of one that is `shared` the same in all lanes."""
+    """Element `index` of a contiguous array, or of a `shared` array the same in all lanes."""
 
     def emit(context, builder, signature, args):
         if array.ndim == _SHARED and lanes.count > 1:
@@ -215,7 +215,7 @@ def load(typing, array, index, lanes):
 
 @instruction(_plain_store)
 def store(typing, array, index, lanes, value):
-    """Set number `index` of a contiguous array."""
+    """Set element `index` of a contiguous array."""
     _, (given,) = _kinds(value)
 
     def emit(context, builder, signature, args):
@@ -238,7 +238,7 @@ def same(typing, lanes, value):
 
 
 def _in_all(builder, value, width):
-    """A vector of so many times one double."""
+    """A vector that repeats one double `width` times."""
     index = ir.IntType(32)
     vector = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     vector = builder.insert_element(vector, value, index(0))
@@ -247,7 +247,7 @@ def _in_all(builder, value, width):
 
 
 def _named(builder, name, args):
-    """Call one of LLVM's own functions of doubles or vectors."""
+    """Call an LLVM intrinsic on doubles or vectors."""
     kind = args[0].type
     suffix = "f64" if kind == _DOUBLE else f"v{kind.count}f64"
     function = cgutils.get_or_insert_function(
@@ -316,7 +316,7 @@ def pick(typing, a, b, yes, no):
 
 @instruction(_plain_larger)
 def larger(typing, a, b):
-    """The larger of both, b where a is not a number."""
+    """The larger of both; b if a is NaN."""
     kind, given = _kinds(a, b)
 
     def emit(context, builder, signature, args):
@@ -327,7 +327,7 @@ def larger(typing, a, b):
 
 
 def _operate(operation, instruction, count):
-    """Make an operation of Lanes, or of Lanes and a number for all of them, one instruction."""
+    """Compile an operation on Lanes, or on Lanes and a number, to one instruction."""
 
     @type_callable(operation)
     def kind(context):

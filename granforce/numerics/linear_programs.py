@@ -1,4 +1,4 @@
-"""Linear contact programs in lanes: from the analytic centre to their optimum.
+"""Linear contact programs in lanes, from the analytic centre to their optimum.
 
 Every program starts at the analytic centre y°, where y° z° = 1 with z° = −Tᵀ Aᵀ v°: adding
 θ (v°, z°) to any cost gives a strictly feasible, nearly centred start on both sides.
@@ -19,45 +19,45 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 from granforce.types import Floats
 
-# θ relative to the smallest for which all multipliers are ≥ 0; from 1.2 to 20 it costs the same
-# within 4 %.
+# θ relative to the smallest for which all multipliers are ≥ 0; from 1.2 to 20 the cost varies by 4
+# %.
 _CENTRING = 1.5
-# A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; a Newton step or two on the
-# balance afterwards bring the unbalance to rounding error. Further steps towards the optimum would
-# make it worse, where many forces have bounds of their own.
+# A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; one or two Newton steps on the
+# balance then reduce the unbalance to rounding error. Further steps towards the optimum would
+# increase it if many forces have bounds of their own.
 _LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-5
-# A gap so far below that does not improve the balance any more (large μ, degenerate vertices).
+# A gap this far below the target no longer improves the balance (large μ, degenerate vertices).
 _HOPELESS = 1e-3
 _MOST_STEPS = 60
 _MOST_BALANCING = 4
-# Unbalance, relative to BALANCED, at which the balance is restored; the smaller one where forces
-# act from outside: rows left out there may follow from hundreds of others.
+# Unbalance, relative to BALANCED, at which the balance is restored; the smaller value with external
+# forces, where rows left out may follow from hundreds of others.
 _RESTORED, _RESTORED_LOADED = 0.1, 1e-4
 
 
 class Program(NamedTuple):
-    """One program: minimise Σ cost · y[columns], or, if loaded ≥ 0, maximise the load F there."""
+    """One program: minimise Σ cost · y[columns]; if loaded ≥ 0, maximise the load F there."""
 
     columns: list[int]  # positions of the nonzero costs
     costs: list[float]  # their values
-    loaded: int  # contact that carries the load F, −1 without
+    loaded: int  # contact that carries the load F, or −1
 
 
 class ProgramOutcome(NamedTuple):
-    """Where a program ended: nothing is claimed about it before it is certified."""
+    """Where a program ended; nothing is claimed about it until it is certified."""
 
     number: int  # place in the list of programs
     loaded: int  # as in its Program
     y: Floats  # (n,)
     load: float  # F
-    multiplier: Floats  # v of the balance; of all rows of A where z is None
+    multiplier: Floats  # v of the balance; of all rows of A if z is None
     z: Floats | None  # (n,) multipliers of y ≥ 0
     steps: int
 
 
 class Centre(NamedTuple):
-    """The analytic centre y° (n,), its multipliers, and whether it was reached."""
+    """The analytic centre y° (n,), its multipliers, and whether it converged."""
 
     y: Floats
     z: Floats
@@ -93,12 +93,11 @@ def run(
     workers: int = 1,
     finished: Callable[[Sequence[ProgramOutcome]], object],
 ) -> None:
-    """Carry the programs of these numbers from the centre to their optimum on ``workers`` threads.
+    """Solve the programs of these numbers, starting from the centre, on ``workers`` threads.
 
-    refined: each step is solved again and again until rounding leaves nothing of the unbalance.
-    finished(list of ProgramOutcome) is called from the threads, at most LANES outcomes at a time.
-    Cancelling is asked for before every step. An outcome does not depend on the number of threads,
-    bit for bit.
+    refined: each step is refined until only rounding is left of the unbalance. finished(list of
+    ProgramOutcome) is called from the threads, with at most LANES outcomes at a time. Cancellation
+    is polled before every step. Outcomes are bit-identical for any number of threads.
     """
     mode = REFINED if refined else OPTIMUM
     waiting = deque(numbers)
@@ -122,7 +121,7 @@ def _work(
     mode: int,
     finished: Callable[[Sequence[ProgramOutcome]], object],
 ) -> None:
-    """One thread: fill lanes from the queue, step, hand over what has arrived."""
+    """One thread: fill lanes from the queue, step, and pass finished outcomes on."""
     if not waiting:
         return
     lanes = lanes_for(len(waiting))
@@ -158,7 +157,7 @@ def _work(
 def fill(
     middle: Centre, at: Iterate, lane: int, programs: Sequence[Program], waiting: deque[int]
 ) -> int:
-    """Start the next program in a lane; its number, or −1 where none is waiting."""
+    """Start the next program in a lane; return its number, or −1 if none is waiting."""
     try:
         number = waiting.popleft()
         program = programs[number]
@@ -200,11 +199,11 @@ def multipliers(
 ) -> Floats:
     """Multipliers of all rows of A, from those of the balance and z (n,); see `certified_values`.
 
-    Those of the sides are −ζ, and pinned components answer for what is then left of the costs.
+    Those of the sides are −ζ, and those of pinned components account for the remaining costs.
     """
     if len(balance) == A.shape[0]:
         return balance
-    assert z is not None  # it is left out only where the multipliers are of all rows
+    assert z is not None  # z is None only if the multipliers are of all rows
     pairs = len(problem.w)
     sides = -z[pairs:]
     known = np.concatenate([balance, sides])
@@ -212,7 +211,7 @@ def multipliers(
     reaction = np.column_stack([left.sum(axis=1), left[:, 0] - left[:, 1]]).ravel()
     pinned = np.flatnonzero(problem.w >= contact_program.PINNED)
     if problem.mu == 0:
-        pinned = pinned[::2]  # f_t is no unknown
+        pinned = pinned[::2]  # f_t is not a variable
     return np.concatenate([known, reaction[pinned]])
 
 
@@ -223,10 +222,10 @@ def balanced(
     work: Workspace | None = None,
     lanes: Any = ONE,
 ) -> list[ProgramOutcome]:
-    """As many outcomes as lanes, or fewer, moved into S, if they are close to it.
+    """Move at most as many outcomes as lanes into S, if they are close to it.
 
-    First A y + a F = b is restored; what this drove below zero is then undone by mixing in as
-    little as it takes of the centre, which is balanced and positive.
+    First A y + a F = b is restored; components that became negative are then corrected by mixing in
+    as little as possible of the centre, which is balanced and positive.
     """
     work = work or contact_program.make_workspace(problem, len(lanes))
     at = contact_program.make_iterate(problem, len(lanes))
@@ -241,7 +240,7 @@ def balanced(
         done = work.unbalance[0] <= restored
         if done[: len(outcomes)].all():
             break
-        # Those are put back, so that no outcome depends on the company it came in.
+        # Those are restored, so that no outcome depends on the others in its batch.
         kept = at.y[:, done].copy()
         interior_point.advance(problem, True, BALANCE, at, work, lanes)
         at.y[:, done] = kept

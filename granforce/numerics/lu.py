@@ -1,21 +1,21 @@
-"""L U = A K Aᵀ + δ for conductances K that are not symmetric, without pivoting.
+"""L U = A K Aᵀ + δ for unsymmetric conductances K, without pivoting.
 
-As in `cholesky`, with two factors in place of one: L has units on its diagonal, U is kept
-transposed, so that both are columns of blocks, and both are changed by products x yᵀ of a block x
-of one and y of the other (see `blocks`). Diagonal blocks hold both triangles.
+As in `cholesky`, but with two factors: L has a unit diagonal and U is stored transposed, so that
+both are columns of blocks, updated by products x yᵀ of a block x of one and y of the other (see
+`blocks`). Diagonal blocks hold both triangles.
 
-One grain alone, with rows x, y and torque:
+For one grain, with rows x, y and torque:
 
-    2 1 0        the first row is U's as it is; what is below is divided by its pivot: 4/2 = 2, 0;
-    4 5 2        of the second row is left 5 − 2·1 = 3, 2 − 2·0 = 2, and below it 3 − 0·1 = 3 is
-    0 3 4        3/3 = 1 of it; of the third is left 4 − 0·0 − 1·2 = 2.
+    2 1 0        the first row is that of U; the numbers below are divided by its pivot: 4/2 = 2, 0;
+    4 5 2        the second row becomes 5 − 2·1 = 3, 2 − 2·0 = 2, and below its pivot (3 − 0·1)/3
+    0 3 4        = 1; the third row becomes 4 − 0·0 − 1·2 = 2.
 
-So L = (1; 2 1; 0 1 1) and U = (2 1 0; 3 2; 2) by rows, kept as (½ 1 0; 2 ⅓ 2; 0 1 ½). To solve for
-(3, 11, 7) is to go down, 3, 11 − 2·3 = 5, 7 − 0·3 − 1·5 = 2, and up: 2·½ = 1, (5 − 2·1)·⅓ = 1,
-(3 − 1·1 − 0·1)·½ = 1. The solution is (1, 1, 1).
+So L = (1; 2 1; 0 1 1) and U = (2 1 0; 3 2; 2) by rows, stored as (½ 1 0; 2 ⅓ 2; 0 1 ½). To solve
+for (3, 11, 7), sweep down: 3, 11 − 2·3 = 5, 7 − 0·3 − 1·5 = 2, and up: 2·½ = 1, (5 − 2·1)·⅓ = 1, (3
+− 1·1 − 0·1)·½ = 1. The solution is (1, 1, 1).
 
-Global rows s and columns t come last as a border, `sides` ← U⁻ᵀ s and `tops` ← L⁻¹ t, and what is
-left of the corner is C less their products.
+Global rows s and columns t come last as a border, `sides` ← U⁻ᵀ s and `tops` ← L⁻¹ t, and the
+corner becomes C minus their products.
 """
 
 from granforce.numerics.blocks import (
@@ -34,10 +34,10 @@ from granforce.numerics.lanes import fma, load, pick, size, store, within
 
 @within
 def factor(network, factors, stop, lanes):
-    """L U of a matrix that is not symmetric, in place, without pivoting.
+    """L U of an unsymmetric matrix, in place, without pivoting.
 
-    The diagonal must keep the pivots regular; who asks must judge the solution. L has units on its
-    diagonal; U is kept transposed, its diagonal blocks with those of L, the pivots inverted.
+    The diagonal must keep the pivots nonzero; the caller must check the solution. L has a unit
+    diagonal; U is stored transposed, its diagonal blocks with those of L, and the pivots inverted.
     """
     layout, L, U = network.layout, factors.lower, factors.upper
     start, panel = layout.start, layout.panel
@@ -87,7 +87,7 @@ def factor(network, factors, stop, lanes):
 
 @within
 def _factor_skew_diagonal(L, d, lanes):
-    """Unit L below and U above the diagonal of a diagonal block in place, pivots inverted."""
+    """Unit L below and U above the diagonal of a diagonal block, in place, pivots inverted."""
     for k in range(3):
         inverse = _inverse(load(L, d + 4 * k, lanes))
         store(L, d + 4 * k, lanes, inverse)
@@ -101,7 +101,7 @@ def _factor_skew_diagonal(L, d, lanes):
 
 @within
 def _divide_by_unit(U, x, L, d, lanes):
-    """x ← x L⁻ᵀ for a block x of U, and the unit lower triangle of the diagonal block d."""
+    """x ← x L⁻ᵀ for a block x of U and the unit lower triangle of the diagonal block d."""
     for a in range(x, x + 9, 3):
         x0 = load(U, a, lanes)
         x1 = fma(-x0, load(L, d + 3, lanes), load(U, a + 1, lanes))
@@ -112,7 +112,7 @@ def _divide_by_unit(U, x, L, d, lanes):
 
 @within
 def _inverse(pivot):
-    """One over a pivot of either sign; 0 without pivot."""
+    """One over a pivot of either sign; 0 for a missing pivot."""
     there = pick(size(pivot), NO_PIVOT, pivot, 1.0)
     return pick(size(pivot), NO_PIVOT, 1.0 / there, 0.0)
 
@@ -131,7 +131,7 @@ def _forward_unit(layout, L, x, first, lanes):
 
 @within
 def solve(network, factors, x, y, lanes):
-    """x, y ← (L U)⁻¹ (x, y); shapes as for `cholesky.solve`."""
+    """x, y ← (L U)⁻¹ (x, y); shapes as in `cholesky.solve`."""
     layout, corner = network.layout, factors.corner
     m, rows = network.border.shape[1] // 2, 3 * (len(layout.start) - 1)
     _forward_unit(layout, factors.lower, x, 0, lanes)

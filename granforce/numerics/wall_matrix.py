@@ -1,15 +1,15 @@
-"""What a push at one wall of a polytope does to the speed at which all others are approached.
+"""How a push at one wall of a polytope changes the speed at which all others are approached.
 
 In {f : A f = b, f_c in a polygon of its own for every contact c} the slack of a wall, relative to
-that at a centre f°, is s = 1 + B (f − f°), B having one wall of one contact in every row. With a
-stiffness M = Bᵀ B + W of each contact (the barrier's at the centre, and what else pulls) and its
-inverse, the conductance C, forces that keep the balance move by
+that at a centre f°, is s = 1 + B (f − f°), where each row of B is one wall of one contact. With a
+stiffness M = Bᵀ B + W of each contact (the barrier's at the centre, and any added stiffness W) and
+its inverse, the conductance C, forces that keep the balance move by
 
     Q = C − C Aᵀ (A C Aᵀ)⁻¹ A C,
 
-and slacks by the matrix K = B Q Bᵀ. Where W = 0 it is the projection I − D Ãᵀ (Ã D² Ãᵀ)⁻¹ Ã D on
-what slacks can do together, in slacks y = D s with Ã y = b̃: no basis of it is needed, only the
-sparse factor of A C Aᵀ (`cholesky`). One factor serves eight right-hand sides in lanes.
+and slacks by the matrix K = B Q Bᵀ. If W = 0, K is the projection I − D Ãᵀ (Ã D² Ãᵀ)⁻¹ Ã D onto the
+feasible changes of all slacks, in slacks y = D s with Ã y = b̃. It needs no basis, only the sparse
+factor of A C Aᵀ (`cholesky`). One factor serves eight right-hand sides in lanes.
 """
 
 from typing import NamedTuple
@@ -37,29 +37,29 @@ from granforce.types import Floats, Integers, Mask
 
 # Rows whose pivot is below this, relative to the diagonal, follow from others.
 DEPENDENT = 1e-13
-# Random forces that tell what varies in S.
+# Number of random forces that show which slacks vary in S.
 PROBES = 8
-# Balance is restored so many times as often where only rounding may be left.
+# Factor on the number of balance restorations where only rounding may remain.
 POLISH = 3
-# Balance is restored so often at most; until the slacks of random forces change by less than this,
-# relative to the largest: usually 10⁻⁹ or less after the first time, 10⁻⁵ and more otherwise.
+# Most restorations of the balance; they end once the slacks of random forces change by less than
+# _STEADY relative to the largest. Usually the first leaves 10⁻⁹ or less, otherwise 10⁻⁵ and more.
 _MOST_TIMES, _STEADY = 12, 1e-7
 
 
 class WallMatrix(NamedTuple):
-    """K in factors; walls are padded with such that meet no force."""
+    """K in factored form; walls are padded with walls that no force reaches."""
 
     network: Network  # A, for forces (f_n, f_t/μ)
     contact: Integers  # (walls,) contact of each wall
-    normal: Floats  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
+    normal: Floats  # (walls, 2) B: change of its slack per unit f_n, f_t/μ
     C: Floats  # (N_c, 3) nn, nt, tt of each conductance
-    own: Floats  # (N_c, 3) the same without W: with it f − f° is read off the slacks
+    own: Floats  # (N_c, 3) the same without W, which gives f − f° from the slacks
     factors: Factors  # of A C Aᵀ, one number for all lanes
     times: int = 1  # how often balance is restored
 
     @property
     def count(self) -> int:  # type: ignore[override]
-        """Number of walls, padding included."""
+        """Number of walls, including padding."""
         return len(self.contact)
 
     def moved(
@@ -67,9 +67,9 @@ class WallMatrix(NamedTuple):
     ) -> Floats:
         """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
 
-        times: how many times as often as the matrix says balance is restored: once, what is left of
-        the unbalance is that of rounding and of the weights together. C (N_c, 3): where forces come
-        from, if not the matrix's own.
+        times: multiplies the number of balance restorations; with one, the remaining unbalance is
+        that of rounding and of the weights. C (N_c, 3): conductances to use instead of the matrix's
+        own.
         """
         found = np.empty_like(g)
         for first in range(0, len(g), LANES):
@@ -91,12 +91,12 @@ class WallMatrix(NamedTuple):
         return self.moved(g)
 
     def on_hull(self, away: Floats) -> Floats:
-        """The nearest to away (k, walls) that the balance lets be."""
+        """The nearest point to `away` (k, walls) that satisfies the balance."""
         return self.moved(away, None, POLISH, self.own)
 
 
 class Scratch(NamedTuple):
-    """Room for W right-hand sides."""
+    """Storage for W right-hand sides."""
 
     f: Floats  # (2 N_c, W) forces
     x: Floats  # (rows, W)
@@ -106,10 +106,10 @@ class Scratch(NamedTuple):
 
 
 def conductances(d: Floats, k: Floats) -> tuple[Floats, Floats, Integers]:
-    """(C (N_c, 3), ln det M (N_c,) on what is free, free (N_c,)) of contacts.
+    """(C (N_c, 3), ln det M (N_c,) on the free components, free (N_c,)) of contacts.
 
-    M = Tᵀ-form of `contact_program`: d (N_c, 2) along y₁, y₂ = f_n ± f_t/μ and k (N_c, 2) along
-    f_n, f_t/μ, each PINNED where nothing may move along it; free: dimensions that are left.
+    M is given as in `contact_program`: d (N_c, 2) along y₁, y₂ = f_n ± f_t/μ and k (N_c, 2) along
+    f_n, f_t/μ, each PINNED if fixed; free: number of free dimensions.
     """
     (d0, d1), (k_n, k_t) = d.T, k.T
     det = 0.25 * (k_n + k_t) * (d0 + d1) + d0 * d1 + 0.25 * k_n * k_t
@@ -140,9 +140,9 @@ def factored(network: Network, C: Floats, diagonal: Floats, least: float) -> tup
 
 
 def _without_dependent(corner: Floats, weight: Floats) -> None:
-    """Leave global rows out, in place, whose pivot is but rounding of their weight (m,) in A C Aᵀ.
+    """Remove, in place, global rows whose pivot is only rounding of their weight (m,) in A C Aᵀ.
 
-    Known forces can be such that a pressure follows from them.
+    Known forces may imply the pressure.
     """
     inverse = np.diag(corner)
     kept = inverse > 0
@@ -165,7 +165,7 @@ def global_rows(network: Network, factors: Factors) -> int:
 
 
 def log_determinant(network: Network, factors: Factors) -> float:
-    """ln det A C Aᵀ by its factors, rows without a pivot left out."""
+    """ln det A C Aᵀ from its factors, without rows that lack a pivot."""
     m = network.border.shape[1] // 2
     own = factors.lower[cholesky.diagonals(network)].ravel()
     corner = factors.corner[:: m + 1].ravel() if m else np.zeros(0)
@@ -174,10 +174,10 @@ def log_determinant(network: Network, factors: Factors) -> float:
 
 
 def restored(matrix: WallMatrix) -> WallMatrix:
-    """The matrix, balance restored as often as it takes until once more changes nothing.
+    """The matrix with enough balance restorations that one more changes nothing.
 
-    Where rows of A all but follow from others, as those of the stress do at μ < 10⁻⁵, each time
-    takes but a part off; else once is enough.
+    If rows of A nearly follow from others, as those of the stress do at μ < 10⁻⁵, each restoration
+    removes only part of the unbalance; otherwise one is enough.
     """
     g = np.random.default_rng(0).standard_normal((PROBES, len(matrix.contact)))
     before = matrix.moved(g)
@@ -190,7 +190,7 @@ def restored(matrix: WallMatrix) -> WallMatrix:
 
 
 def balancing(matrix: WallMatrix, rest: Floats, rest_border: Floats) -> Floats:
-    """The change of slacks (walls,) by the forces of least weight that take up an unbalance."""
+    """The change of slacks (walls,) by the forces of least weight that remove an unbalance."""
     at = make_scratch(matrix, 1)
     at.x[:, 0], at.y[:, 0] = rest, rest_border
     _balance(matrix, at, ONE)
@@ -198,7 +198,7 @@ def balancing(matrix: WallMatrix, rest: Floats, rest_border: Floats) -> Floats:
 
 
 def make_scratch(matrix: WallMatrix, width: int) -> Scratch:
-    """Scratch of `width` right-hand sides, all zero."""
+    """Scratch for `width` right-hand sides, all zero."""
     grains, m = len(matrix.network.layout.position), matrix.network.border.shape[1] // 2
     walls = len(matrix.contact)
     return Scratch(
