@@ -1,1 +1,1 @@
-"""Photoelastic experiments: frames from files, their walls and flaws, and inference of forces."""
+"""Photoelastic experiments: frames from files, their walls and repair, and inference of forces."""

@@ -1,4 +1,4 @@
-"""Which grains lie at the outside of a frame, or at its hole, by their places alone."""
+"""Grains on the outside of a frame, or at its hole, from their positions alone."""
 
 import numpy as np
 from scipy import sparse
@@ -7,23 +7,23 @@ from scipy.spatial import Delaunay, QhullError
 
 from granforce.types import Floats, Integers
 
-# Triangles of neighbours have circles up to so many mean radii about them: with those of a grain
-# that is missing among others, and without those that bridge a bay of the outside.
+# Largest circumradius of triangles of neighbours, in mean radii: includes triangles around a single
+# missing grain, but not those that bridge a bay of the outside.
 _CIRCLE = 4.0
-# A hole so many mean radii across is that of an inner wall, and not that of missing grains.
+# A hole this many mean radii across belongs to an inner wall, not to missing grains.
 _HOLE = 12.0
 
 
 def boundary(x: Floats, r: Floats) -> Integers:
-    """(N,) 1 for grains at the outside, −1 at the largest hole, if it is large, and 0 elsewhere.
+    """(N,) 1 for grains on the outside, −1 at the largest hole if it is large, and 0 elsewhere.
 
-    x (N, 2), r (N,). By the edges of the alpha shape of the centres (Edelsbrunner, Kirkpatrick,
+    x (N, 2), r (N,). Uses the edges of the alpha shape of the centres (Edelsbrunner, Kirkpatrick,
     Seidel, IEEE Trans. Inf. Theory 29, 551 (1983)).
     """
     found = np.ones(len(x), dtype=np.int64)
     try:
         triangles = Delaunay(x).simplices
-    except QhullError:  # fewer than three grains, or all on a line
+    except QhullError:  # fewer than three grains, or all collinear
         return found
     corner = x[triangles]
     sides = np.stack([corner[:, k] - corner[:, k - 1] for k in range(3)], axis=1)

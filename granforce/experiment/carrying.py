@@ -1,4 +1,4 @@
-"""Which contacts carry for certain: in every network that agrees with a measurement."""
+"""Contacts that certainly carry force: in every network that agrees with a measurement."""
 
 from typing import NamedTuple
 
@@ -16,11 +16,11 @@ from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
-# Forces that were not measured stay below this, in the largest measured one.
+# Bound on unmeasured forces, in the largest measured one.
 _MOST = 10.0
-# Bounds that the likeliest network breaks give so much more than they must: what is left has room.
+# Factor by which bounds are widened beyond a violation, so that networks exist.
 _BEYOND = 1.1
-# Programs between two looks at which contacts were seen without force.
+# Programs between two checks for contacts without force in some network.
 _AT_ONCE = 64
 
 
@@ -30,12 +30,12 @@ class Carrying(NamedTuple):
 
     contacts: Integers  # (k,) their numbers in the packing
     least: Floats  # (k,) certified lower bound of f_n, force
-    carries: Mask  # (k,) bool: it is above 0, so they carry for certain
-    widened: int  # measured components whose bounds had to give, as no network agreed
-    counts: dict[str, int]  # programs solved, and skipped as f_n = 0 was seen in some network
+    carries: Mask  # (k,) bool: least is above 0, so they certainly carry force
+    widened: int  # measured components with widened bounds, as no network agreed
+    counts: dict[str, int]  # programs solved, and skipped because f_n = 0 in some network
 
     def _repr_html_(self) -> str:
-        """The result as notebooks show it."""
+        """The result as displayed in notebooks."""
         lines = {"contacts": len(self.contacts), "carry for certain": int(self.carries.sum())}
         return notebook.table("Contacts that carry", lines | self.counts)
 
@@ -54,15 +54,15 @@ def carrying(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Carrying:
-    """Least f_n of contacts over the networks within so many σ of a measurement; a Carrying.
+    """Least f_n of contacts over the networks within some σ of a measurement; a Carrying.
 
     measured, sigma, unmeasured: as for `infer`. contacts: numbers in the packing, by default all
-    that were not measured. within: bounds on each measured component, in σ; where the likeliest
-    network is farther off, a tenth beyond its distance, so that there always is a network. Forces
-    that were not measured stay below ten times the largest measured one.
+    that were not measured. within: bounds on each measured component, in σ; if the most likely
+    network is farther away, its distance and a tenth, so that there always is a network. Forces
+    that were not measured are bounded by ten times the largest measured one.
 
-    Each contact takes one linear program, none where f_n = 0 was seen in a known network. Raises
-    InputError and NotJammedError as `infer` does.
+    Each contact takes one linear program, or none if f_n = 0 in a known network. Raises InputError
+    and NotJammedError as `infer` does.
     """
     within = positive(within, "within")
     m, s = checked(ensemble, measured, sigma)

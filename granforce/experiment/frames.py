@@ -1,4 +1,4 @@
-"""The frames of an experiment: which files hold them, and their numbers."""
+"""The frames of an experiment: their files and their numbers."""
 
 import itertools
 import re
@@ -10,7 +10,7 @@ from granforce.experiment.pegs import open_frames
 from granforce.records import InputError
 from granforce.system.files import expanded
 
-# What files are, by their names.
+# The contents of files, by their names.
 _POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
 _TEXT = (".txt", ".csv", ".dat")
 _PACKED = (".gz", ".zst")
@@ -20,15 +20,15 @@ class Frame(NamedTuple):
     """One frame: its files, and its number in them."""
 
     positions: str
-    adjacency: str | None  # None: a *_solved.mat
+    adjacency: str | None  # None for a *_solved.mat
     number: float
 
 
 def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
     """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
 
-    In order of their numbers. columns: of text files, as for `read_pegs`. Raises InputError where
-    there are none, or two of one number.
+    Sorted by number. columns: of text files, as for `read_pegs`. Raises InputError if there are
+    none, or two with the same number.
     """
     files = []
     for path in map(expanded, paths):
@@ -70,7 +70,7 @@ def _is_text(path: Path) -> bool:
 def _numbers(
     one: Path, two: Path | None, count: int, columns: Mapping[str, str] | None
 ) -> list[float]:
-    """Numbers of the frames in one pair of files; by the name where each file has one frame."""
+    """Numbers of the frames in one pair of files; from the name if each file has one frame."""
     inside = open_frames(one, two, columns=columns).frames
     by_name = _digits(one) if count > 1 and two is not None else []
     return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
@@ -84,7 +84,7 @@ def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
     """Pairs (positions, contacts) that have the same number, or none, in their names."""
     positions = [one for one in files if _POSITIONS.search(one.name)]
     contacts = [one for one in files if _CONTACTS.search(one.name)]
-    # One file of all frames goes before those of each.
+    # A file of all frames comes before files of single frames.
     for choose in (lambda path: not _digits(path), _digits):
         some = [[one for one in those if choose(one)] for those in (positions, contacts)]
         if len(some[0]) == len(some[1]) == 1:

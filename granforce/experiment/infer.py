@@ -4,9 +4,9 @@ A measurement gives components m of forces with standard errors σ. The network 
 
     χ² = Σ ((f − m)/σ)²
 
-is the likeliest one, and all of S, weighted with exp(−χ²/2), is a normal distribution cut by the
-walls of S: what is known of the forces once balance and Coulomb's law are. Draws from it give the
-standard error of every force, of those that were not measured too.
+is the most likely one, and S weighted with exp(−χ²/2) is a normal distribution truncated by the
+walls of S: the distribution of the forces given the measurement, balance and Coulomb's law. Draws
+from it give the standard error of every force, including those that were not measured.
 """
 
 import time
@@ -28,13 +28,13 @@ from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.types import Cancel, Floats, Integers, Progress
 
-# Residuals beyond so many standard errors are told.
+# Residuals beyond this many standard errors are reported.
 SUSPECT = 3.0
-# A quarter of an oscillation: without walls the next state does not depend on the last.
+# A quarter of an oscillation: without walls the next state is independent of the last.
 _TIME = np.pi / 2
-# Paths between states that are kept: 1000 states are then worth 300 to 900 independent ones.
+# Paths between stored states: 1000 states are then worth 300 to 900 independent ones.
 _PATHS = 4
-# Paths whose speeds are drawn side by side.
+# Number of paths whose speeds are drawn together.
 _AT_ONCE = 8
 # States dropped at the start of each chain.
 _DROPPED = 20
@@ -45,16 +45,16 @@ Kind = TypeVar("Kind", bound="Inference")
 
 @notebook.brief
 class Draws(NamedTuple):
-    """States of S drawn with the weight exp(−χ²/2), by chain, and whether they can be trusted."""
+    """States of S drawn with the weight exp(−χ²/2), by chain, with diagnostics."""
 
     states: Floats  # (chains, k, N_c, 2) admissible networks, force
     residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component
     reached: bool  # all in S, and R̂ ≤ MIXED
-    counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates
-    setup_seconds: float  # wall time of the walls
-    sampling_seconds: float  # wall time of the draws, those dropped included
+    counts: dict[str, Any]  # turns, rejected paths, dropped states, held coordinates
+    setup_seconds: float  # wall time for computing the walls
+    sampling_seconds: float  # wall time of the draws, including dropped ones
 
     effective = uniform.UniformSample.effective  # type: ignore[misc]
     flat = uniform.UniformSample.flat  # type: ignore[misc]
@@ -63,21 +63,21 @@ class Draws(NamedTuple):
 
 @notebook.brief
 class Inference(NamedTuple):
-    """The network that a measurement speaks for, and how sure it is."""
+    """The most likely network given a measurement, and its uncertainty."""
 
     forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
-    freedom: int  # degrees of freedom: what was measured less what the network could adapt to
-    deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
+    freedom: int  # degrees of freedom: measured components less adjustable dimensions
+    deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN if not measured
     suspects: Integers  # (s,) contacts, as numbers in the packing, beyond 3 σ, largest first
     residual: float  # in ⟨f_n⟩, by Ensemble.residual
     violation: float  # in ⟨f_n⟩, by Ensemble.violation
-    draws: Draws | None  # None where none were asked for
-    seconds: float  # wall time, draws included
+    draws: Draws | None  # None if none were requested
+    seconds: float  # wall time, including draws
 
     @property
     def drawn(self) -> Draws:
-        """The draws; AttributeError where none were asked for."""
+        """The draws; AttributeError if none were requested."""
         if self.draws is None:
             raise AttributeError("no states were drawn: set `states`")
         return self.draws
@@ -93,7 +93,7 @@ class Inference(NamedTuple):
         return self.drawn.flat.std(axis=0)
 
     def _repr_html_(self) -> str:
-        """The inference as notebooks show it."""
+        """The inference as displayed in notebooks."""
         lines = {
             "measured components": int(np.isfinite(self.deviation).sum()),
             "χ²": self.chi_square,
@@ -123,16 +123,16 @@ def infer(
 ) -> Inference:
     """The admissible network with the least Σ ((f − m)/σ)², and draws around it; an Inference.
 
-    measured, sigma: m and σ (N_c of S, 2), force; NaN where a component was not measured. σ may be
-    one number, or two for f_n and f_t. states: at least so many draws from the normal distribution
-    of the measurement cut by S, for error bars, by `chains` independent chains. workers: threads,
-    which change nothing in the result. progress(done, total) counts draws.
+    measured, sigma: m and σ (N_c of S, 2), force; NaN for components that were not measured. σ may
+    be one number, or two for f_n and f_t. states: minimum number of draws from the normal
+    distribution of the measurement truncated by S, for error bars, by `chains` independent chains.
+    workers: threads, which do not change the result. progress(done, total) counts draws.
 
-    unmeasured: what was not measured counts as 0 with a standard error of so many ⟨f_n⟩. As it is,
-    that only chooses the least of networks that fit equally well; where neither S nor the
-    measurement bounds some forces (no pressure is prescribed), it is all that does.
+    unmeasured: unmeasured components count as 0 with a standard error of this many ⟨f_n⟩. The
+    default only selects the least of networks that fit equally well; if neither S nor the
+    measurement bounds some forces (no pressure is prescribed), only this does.
 
-    Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
+    Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
@@ -154,7 +154,7 @@ def asked(
     numbers: tuple[int, int, int],
     least: int = 0,
 ) -> tuple[Floats, Floats, Likeliest, tuple[int, int, int]]:
-    """(m, σ, the likeliest network, numbers) of arguments; numbers: draws, chains, workers."""
+    """(m, σ, the likeliest network, numbers) for arguments; numbers: draws, chains, workers."""
     draws, chains = whole(numbers[0], "states", least), whole(numbers[1], "chains", 1)
     workers, most = worker_count(numbers[2]), max(draws, chains)
     check_memory(16 * most * len(ensemble.index), f"{most} states")
@@ -165,7 +165,7 @@ def asked(
 def told(
     kind: type[Kind], ensemble: Ensemble, best: Likeliest, draws: Draws | None, begin: float
 ) -> Kind:
-    """The Inference, or one of its kind, of a likeliest network and draws, and what it took."""
+    """The Inference (or a subclass) with a likeliest network, draws, and elapsed time."""
     far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
     beyond = np.flatnonzero(far > SUSPECT)
     return kind(
@@ -186,7 +186,7 @@ def judged(
     counts: dict[str, Any],
     *seconds: float,
 ) -> Draws:
-    """The Draws of states (chains, k, N_c, 2), by the judges of the ensemble and their mixing."""
+    """The Draws of states (chains, k, N_c, 2), with their residual, violation and mixing."""
     residual, violation = ensemble.residual(found), ensemble.violation(found)
     good = bool(uniform.inside(residual, violation) and mixed)
     return Draws(found, residual, violation, worth, good, counts, *seconds)
@@ -224,12 +224,12 @@ def step(
     *,
     count: int,
 ) -> uniform.Flown:
-    """The next `count` states of some chains, as `uniform.step` gives them.
+    """The next `count` states of some chains, in the format of `uniform.step`.
 
-    Two steps take turns (Gibbs). To every wall's 1 + B (f − f°) a normal error of variance 1 is
-    added, its companion; given those, f has a normal distribution of precision Bᵀ B + W around a
-    point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
-    draws from it. Without a measurement that leaves uniform states.
+    Gibbs sampling alternates two steps. A normal error of variance 1 is added to every wall's 1 + B
+    (f − f°), its companion; given the companions, f has a normal distribution of precision Bᵀ B + W
+    around a point that one solve gives, truncated by the walls: a harmonic path of a quarter
+    oscillation draws from it. Without a measurement this gives uniform states.
     """
     rows, times = rows or billiard.room_for_rows(made.count), np.array([_TIME])
     pulls = np.tile(made.pull, (len(ends), 1))
@@ -249,7 +249,7 @@ def step(
 
 
 def _drawn(made: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
-    """Speeds (count, walls) of covariance K, and errors (count, walls) of companions."""
+    """Speeds (count, walls) with covariance K, and errors (count, walls) of companions."""
     push, error = (np.empty((count, made.count)) for _ in range(2))
     pull = np.empty((count, made.root.size))
     for path in range(count):

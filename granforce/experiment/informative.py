@@ -1,4 +1,4 @@
-"""Which measurement next: where one more known force would tell most about all others."""
+"""Which measurement next: the contact whose force would say most about all others."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -18,15 +18,15 @@ from granforce.types import Cancel, Floats, Integers, Progress
 
 @notebook.brief
 class Informative(NamedTuple):
-    """Contacts whose normal force would be worth measuring, the best first."""
+    """Contacts whose normal force is most worth measuring, the best first."""
 
     contacts: Integers  # (k,) their numbers in the packing
-    expected: Floats  # (k,) part by which the mean error of f_n falls, by covariance
-    before: float  # exact mean interval of f_n as it is, in ⟨f_n⟩; NaN where not certified
-    after: Floats  # (k,) the same once f_n of that contact is known; NaN likewise, or not computed
+    expected: Floats  # (k,) fraction by which the mean error of f_n falls, from covariances
+    before: float  # exact mean interval of f_n now, in ⟨f_n⟩; NaN if not certified
+    after: Floats  # (k,) the same with f_n of that contact known; NaN also if not computed
 
     def _repr_html_(self) -> str:
-        """The contacts as notebooks show them."""
+        """The contacts as displayed in notebooks."""
         lines = {"mean interval of fₙ / ⟨fₙ⟩ now": self.before}
         for contact, after in zip(self.contacts, self.after, strict=True):
             lines[f"with fₙ of contact {contact} known"] = float(after)
@@ -48,16 +48,16 @@ def informative(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Informative:
-    """The k contacts whose f_n, once known, would shorten the mean interval most; an Informative.
+    """The k contacts whose f_n, if known, would shorten the mean interval most; an Informative.
 
-    From `states` uniform states: were forces normally distributed, a known f_n of contact c would
-    leave √(1 − ρ²) of the standard deviation of another one, ρ their correlation. The best `check`
-    contacts are then put in order by exact bounds, with f_n held at its mean over the states.
-    sample: a UniformSample of S to take in place of new states.
-    workers: threads; progress(done, total) counts those. watch(Informative) is called before the
-    first of them, with the order by covariance.
+    Based on `states` uniform states: if forces were normally distributed, a known f_n of contact c
+    would leave √(1 − ρ²) of the standard deviation of another one, where ρ is their correlation.
+    The best `check` contacts are then sorted by exact bounds, with f_n fixed at its mean over the
+    states. sample: a UniformSample of S to use instead of new states. workers: threads;
+    progress(done, total) counts the checked contacts. watch(Informative) is called before the first
+    of them, with the order by covariance.
 
-    Raises InputError where nothing is left to measure, and as `sample_uniform` does.
+    Raises InputError if nothing is left to measure, and as `sample_uniform` does.
     """
     k, check = whole(k, "k", 1), whole(check, "check")
     if sample is None:
@@ -65,7 +65,7 @@ def informative(
     else:
         ensemble.refuse_foreign(sample.states, sample.residual, "the sample")
     normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
-    if not ensemble.admits(held):  # states of an S as thin as rounding may keep an unbalance
+    if not ensemble.admits(held):  # the states of a very thin S may be unbalanced
         held = some_network(ensemble, held)
     expected = _expected(normal)
     if not expected.any():
@@ -83,13 +83,13 @@ def informative(
         after[done] = _mean_extent(ensemble.with_normal(c, held), workers)
         if progress is not None:
             progress(done + 1, len(best))
-    place = np.argsort(after, kind="stable")  # those that were not computed come last
+    place = np.argsort(after, kind="stable")  # contacts that were not computed come last
     order = order[place]
     return Informative(ensemble.index[order], expected[order], before, after[place])
 
 
 def _expected(normal: Floats) -> Floats:
-    """(N_c,) part by which the mean deviation of f_n (states, N_c) falls once one is known."""
+    """(N_c,) fraction by which the mean deviation of f_n (states, N_c) falls if one is known."""
     off = normal - normal.mean(axis=0)
     spread = off.std(axis=0)
     unit = np.divide(off, spread, out=np.zeros_like(off), where=spread > INTERVAL_GAP)
@@ -99,7 +99,7 @@ def _expected(normal: Floats) -> Floats:
 
 
 def _mean_extent(ensemble: Ensemble, workers: int) -> float:
-    """Mean exact interval of f_n, in ⟨f_n⟩; NaN where a bound has no certificate."""
+    """Mean exact interval of f_n, in ⟨f_n⟩; NaN if a bound has no certificate."""
     bounds = intervals(ensemble, workers=workers)
     cancelling.check("exact bounds")
     if not bounds.converged:

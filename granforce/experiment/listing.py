@@ -1,18 +1,18 @@
-"""What the files of one photoelastic frame list, before anything is judged or mended.
+"""The contents of the files of one photoelastic frame, before any check or repair.
 
-Text files of positions and contacts come with or without a column for the frame, a flag for grains
-at walls, and a header, separated by commas, semicolons, tabs or blanks. Which columns there are is
-told from the header or, without one, from their number and from what is in them:
+Text files of positions and contacts may have a column for the frame, a flag for grains at walls,
+and a header, with fields separated by commas, semicolons, tabs or blanks. Columns are recognised by
+the header or, without one, by their number and contents:
 
     frame, id, x, y, radius, flag     id, x, y, radius, flag     x, y, radius, flag
     frame, id, x, y, radius           id, x, y, radius           x, y, radius
     frame, id1, id2, f_t, f_n         id1, id2, f_t, f_n         (the contacts; ids < 0: a wall)
     id1, id2, flag, f_t, f_n          (where the third is 0 throughout)
 
-Without a column for the frame, another frame begins where the ids of the grains begin anew.
+Without a column for the frame, a new frame begins where the ids of the grains restart.
 
-The formats of PeGS are those of its README (github.com/photoelasticity), modules particleTrack and
-adjacencyMatrix. Angles and signs are in the axes of the files: **t** is **n** turned from x to y.
+The formats of PeGS are those in its README (github.com/photoelasticity), modules particleTrack and
+adjacencyMatrix. Angles and signs refer to the axes of the files: **t** is **n** turned from x to y.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from granforce.types import Floats, Integers, Mask
 
 _GRAINS = ("frame", "id", "x", "y", "radius", "flag")
 _CONTACTS = ("frame", "id1", "id2", "tangential", "normal")
-# Other words for them, in lower case without blanks and what is in brackets.
+# Synonyms, in lower case without blanks and brackets.
 _WORDS = {
     "frame": ("frame", "frameid", "frame_id", "image", "step", "t"),
     "id": ("id", "particle", "particleid", "particle_id", "grain", "track", "label"),
@@ -42,45 +42,45 @@ _WORDS = {
     "tangential": ("tangential", "ft", "f_t", "tangentialforce", "tangential_force"),
     "normal": ("normal", "fn", "f_n", "normalforce", "normal_force"),
 }
-# Grains of a frame at least, on average, where frames are told apart by their ids.
+# Least mean number of grains per frame, if frames are recognised by their ids.
 _LEAST = 3
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 
 
 class Listing(NamedTuple):
-    """Grains and contacts of one frame as listed; NaN where a field was no finite number."""
+    """Grains and contacts of one frame as listed; NaN for fields that are not finite numbers."""
 
-    ids: Floats  # (N,) names of the grains
+    ids: Floats  # (N,) ids of the grains
     x: Floats  # (N, 2) centres
     r: Floats  # (N,) radii
     flag: Floats  # (N,) not 0 for grains at a wall
-    ends: Floats  # (k, 2) names of the two grains of each line; below 0: a wall
+    ends: Floats  # (k, 2) ids of the two grains of each line; below 0: a wall
     forces: Floats  # (k, 2) f_n, f_t
     beta: Floats  # (k,) angle from the first grain to the contact, rad; NaN: not listed
     weight: Floats  # (k,) 1/σ² of the line's forces relative to a usual line
     names: tuple[str, str]  # of the two files
-    lines: tuple[Integers, Integers]  # (N,), (k,): where they stand in them
-    both_ways: bool  # two lines of one contact are two independent measurements
+    lines: tuple[Integers, Integers]  # (N,), (k,): their line numbers
+    both_ways: bool  # whether two lines of one contact are independent measurements
     frame: float
-    said: str  # which columns were recognised
+    said: str  # the recognised columns, in words
 
     def place(self, kind: int, row: SupportsIndex) -> str:
         """'file, line n' of a grain (kind 0) or a contact (1)."""
         return f"{self.names[kind]}, line {int(self.lines[kind][row])}"
 
     def with_grains(self, rows: Integers | Mask) -> Listing:
-        """The listing with some of its grains, in this order."""
+        """The listing with a selection of its grains, in this order."""
         kept = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
         return self._replace(**kept, lines=(self.lines[0][rows], self.lines[1]))
 
     def with_contacts(self, rows: Integers | Mask) -> Listing:
-        """The listing with some of its contacts, in this order."""
+        """The listing with a selection of its contacts, in this order."""
         kept = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
         return self._replace(**kept, lines=(self.lines[0], self.lines[1][rows]))
 
 
 class Frames(Protocol):
-    """What frames are read from: their numbers, and the Listing of one, by default the last."""
+    """A source of frames: their numbers, and the Listing of one, by default the last."""
 
     @property
     def frames(self) -> Floats: ...
@@ -89,21 +89,21 @@ class Frames(Protocol):
 
 
 class Columns(NamedTuple):
-    """A text file as numbers under the names that were recognised."""
+    """The numbers in a text file, by the recognised names of columns."""
 
-    name: str  # of the file
+    name: str  # file name
     values: dict[str, Floats]  # {column: (rows,)}
     lines: Integers  # (rows,) line numbers
     said: str
 
     @property
     def frames(self) -> Floats:
-        """Numbers of the frames, ascending; empty where there is no such column."""
+        """Numbers of the frames, ascending; empty without such a column."""
         found = self.values.get("frame", np.zeros(0))
         return np.unique(found[np.isfinite(found)])
 
     def of(self, frame: float) -> Columns:
-        """The rows of one frame, or all where frames are not told apart."""
+        """The rows of one frame, or all rows if there is no column for the frame."""
         if "frame" not in self.values:
             return self
         here = self.values["frame"] == frame
@@ -111,20 +111,20 @@ class Columns(NamedTuple):
         return self._replace(values=values, lines=self.lines[here])
 
     def with_frames(self, frame: Floats | Integers) -> Columns:
-        """The same with a column for the frame (rows,), as ids tell it."""
+        """The same with a column for the frame (rows,), derived from ids."""
         values = self.values | {"frame": np.asarray(frame, dtype=np.float64)}
         return self._replace(values=values, said=f"{self.said}, frames told apart by the ids")
 
 
 class TextFrames(NamedTuple):
-    """The two files of one frame or of many."""
+    """The two files of one or many frames."""
 
     grains: Columns
     contacts: Columns
 
     @property
     def frames(self) -> Floats:
-        """Numbers of the frames that both files have, ascending, at least one."""
+        """Numbers of the frames that are in both files, ascending, at least one."""
         one, two = self.grains.frames, self.contacts.frames
         if len(one) and len(two):
             both = np.intersect1d(one, two)
@@ -174,10 +174,10 @@ class TextFrames(NamedTuple):
 def read_frames(
     positions: Source, adjacency: Source, columns: Mapping[str, str] | None = None
 ) -> TextFrames:
-    """The TextFrames in two files, paths or open files; InputError for what is no such file.
+    """The TextFrames in two files, paths or open files; InputError for other files.
 
     columns: {frame, id, x, y, r, flag, i, j, ft or fn: its header in the files, or its number from
-    1}. Where one of a file is given, what its other columns are is told by headers only.
+    1}. If one column of a file is given, the others are recognised by headers only.
     """
     given = _by_name(columns or {})
     grains, contacts = (
@@ -188,7 +188,7 @@ def read_frames(
 
 
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
-    """The columns under the names that are used here."""
+    """The columns under the names used here."""
     given = {}
     for word, theirs in columns.items():
         name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
@@ -203,7 +203,7 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
 
 
 def _told_apart(grains: Columns, contacts: Columns) -> TextFrames:
-    """Both files with a column for the frame where the ids of the grains begin anew without one."""
+    """Both files with a column for the frame; without one, it is derived from restarting ids."""
     if "frame" in grains.values or "id" not in grains.values:
         return TextFrames(grains, contacts)
     parts = _begun_anew(grains.values["id"])
@@ -230,7 +230,7 @@ def _told_apart(grains: Columns, contacts: Columns) -> TextFrames:
 
 
 def _begun_anew(ids: Floats) -> Integers | None:
-    """(rows,) numbers from 1 of the parts in each of which ids restart, None for a single one.
+    """(rows,) numbers from 1 of the parts in which ids restart; None for a single part.
 
     A part has at least half as many rows as the largest, and most of its ids are in the first.
     """
@@ -244,18 +244,18 @@ def _begun_anew(ids: Floats) -> Integers | None:
 
 
 def _ascending(values: Floats) -> Integers:
-    """(rows,) numbers from 1 of the parts in each of which values ascend."""
+    """(rows,) numbers from 1 of the parts in which values ascend."""
     with np.errstate(invalid="ignore"):
         return np.cumsum(np.concatenate([[True], np.diff(values) < 0]))
 
 
 def plain(number: float) -> int | float:
-    """A number as people write it: whole where it is whole."""
+    """The number as an int if it is whole."""
     return int(number) if float(number).is_integer() else float(number)
 
 
 def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) -> Columns:
-    """The Columns of a text file of grains or contacts; given: headers or numbers of some."""
+    """The Columns of a text file of grains or contacts; given: headers or numbers of columns."""
     name, text = read_text(source)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if "\0" in text:
@@ -270,7 +270,7 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
     width = max(set(counts := [len(fields) for _, fields in rows]), key=counts.count)
     numbers = np.full((len(rows), width), np.nan)
     for row, (_, fields) in zip(numbers, rows, strict=True):
-        # A line of another length is no line of this table: nothing in it is taken.
+        # Lines of another length do not belong to this table.
         if len(fields) == width:
             row[:] = [_number(field) for field in fields]
     if given.keys() - {"frame"}:
@@ -283,7 +283,7 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
 
 
 def _number(text: str) -> float:
-    """The finite number that is written, or NaN."""
+    """The number in the text if it is finite, otherwise NaN."""
     try:
         value = float(text)
     except ValueError:
@@ -292,7 +292,7 @@ def _number(text: str) -> float:
 
 
 def _named(header: Sequence[str], wanted: Sequence[str], width: int) -> list[str] | None:
-    """Names of the columns by a header line, "" for others; None where it does not tell."""
+    """Names of the columns from a header line, "" for others; None if it is insufficient."""
     if header is None or len(header) != width:
         return None
     named = _known(header, wanted)
@@ -312,7 +312,7 @@ def _needed(wanted: Sequence[str]) -> set[str]:
 def _given(
     file: str, header: Sequence[str] | None, wanted: Sequence[str], width: int, given: Any
 ) -> list[str]:
-    """Names of the columns where some are given by header or number; "" for others."""
+    """Names of the columns if some are given by header or number; "" for others."""
     header = header if header is not None and len(header) == width else [""] * width
     plain_words = [word.strip(" #\"'").lower() for word in header]
     named = [name if name not in given else "" for name in _known(header, wanted)]
@@ -340,7 +340,7 @@ def _given(
 
 
 def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[str]:
-    """Names of the columns by their number and what is in them."""
+    """Names of the columns from their number and contents."""
     width = numbers.shape[1]
     found = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
     if (
@@ -367,7 +367,7 @@ def _as_contacts(numbers: Floats) -> Sequence[str] | None:
     if columns is None:
         return None
     if len(columns) == 5 and not np.nan_to_num(numbers[:, 2]).any():
-        # No grain is in every contact: a flag, and the first two are the grains.
+        # No grain is in every contact: the third is a flag, and the first two are the grains.
         columns = ("id1", "id2", "", "tangential", "normal")
     whole = [_whole(numbers[:, columns.index(name)]) for name in ("id1", "id2")]
     return columns if all(whole) else None
@@ -384,7 +384,7 @@ def _as_grains(numbers: Floats) -> Sequence[str] | None:
     if width >= 6:
         return (*_GRAINS, *[""] * (width - 6)) if counted else None
     if width == 5:
-        # A number for the frame comes again and again, that of a grain once a frame.
+        # A frame number repeats; the id of a grain occurs once per frame.
         if not counted:
             return None
         alone |= anew and not _whole(numbers[:, 1])
@@ -397,7 +397,7 @@ def _as_grains(numbers: Floats) -> Sequence[str] | None:
 
 
 def _whole(column: Floats) -> bool:
-    """Whether nearly all are whole numbers: what is not may be a damaged line."""
+    """Whether nearly all are whole numbers; exceptions may be damaged lines."""
     seen = column[np.isfinite(column)]
     return len(seen) > 0 and bool(np.mean(seen == np.round(seen)) > 0.9)
 

@@ -1,10 +1,10 @@
 """Struct arrays from MATLAB files of version 5 to 7, field by field.
 
-As in "MAT-File Format" of MathWorks: after a header of 128 bytes come elements, each a tag (type,
-number of bytes; both in four bytes where the data have four or fewer) and its data, filled up to
-eight bytes. A variable is an element of type 14 that holds others: class and flags, dimensions,
-name, and for a struct the names of its fields and the field of each of its parts. SciPy's reader
-ends the whole process on some damaged files, and unpacks the images beside what is wanted here.
+The format follows "MAT-File Format" of MathWorks: after a header of 128 bytes come elements, each a
+tag (type, number of bytes; both in four bytes if the data have four or fewer) and its data, padded
+to eight bytes. A variable is an element of type 14 that contains others: class and flags,
+dimensions, name, and for a struct the names of its fields and the field of each part. SciPy's
+reader crashes the process on some damaged files, and also unpacks the images, which are not needed.
 """
 
 import struct
@@ -27,17 +27,17 @@ class _Element(NamedTuple):
     kind: int
     start: int  # of its data
     size: int
-    end: int  # where the next one begins
+    end: int  # start of the next element
 
 
 class _Reader:
-    """Elements of some bytes; ValueError where they are not as the format has them."""
+    """Elements of a byte string; ValueError if they violate the format."""
 
     def __init__(self, data: bytes, order: str) -> None:
         self.data, self.order = data, order
 
     def element(self, at: int, end: int) -> _Element:
-        """The _Element whose tag is at a place, before `end`."""
+        """The _Element whose tag is at the offset `at`, before `end`."""
         if at + 8 > end:
             raise ValueError("cut off")
         kind, size = struct.unpack_from(f"{self.order}II", self.data, at)
@@ -62,7 +62,7 @@ class _Reader:
         return bytes(self.data[element.start : element.start + element.size]).decode("latin-1")
 
     def head(self, matrix: _Element) -> tuple[int, npt.NDArray[Any], str, int]:
-        """Class, dimensions and name of a variable, and where what it holds begins."""
+        """Class, dimensions and name of a variable, and the offset of its contents."""
         end = matrix.start + matrix.size
         flags = self.element(matrix.start, end)
         shape = self.element(flags.end, end)
@@ -71,7 +71,7 @@ class _Reader:
         return word & 0xFF, self.values(shape), self.text(name), name.end
 
     def numbers(self, matrix: _Element) -> npt.NDArray[Any]:
-        """The real part of a numeric variable, flat; an empty array for what is not one."""
+        """The real part of a numeric variable, flat; an empty array for other variables."""
         if not matrix.size:
             return np.zeros(0)
         kind, shape, _, at = self.head(matrix)
@@ -115,8 +115,8 @@ def read_struct(
 ) -> list[dict[str, npt.NDArray[Any]]]:
     """Parts of the struct array `name` in a file's bytes: a list of {field: flat numbers}.
 
-    An empty list where there is none. most: bytes that may be unpacked. Raises ValueError,
-    KeyError, zlib.error or struct.error where the file is damaged.
+    An empty list if there is none. most: largest number of bytes to unpack. Raises ValueError,
+    KeyError, zlib.error or struct.error if the file is damaged.
     """
     order = {b"IM": "<", b"MI": ">"}[content[126:128]]
     at, outside = _HEADER, _Reader(content, order)

@@ -15,14 +15,14 @@ COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 
 @notebook.brief
 class Measurement(NamedTuple):
-    """Forces measured on k contacts; NaN where a component was not."""
+    """Forces measured on k contacts; NaN for components that were not measured."""
 
     contacts: Integers  # (k,) their numbers in the packing
     forces: Floats  # (k, 2) f_n, f_t, force
-    sigma: Floats  # (k, 2) their standard errors
+    sigma: Floats  # (k, 2) standard errors
 
     def on(self, count: int) -> tuple[Floats, Floats]:
-        """Forces and σ (count, 2) of all contacts of a packing; InputError for others."""
+        """Forces and σ (count, 2) of all contacts of a packing; InputError for unknown contacts."""
         if self.contacts.max(initial=0) >= count:
             raise InputError(
                 f"contact {self.contacts.max()} was measured, and the packing's contacts are "
@@ -34,17 +34,17 @@ class Measurement(NamedTuple):
 
 
 def read_measurement(source: Source) -> Measurement:
-    """The Measurement in a CSV file, as `infer` wants it once it is `on` the contacts of a packing.
+    """The Measurement in a CSV file; its `on` gives the arrays that `infer` takes.
 
     source: a path or an open file. Columns: contact (its number in the packing), f_n, f_t, sigma_n,
-    sigma_t in the packing's unit, which names may end with: ``f_n [packing]``. Fields are empty or
-    nan where a component was not measured. Contacts without a line were not measured.
+    sigma_t in the packing's unit, which names may end with: ``f_n [packing]``. Fields of components
+    that were not measured are empty or nan. Contacts without a line were not measured.
 
     Raises InputError naming file and line.
     """
     table = read_csv(source).in_packing_unit()
     contacts = table.whole("contact")
-    table.index("contact")  # each is given once
+    table.index("contact")  # each occurs once
     values = np.empty((len(contacts), 4))
     for k, name in enumerate(COLUMNS):
         for row, text in enumerate(table.fields(name)):
@@ -58,7 +58,7 @@ def read_measurement(source: Source) -> Measurement:
 
 
 def _value(text: str, name: str, place: str) -> float:
-    """One number, NaN where nothing was measured."""
+    """One number, or NaN for an empty field."""
     try:
         value = float(text or "nan")
     except ValueError:

@@ -1,10 +1,10 @@
 """Packings and measured forces from photoelastic experiments, in the formats of PeGS.
 
-Such data do not balance: contacts were missed, others are wrong, and radii are known to some
-tenths only. What is wrong by itself is mended first (`repair`). Pairs that are about as near as the
-listed ones join as candidates that were not measured; a linear program then finds the fewest grains
-that still cannot be balanced, and their balance is left open. So is that of grains at walls, unless
-the directions of their contacts with the walls are known (`walls`).
+Such data do not balance: some contacts are missing, others are wrong, and radii are known only to
+some tenths. Errors that show in the data themselves are repaired first (`repair`). Pairs about as
+close as the listed ones are added as unmeasured candidates; a linear program then finds the fewest
+grains that still cannot be balanced, and their balance is left open. So is that of grains at walls,
+unless the directions of their contacts with the walls are known (`walls`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,33 +36,33 @@ from granforce.records import (
 )
 from granforce.types import Floats, Integers, Mask
 
-# What changing a measured force by ⟨f_n⟩ costs, where ⟨f_n⟩ of unbalance costs 1.
+# Cost of changing a measured force by ⟨f_n⟩, compared with 1 for ⟨f_n⟩ of unbalance.
 _CHANGE = 0.2
 # Unbalance in ⟨f_n⟩ up to which a grain is balanced.
 _BALANCED = 1e-6
-# Steps of interior points after which another method is tried: they take 10 to 40.
+# Interior-point steps after which another method is tried; usually 10 to 40 are enough.
 _ITERATIONS = 500
-# Findings of one kind that are listed in the report.
+# Findings of one kind listed in the report.
 _LISTED = 10
 
 
 @notebook.brief
 class Photoelastic(NamedTuple):
-    """A packing with measured forces; contacts: those listed, candidates, those of walls."""
+    """A packing with measured forces; contacts: listed, candidates, then walls."""
 
-    packing: Packing  # its own network is the likeliest one; loads are NaN where balance is open
+    packing: Packing  # its own network is the likeliest one; loads are NaN if balance is open
     measured: Floats  # (N_c, 2) f_n, f_t as listed, force; NaN for candidates
     sigma: Floats  # (N_c, 2) their standard errors
     added: Mask  # (N_c,) mask of contacts that were not listed
-    left_open: Integers  # (k,) grains that no admissible forces balance, walls apart
+    left_open: Integers  # (k,) grains that no admissible forces balance, except at walls
     at_wall: Mask  # (N,) mask of grains at walls, and of the walls themselves
-    ids: Floats  # (N,) their names in the files; −1, −2, … for the walls
+    ids: Floats  # (N,) their ids in the files; −1, −2, … for the walls
     walls: tuple[str, ...]  # names of the walls, which are the last bodies of the packing
-    findings: list[Finding]  # of repair.Finding: what was mended, and where
-    report: dict[str, Any]  # what was found and what was done, in plain numbers and words
+    findings: list[Finding]  # repairs, and their places
+    report: dict[str, Any]  # findings and actions, in plain numbers and words
 
     def _repr_html_(self) -> str:
-        """The import as notebooks show it."""
+        """The import as displayed in notebooks."""
         lines = {name.replace("_", " "): value for name, value in self.report.items()}
         return notebook.table("Photoelastic frame", lines)
 
@@ -75,8 +75,8 @@ def open_frames(
 ) -> Frames:
     """Frames to read: `frames` (their numbers) and `listing(frame)`.
 
-    From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; a frame that is one
-    already (`synthetic_frame`) is taken as it is. columns: of text files, as for `read_frames`.
+    From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; existing frames
+    (`synthetic_frame`) are returned unchanged. columns: of text files, as for `read_frames`.
     """
     if columns and (adjacency is None or hasattr(positions, "listing")):
         raise InputError("columns are named in two text files, positions and adjacency, only")
@@ -104,29 +104,29 @@ def read_pegs(
     wall_forces: Mapping[str, Sequence[float]] | None = None,
     most_grains: int | None = None,
 ) -> Photoelastic:
-    """A Photoelastic of one frame, from files or open files of positions and contacts.
+    """A Photoelastic of one frame, from files of positions and contacts (paths or open files).
 
-    Without adjacency, positions is a *_solved.mat of PeGS 2, or frames that `open_frames` has read.
-    frame: its number, by default the last one that both files have. scale: factor on the radii as
-    listed. reach: largest gap between the disks of a candidate, in mean radii (0: no candidates).
-    error: standard error of a measured component, force; by default the one that makes χ² equal to
-    its degrees of freedom; half the difference of what was listed twice is added in quadrature.
-    reverse: take f_t with the other sign (programs differ). repair: mend what is wrong by itself,
-    up to a tenth of the data (or the part that is given); False: the first thing wrong raises.
-    most_grains: how many are taken. columns: {name here: header or number in the files}, such as
-    {"r": "diameter", "fn": "5"}, of columns that are not recognised.
+    Without adjacency, positions is a *_solved.mat of PeGS 2, or frames from `open_frames`. frame:
+    its number, by default the last one in both files. scale: factor on the listed radii. reach:
+    largest gap between the disks of a candidate, in mean radii (0: no candidates). error: standard
+    error of a measured component, force; by default the one that makes χ² equal to its degrees of
+    freedom; half the difference between two measurements of a contact is added in quadrature.
+    reverse: change the sign of f_t (programs differ). repair: repair errors in up to a tenth of the
+    data (or in the given fraction); False: the first error raises. most_grains: largest number of
+    grains. columns: {name here: header or number in the files}, such as {"r": "diameter", "fn":
+    "5"}, for columns that are not recognised.
 
-    walls: "open" (the balance of grains at walls is not asked for), "box", "annulus", "circle" or
-    "auto" (which of them fits), found from the grains at walls or with numbers
-    (`walls.read_outline`). Grains at walls are flagged in the files. flag: "ignore" for those at
-    the boundary of the frame in their place, which are taken, too, where nearly all grains are
-    flagged; a note in the report says so. By default contacts with
-    walls count where the solver lists their directions. wall_forces: {"right": (f_x, f_y, σ)},
-    forces of the grains on straight walls, measured by load cells.
+    walls: "open" (the balance of grains at walls is not required), "box", "annulus", "circle" or
+    "auto" (the best fit), found from the grains at walls or given with numbers
+    (`walls.read_outline`). Grains at walls are flagged in the files. flag: "ignore" uses the grains
+    at the boundary of the frame instead, which are also used if nearly all grains are flagged; a
+    note in the report says so. By default contacts with walls count if the solver lists their
+    directions. wall_forces: {"right": (f_x, f_y, σ)}, forces of the grains on straight walls,
+    measured by load cells.
 
-    The report is an account: what was mended, by kind; how many inner grains cannot be balanced on
-    the listed contacts alone and with the candidates, and by how much in sum, in mean measured
-    normal forces; and what came of it.
+    The report gives the repairs, by kind; how many inner grains cannot be balanced on the listed
+    contacts alone and with the candidates, with their total unbalance in mean measured normal
+    forces; and the result.
 
     Raises InputError naming file and line.
     """
@@ -245,7 +245,7 @@ def read_pegs(
 
 
 def _told(account: Account) -> list[str]:
-    """What was found of each kind, in lines of words, the first ones of many."""
+    """The findings of each kind, in lines of words, only the first ones of many."""
     lines = []
     for kind, (words, *_) in KINDS.items():
         found = account.of(kind)
@@ -260,17 +260,17 @@ class _Listed(NamedTuple):
     """Contacts between two grains, each once."""
 
     pairs: Integers  # (k, 2) grains, the first before the second
-    forces: Floats  # (k, 2) mean of what is listed; NaN where that was no measurement
-    spread: Floats  # (k, 2) half of the largest difference
-    factor: Floats  # (k,) variance of the mean, in that of a usual line
+    forces: Floats  # (k, 2) mean of the listed forces; NaN if not measured
+    spread: Floats  # (k, 2) half the largest difference
+    factor: Floats  # (k,) variance of the mean, relative to a usual line
     twice: int
     unequal: int  # listed twice, with different forces
 
 
 def _listed(listing: Listing, rows: Integers) -> _Listed:
-    """The _Listed of a listing that was repaired; rows (k, 2) of its ends."""
+    """The _Listed of a repaired listing; rows (k, 2) of its ends."""
     inner = np.all(rows >= 0, axis=1)
-    # f_t is that of n and t turned together: it keeps its sign when i and j change places.
+    # f_t has the sign of n and t turned together, which stays the same when i and j are swapped.
     pairs, which = np.unique(np.sort(rows[inner]), axis=0, return_inverse=True)
     which, values = which.ravel(), listing.forces[inner]
     good = np.isfinite(values[:, 0])
@@ -300,7 +300,7 @@ def _listed(listing: Listing, rows: Integers) -> _Listed:
 
 
 def _candidates(x: Floats, r: Floats, listed: _Listed, left_open: Mask, reach: float) -> Integers:
-    """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them to be balanced."""
+    """Pairs (k, 2) that are not listed, with a gap up to `reach`, at least one to be balanced."""
     far = 2 * r.max() + reach * r.mean()
     pairs = cKDTree(x).query_pairs(far, output_type="ndarray") if reach else np.zeros((0, 2), int)
     pairs = np.sort(pairs.astype(np.int64))
@@ -319,9 +319,9 @@ def _packing(
     mu: float,
     walls: Bodies | None = None,
 ) -> Packing:
-    """The packing of listed and candidate contacts, and those with walls; forces as listed, else 0.
+    """The packing of listed, candidate and wall contacts; forces as listed, otherwise 0.
 
-    Contact points lie midway between the disks, whose radii are not known well.
+    Contact points are midway between the disks, whose radii are not known accurately.
     """
     i, j = np.concatenate([listed.pairs, pairs]).T
     branch = x[j] - x[i]
@@ -343,7 +343,7 @@ def _packing(
 def _measurement(
     listed: _Listed, candidates: int, walls: Bodies | None
 ) -> tuple[Floats, Floats, Floats, Mask]:
-    """Measured forces (N_c, 2), errors that are known, factors of the variance, what was added."""
+    """Measured forces (N_c, 2), known errors, variance factors, and a mask of added contacts."""
     nothing = np.full((candidates, 2), np.nan)
     measured, factor = [listed.forces, nothing], [listed.factor, np.ones(candidates)]
     sigma = [np.full_like(listed.forces, np.nan), nothing]
@@ -362,9 +362,9 @@ def _measurement(
 
 
 def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
-    """(N,) what of each grain's balance no admissible forces near the measured ones can meet.
+    """(N,) unbalance of each grain that no admissible forces near the measured ones can remove.
 
-    By the least Σ |unbalance| + _CHANGE Σ |f − m|, in units of `unit`: sums of absolute values
+    From the least Σ |unbalance| + _CHANGE Σ |f − m|, in units of `unit`: sums of absolute values
     leave few grains unbalanced.
     """
     S = ensemble(packing, prune=False)
@@ -378,7 +378,7 @@ def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
     slack = sparse.identity(rows + len(seen))
     cost = np.concatenate([np.ones(rows), np.full(len(seen), _CHANGE)])
     right = np.concatenate([np.zeros(rows), m[seen]])
-    # Five times as fast as the simplex method here; its crossover ends in a vertex as well.
+    # Five times as fast as the simplex method here; its crossover also ends in a vertex.
     model = highs.standard_form(sparse.hstack([both, slack, -slack]), right, solver="ipm")
     model.setOptionValue("ipm_iteration_limit", _ITERATIONS)
     highs.set_cost(model, np.concatenate([np.zeros(columns), cost, cost]))
@@ -400,12 +400,12 @@ def _inferred(
     error: float | None,
     unit: float,
 ) -> tuple[Likeliest, Floats]:
-    """The Likeliest network, and σ (N_c, 2): that of load cells as given, else of the factors."""
+    """The Likeliest network, and σ (N_c, 2): as given for load cells, else from the factors."""
     S = ensemble(packing, prune=False)
     relative = np.sqrt(factor)[:, None] * np.ones(2)
     own = np.isnan(sigma)
     if error is None:
-        # With one σ for all, the network does not depend on it, and χ² σ² is what is left over.
+        # With one σ for all, the network does not depend on it, and χ² σ² is the residual.
         best = likeliest(S, np.where(own, m, np.nan), unit * relative)
         error = unit * np.sqrt(max(best.chi_square, _BALANCED) / max(best.freedom, 1))
     sigma = np.where(own, positive(error, "error") * relative, sigma)

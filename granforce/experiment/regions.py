@@ -1,4 +1,4 @@
-"""Stresses in the parts of a frame."""
+"""Stresses in parts of a frame."""
 
 from typing import Any
 
@@ -8,15 +8,15 @@ from granforce.packing.importers.geometry import vectors
 from granforce.records import Contacts
 from granforce.types import Floats, Integers
 
-# Parts of a side of the frame in which the stress is reported.
+# Parts per side of the frame in which the stress is reported.
 REGIONS = 3
 
 
 def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) -> Floats:
     """Stresses (…, 9, 3) xx, yy, xy in 3 × 3 parts of the frame, of forces (…, N_c, 2).
 
-    σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point lies in a part of the area A; of a contact
-    with a wall, ℓ ends at the wall. The first `grains` of the centres x are grains.
+    σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point is in a part of area A; for a contact with
+    a wall, ℓ ends at the wall. The first `grains` of the centres x are grains.
     """
     arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
     at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
@@ -31,7 +31,7 @@ def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) 
 
 
 def regions(at: Floats, x: Floats) -> tuple[Integers, Floats]:
-    """Parts (k,) of the frame in which points (k, 2) lie, column by column, and a part's sides.
+    """Parts (k,) of the frame that contain points (k, 2), column by column, and a part's sides.
 
     x (N, 2): centres of the grains.
     """

@@ -1,16 +1,16 @@
-"""Error bars of inferred forces by measuring again: for networks that dynamics made.
+"""Error bars of inferred forces by repeated measurement, for networks created by dynamics.
 
-`infer` weighs all of S alike before a measurement speaks. Networks that come about by dynamics are
-not of that kind: some of their contacts slide or carry nothing, so that they lie on walls of S,
-where hardly any of its volume is, and half as many of their forces as should be lie within one
-standard error. So nothing is said about them here. The likeliest network is measured again, with
+`infer` gives all of S equal weight before the measurement. Networks created by dynamics are
+different: some of their contacts slide or carry no force, so that they lie on walls of S, which
+contain hardly any of its volume, and only half as many of their forces as expected lie within one
+standard error. So nothing is assumed about them here. The likeliest network is measured again, with
 new errors,
 
     m' = f + σ ε,   ε normal,
 
 and the likeliest network of m' is one draw (the parametric bootstrap: Efron, Tibshirani, An
-Introduction to the Bootstrap, 1993). It lies on walls as often as networks nearest to something do.
-What was not measured counts as 0 with an error of `unmeasured` ⟨f_n⟩, in either measurement.
+Introduction to the Bootstrap, 1993). It lies on walls as often as nearest networks do. Unmeasured
+components count as 0 with an error of `unmeasured` ⟨f_n⟩, in either measurement.
 """
 
 import time
@@ -28,28 +28,27 @@ from granforce.records import random_seed, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
 
-# Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
+# Standard error of unmeasured forces beforehand, in ⟨f_n⟩.
 UNMEASURED = 2.0
 
 
 @notebook.brief
 class Remeasured(Inference):
-    """An Inference whose draws tell how far the likeliest network is from the truth.
+    """An Inference whose draws estimate the error of the likeliest network.
 
-    Of networks made by dynamics 68 % of the forces lie within one standard error of it
-    (data/README.md has how nearly).
+    For networks created by dynamics 68 % of the forces lie within one standard error of it.
     """
 
     __slots__ = ()
 
     @property
     def mean(self) -> Floats:
-        """(N_c, 2) the likeliest network itself, about which the errors are told, force."""
+        """(N_c, 2) the likeliest network itself, to which the errors refer, force."""
         return self.forces
 
     @property
     def error(self) -> Floats:
-        """(N_c, 2) standard error of every force: root mean square of draws less that."""
+        """(N_c, 2) standard error of every force: root mean square of draws less the network."""
         return np.sqrt(np.mean((self.drawn.flat - self.forces) ** 2, axis=0))
 
 
@@ -68,13 +67,13 @@ def remeasured(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Remeasured:
-    """The network with the least Σ ((f − m)/σ)², and what would be found if measured again.
+    """The network with the least Σ ((f − m)/σ)², with error bars from repeated measurement.
 
     A Remeasured, with the same arguments as `infer`; its draws are independent of each other (their
     mixing is not diagnosed: NaN) and need no set-up: one contact program each, eight at a time.
-    workers: threads, which change nothing in the result.
+    workers: threads, which do not change the result.
 
-    Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
+    Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
@@ -82,7 +81,7 @@ def remeasured(
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
     found = _again(ensemble, best.forces, width, *numbers, seed, progress)
-    # Independent draws: there is nothing to mix, and nothing is said of it.
+    # The draws are independent, so mixing is not diagnosed.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
     draws = judged(ensemble, found, worth, True, counts, 0.0, time.perf_counter() - ready)
@@ -99,7 +98,7 @@ def _again(
     seed: int,
     progress: Progress | None,
 ) -> Floats:
-    """Networks (chains, k, N_c, 2) of the network measured again, at least `states` in all."""
+    """Networks (chains, k, N_c, 2) from repeated measurements, at least `states` in all."""
     each = -(-states // chains)
     streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(chains))
     errors = np.stack([rng.standard_normal((each, *s.shape)) for rng in streams])

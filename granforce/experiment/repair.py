@@ -1,8 +1,8 @@
-"""What is wrong with a photoelastic frame, mended where it can be, and an account of it.
+"""Errors in a photoelastic frame, their repair, and a record of them.
 
-Each step takes a Listing, notes what it finds, and gives the Listing without it. Lines that cannot
-be are left out; forces that cannot be are taken as not measured. Beyond a tenth of the grains or of
-the contacts nothing is mended any more: then the files do not belong together, or a unit is wrong.
+Each step takes a Listing, records errors, and returns a Listing without them. Invalid lines are
+dropped; invalid forces count as not measured. If more than a tenth of the grains or of the contacts
+is affected, nothing is repaired: then the files do not belong together, or a unit is wrong.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
 from granforce.records import InputError
 from granforce.types import Floats, Integers
 
-# Kind of finding → what it is called, whether it is of grains (0) or contacts (1), and how much of
-# the data it spoils: 1 what is left out or not measured any more, 0 what is only told.
+# Kind of finding → its description, whether it concerns grains (0) or contacts (1), and whether the
+# data are dropped or count as not measured (1) or the finding is only reported (0).
 KINDS = {
     "unreadable_grains": (
         "grains with a field that is not a finite number, or without a radius",
@@ -32,42 +32,42 @@ KINDS = {
     "negative_normal_forces": ("contacts that pull, taken as not measured", 1, 1),
     "beyond_friction": ("measured forces beyond the friction limit at this μ, not changed", 1, 0),
 }
-# Disks may overlap by this part of the smaller radius before one of them must be false.
+# Overlap, as a fraction of the smaller radius, beyond which one of two disks must be false.
 OVERLAP = 0.5
-# Largest gap of two grains that may touch, in mean radii: centres and radii are known to some
-# tenths of a radius only.
+# Largest gap of two grains that may touch, in mean radii: centres and radii are known only to some
+# tenths of a radius.
 FAR = 1.0
-# Part of the data up to which it is mended, if not told otherwise.
+# Largest fraction of the data to repair, by default.
 MOST = 0.1
-# Two detections are of one grain where centres are nearer than this part of the smaller radius and
-# radii differ by less than that part.
+# Two detections are the same grain if centres are closer than the first fraction of the smaller
+# radius and radii differ by less than the second.
 _SAME = 0.5, 0.3
-# Gaps fit up to this many mean radii, and radii are of one size within this part.
+# Gaps fit up to this many mean radii, and radii within this fraction are of one size.
 _FIT, _SIZE = 0.5, 0.05
-# A force that is so many times the usual one was not measured: digits too many, an exponent lost.
+# A force this many times the usual one was not measured: extra digits, or a lost exponent.
 HUGE = 1e6
-# A force at the edge of its cone lies beyond it by no more than this part.
+# A force at the edge of its cone exceeds it by no more than this fraction.
 _ROUNDING = 1e-9
 
 
 class Finding(NamedTuple):
-    """One thing that was wrong."""
+    """One error."""
 
     kind: str  # one of KINDS
     text: str  # in words, with file and line
-    x: float  # where it is, NaN if that is not known
+    x: float  # its place, NaN if unknown
     y: float
 
 
 class Account(NamedTuple):
-    """What was found in a frame, in the order in which it was looked for."""
+    """The findings in a frame, in the order of the checks."""
 
     findings: list[Finding]
-    strict: bool  # the first thing to mend is an error
-    most: float  # part of grains and of contacts that may be mended
+    strict: bool  # whether the first finding is raised as an error
+    most: float  # largest fraction of grains and of contacts to repair
 
     def note(self, kind: str, texts: Sequence[str], places: Floats) -> None:
-        """Findings of one kind: texts, and where (k, 2). InputError where nothing may be mended."""
+        """Record findings of one kind: texts and places (k, 2). InputError if `strict`."""
         if self.strict and texts and KINDS[kind][2] and kind != "negative_normal_forces":
             raise InputError(f"{texts[0]}; correct or remove the line, or read it with repair")
         for text, (x, y) in zip(texts, places, strict=True):
@@ -79,11 +79,11 @@ class Account(NamedTuple):
 
     @property
     def counts(self) -> dict[str, int]:
-        """{kind: how many}, of all kinds."""
+        """{kind: number of findings}, of all kinds."""
         return {kind: len(self.of(kind)) for kind in KINDS}
 
     def check(self, grains: int, contacts: int) -> None:
-        """InputError where more was mended than may be, of so many grains and contacts."""
+        """InputError if too many of these grains and contacts were repaired."""
         for which, (count, what) in enumerate(((grains, "grains"), (contacts, "contacts"))):
             spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
             if len(spoilt) > self.most * count and not self.strict:
@@ -100,10 +100,10 @@ class Account(NamedTuple):
 
 
 def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing, Account, str]:
-    """The Listing, mended, each contact between two grains that are there or with a wall.
+    """The repaired Listing: each contact is between two existing grains or with a wall.
 
-    repair: True, False (the first error is raised), or the part of the data that may be mended.
-    Returns it with the Account and with what was done about names, in words ("" for nothing).
+    repair: True, False (the first error is raised), or the largest fraction of the data to repair.
+    Returns it with the Account and a description of any change of ids ("" if none).
     """
     most = MOST if repair is True else float(repair)
     if not 0 <= most <= 1:
@@ -129,7 +129,7 @@ def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing,
 
 
 def rows_of(listing: Listing) -> Integers:
-    """Rows (k, 2) of the grains that contacts name; −1 for a wall, −2 for one that is not there."""
+    """Rows (k, 2) of the grains in contacts; −1 for a wall, −2 for a missing grain."""
     order = np.argsort(listing.ids, kind="stable")
     place = np.searchsorted(listing.ids, listing.ends, sorter=order)
     rows = order[np.minimum(place, len(order) - 1)]
@@ -138,7 +138,7 @@ def rows_of(listing: Listing) -> Integers:
 
 
 def gaps_of(listing: Listing, rows: Integers) -> Floats:
-    """Gaps (k,) of the disks that contacts join; NaN where one is a wall or not there."""
+    """Gaps (k,) of the disks joined by contacts; NaN if one is a wall or missing."""
     there = np.all(rows >= 0, axis=1)
     i, j = np.where(there[:, None], rows, 0).T
     gap = np.hypot(*(listing.x[j] - listing.x[i]).T) - listing.r[i] - listing.r[j]
@@ -146,7 +146,7 @@ def gaps_of(listing: Listing, rows: Integers) -> Floats:
 
 
 def _fitting(listing: Listing) -> float:
-    """Part of the contacts between grains that join grains that are there and near."""
+    """Fraction of the contacts between grains that join existing, close grains."""
     inner = np.all(listing.ends >= 0, axis=1)
     if not inner.any():
         return 1.0
@@ -160,10 +160,10 @@ def _mean_radius(listing: Listing) -> float:
 
 
 def _named(listing: Listing, account: Account) -> tuple[Listing, str]:
-    """The listing with names under which contacts join neighbours, and what was done for it.
+    """The listing with ids under which contacts join neighbours, and a description of the change.
 
-    Where the ids of one file were given anew (by tracking, say), contacts may still count the
-    grains of the frame in some order: that order is found by whether neighbours are joined.
+    If the ids of one file were reassigned (by tracking, say), contacts may still count the grains
+    of the frame in some order; the order is accepted if contacts then join neighbours.
     """
     needed = 1 - account.most
     share = _fitting(listing)
@@ -192,7 +192,7 @@ def _named(listing: Listing, account: Account) -> tuple[Listing, str]:
 
 
 def _strangers(listing: Listing, share: float) -> str:
-    """Why names and places do not belong together, and what to do."""
+    """Why ids and positions do not belong together, and what to do."""
     rows = rows_of(listing)
     gap, radius = gaps_of(listing, rows), _mean_radius(listing)
     absent = np.flatnonzero((rows == -2).any(axis=1))
@@ -233,7 +233,7 @@ def _without_unreadable_grains(listing: Listing, account: Account) -> Listing:
 
 
 def _without_doubled_names(listing: Listing, account: Account) -> Listing:
-    """Of lines of one name, the first."""
+    """Keep the first of several lines with the same id."""
     _, first, which = np.unique(listing.ids, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[which] != np.arange(len(which)))
     texts = [
@@ -246,7 +246,7 @@ def _without_doubled_names(listing: Listing, account: Account) -> Listing:
 
 
 def _without_false_detections(listing: Listing, account: Account) -> Listing:
-    """Of two disks in one place, the one that fits more contacts and sizes."""
+    """Of two disks in one place, keep the one that fits more contacts and sizes."""
     x, r, ids = listing.x, listing.r, listing.ids
     if not len(r):
         return listing
@@ -279,8 +279,10 @@ def _without_false_detections(listing: Listing, account: Account) -> Listing:
 
 
 def _fits(listing: Listing) -> Floats:
-    """(N,) how well each grain fits: contacts with a usual gap count 1, others down to −1, and an
-    unusual radius takes off up to 2."""
+    """(N,) fit of each grain: contacts with a usual gap count 1, others down to −1.
+
+    An unusual radius subtracts up to 2.
+    """
     rows = rows_of(listing)
     gap = gaps_of(listing, rows)
     here = np.isfinite(gap)
@@ -297,7 +299,7 @@ def _fits(listing: Listing) -> Floats:
 
 
 def _without_unreadable_contacts(listing: Listing, account: Account) -> Listing:
-    """Lines without two names go; forces that are no numbers are not measured."""
+    """Drop lines without two ids; forces that are not numbers count as not measured."""
     named = np.all(np.isfinite(listing.ends), axis=1)
     finite = np.all(np.isfinite(listing.forces), axis=1)
     size = np.abs(np.where(finite[:, None], listing.forces, 0.0)).max(axis=1, initial=0.0)
@@ -352,7 +354,7 @@ def _without_long_contacts(listing: Listing, account: Account) -> Listing:
 
 
 def _without_tension(listing: Listing, account: Account) -> Listing:
-    """Contacts of grains without glue only press: a negative normal force is a bad fit."""
+    """Dry grains only press: a negative normal force is a bad fit and counts as not measured."""
     bad = np.flatnonzero(listing.forces[:, 0] < 0)
     texts = [f"{listing.place(1, k)}: f_n = {listing.forces[k, 0]:.3g} pulls" for k in bad]
     account.note("negative_normal_forces", texts, _places(listing, bad))
@@ -377,7 +379,7 @@ def _note_friction(listing: Listing, account: Account, mu: float) -> None:
 
 
 def _places(listing: Listing, contacts: Integers) -> Floats:
-    """(k, 2) where contacts are: between their grains, or at the one that is there."""
+    """(k, 2) places of contacts: between their grains, or at the only existing one."""
     rows = rows_of(listing)[contacts]
     there = rows >= 0
     x = np.where(there[..., None], listing.x[np.where(there, rows, 0)], np.nan)

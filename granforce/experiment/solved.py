@@ -1,16 +1,16 @@
-"""Frames as PeGS 2 leaves them: *_solved.mat, a MATLAB struct array `particle`.
+"""Frames written by PeGS 2: *_solved.mat, a MATLAB struct array `particle`.
 
-Fields as its module adjacencyMatrix documents them (PeGS 2, Lee et al., arXiv:2507.01933,
-github.com/photoelasticity): id; x, y, r in pixels, rm in metres; edge (not 0 at a wall); and, of
+Fields as documented in its module adjacencyMatrix (PeGS 2, Lee et al., arXiv:2507.01933,
+github.com/photoelasticity): id; x, y, r in pixels, rm in metres; edge (not 0 at a wall); and, for
 each contact, neighbours (ids; −1: a wall), forces F, alphas α (0: normal, ±π/2: tangential), betas
 β (the azimuth of the contact, in the axes of the image); fitError, the sum of the squared
-differences of fitted and seen brightness. So
+differences of fitted and observed brightness. So
 
     f_n = F cos α,   f_t = F sin α,   n = (cos β, sin β),
 
-and each contact between two grains is measured twice, from either side. The variance of a fit's
-forces goes with that of its brightness, which is fitError over the pixels of the disk: σ² ∝
-fitError/r².
+and each contact between two grains is measured twice, once from each side. The variance of a fit's
+forces is proportional to that of its brightness, which is fitError over the pixels of the disk: σ²
+∝ fitError/r².
 """
 
 import io
@@ -31,13 +31,13 @@ from granforce.types import Floats
 
 _NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
 _FIELDS = (*_NEEDED, "betas", "fitError", "edge")
-# A fit counts at most so many times as much, or as little, as the usual one.
+# Largest factor by which the weight of a fit may differ from the usual one.
 _WEIGHTS = 100.0
 _LARGEST_FILE = 10**9
 
 
 class SolvedFrame(NamedTuple):
-    """One frame, ready to be taken."""
+    """One frame, already read."""
 
     frames: Floats  # (1,) its number
     only: Listing
@@ -52,9 +52,9 @@ class SolvedFrame(NamedTuple):
 
 
 def read_solved(source: Source) -> SolvedFrame:
-    """The SolvedFrame in a *_solved.mat (a path or an open binary file); its number by its name.
+    """The SolvedFrame in a *_solved.mat (a path or an open binary file), numbered by its name.
 
-    Raises InputError for what is no such file.
+    Raises InputError for other files.
     """
     name, content = _content(source)
     hdf5 = content[:8] == b"\x89HDF\r\n\x1a\n" or content[:15] == b"MATLAB 7.3 MAT-"
@@ -68,7 +68,7 @@ def read_solved(source: Source) -> SolvedFrame:
     except InputError:
         raise
     except Exception:
-        # A damaged file fails anywhere: in zlib, in the tags, in shapes that do not fit.
+        # Reading a damaged file may fail in zlib, in the tags, or on inconsistent shapes.
         raise InputError(
             f"{wanted} that is damaged; save it again in MATLAB with save(…, '-v7')"
             if hdf5
@@ -110,7 +110,7 @@ def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
             return []
         group = file["particle"]
         fields = {field: _own(group, field) for field in set(_FIELDS) & set(group)}
-        # A single particle is kept without references.
+        # A single particle is stored without references.
         stored = {
             field: [file[one] for one in np.ravel(_value(values))]
             if values.dtype == object
@@ -127,16 +127,16 @@ def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
 
 
 def _own(group: Any, name: str) -> Any:
-    """What the group holds by this name; ValueError for a link to another file."""
+    """The member of the group with this name; ValueError for a link to another file."""
     if hasattr(group.get(name, getlink=True), "filename"):
         raise ValueError("link")
     return group[name]
 
 
 def _value(dataset: Any) -> npt.NDArray[Any]:
-    """A dataset as MATLAB holds it: empty arrays are kept as their shape.
+    """The value of a dataset; MATLAB stores empty arrays as their shape.
 
-    ValueError for one whose data lie in other files, which are not the sender's to show.
+    ValueError if its data are in other files, which could be private files of this machine.
     """
     if dataset.external or dataset.is_virtual or dataset.nbytes > _LARGEST_FILE:
         raise ValueError("dataset")
@@ -147,7 +147,7 @@ def _value(dataset: Any) -> npt.NDArray[Any]:
 
 
 def _columns(particles: Sequence[Mapping[str, Any]]) -> dict[str, list[Floats]] | None:
-    """{field: per particle, a flat float array}, or None where a needed field is missing."""
+    """{field: per particle, a flat float array}, or None if a required field is missing."""
     if not particles:
         return None
     there = [field for field in _FIELDS if all(field in one for one in particles)]
@@ -157,7 +157,7 @@ def _columns(particles: Sequence[Mapping[str, Any]]) -> dict[str, list[Floats]] 
 
 
 def _numbers(value: Any) -> Floats:
-    """A flat array; what is no finite number is NaN."""
+    """A flat array; entries that are not finite numbers are NaN."""
     flat = np.real(np.ravel(np.asarray(value)))
     if flat.dtype.kind not in "iufb":
         return np.full(flat.shape, np.nan)
@@ -166,7 +166,7 @@ def _numbers(value: Any) -> Floats:
 
 
 def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> Listing:
-    """The Listing: a line for each contact of each particle."""
+    """The Listing, with a line for each contact of each particle."""
     single = {field: _first(columns, field) for field in ("id", "x", "y", "r", "edge", "fitError")}
     count = len(columns["id"])
     ends, forces, beta, owner = [], [], [], []
@@ -177,7 +177,7 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
         if not size:
             continue
         force, alpha, azimuth = (
-            # Fields of other lengths belong to no contact.
+            # Fields of another length cannot be assigned to contacts.
             values if len(values) == size else np.full(size, np.nan)
             for values in (columns["forces"][k], columns["alphas"][k], angles[k])
         )
@@ -212,7 +212,7 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
 
 
 def _first(columns: dict[str, list[Floats]], field: str) -> Floats:
-    """The one number of each particle, NaN where there is none."""
+    """The one number of each particle, or NaN."""
     return (
         np.array([one[0] if len(one) else np.nan for one in columns[field]])
         if (field in columns)

@@ -1,4 +1,4 @@
-"""Photoelastic frames made from packings whose forces are known, with the errors of real ones."""
+"""Photoelastic frames made from packings with known forces, with the errors of real frames."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -18,10 +18,10 @@ from granforce.types import Floats, Integers
 
 @notebook.brief
 class SyntheticFrame(NamedTuple):
-    """A frame as files would hold it, and the truth; `gf.read_pegs` takes it in place of files."""
+    """A frame as if read from files, and the true forces; `gf.read_pegs` accepts it."""
 
     only: Listing
-    pairs: Integers  # (k, 2) names of the grains that touch inside the frame
+    pairs: Integers  # (k, 2) ids of the grains that touch inside the frame
     forces: Floats  # (k, 2) their true f_n, f_t
     unit: float  # mean true normal force
 
@@ -37,8 +37,10 @@ class SyntheticFrame(NamedTuple):
         return self.only
 
     def truth(self, found: Photoelastic) -> Floats:
-        """True forces (N_c, 2) of a Photoelastic's contacts: 0 of pairs that do not touch, NaN of
-        contacts with walls."""
+        """True forces (N_c, 2) of a Photoelastic's contacts.
+
+        0 for pairs that do not touch, NaN for contacts with walls.
+        """
         c, ids = found.packing.contacts, found.ids
         known = {tuple(sorted(pair)): k for k, pair in enumerate(self.pairs.tolist())}
         true = np.zeros((len(c.i), 2))
@@ -48,7 +50,7 @@ class SyntheticFrame(NamedTuple):
         return true
 
     def write(self, positions: str | Path, adjacency: str | Path) -> None:
-        """Write it as PeGS does: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n."""
+        """Write the files of PeGS: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n."""
         one, number = self.only, self.only.frame
         grains = np.column_stack([one.ids, one.x, one.r, one.flag])
         links = np.column_stack([one.ends, one.forces[:, ::-1]])
@@ -72,17 +74,17 @@ def synthetic_frame(
     number: int = 1,
     seed: int = 0,
 ) -> SyntheticFrame:
-    """A SyntheticFrame of a packing and its own forces, cut out where its box ends.
+    """A SyntheticFrame of a packing and its own forces, cut at the sides of its box.
 
-    noise: standard error of a component, in ⟨f_n⟩, different from either side of a contact. missed:
-    part of the contacts that are not listed, weak ones first: a contact of force f is missed with
-    a chance ∝ 1/(f + ⟨f_n⟩/2). false: contacts listed that are none, as a part of the true ones, of
-    the nearest other pairs, with forces of about 0.2 ⟨f_n⟩. blur: error of centres and radii, in
-    radii. walls: contacts through the sides of the box are listed as contacts with walls, with
-    their direction and force; False: grains there are flagged only. pixels: of the unit of length;
-    newton: mean normal force. number: of the frame.
+    noise: standard error of a component, in ⟨f_n⟩, independent on both sides of a contact. missed:
+    fraction of contacts that are not listed, weak ones first: a contact of force f is missed with
+    probability ∝ 1/(f + ⟨f_n⟩/2). false: listed pairs that are not contacts, as a fraction of the
+    true ones: the nearest other pairs, with forces of about 0.2 ⟨f_n⟩. blur: error of centres and
+    radii, in radii. walls: contacts through the sides of the box are listed as contacts with walls,
+    with their direction and force; False: grains there are only flagged. pixels: per unit of
+    length; newton: mean normal force. number: of the frame.
 
-    Raises InputError for sizes below 0, or beyond LARGEST_UNIT, and for a packing without forces.
+    Raises InputError for values below 0 or beyond LARGEST_UNIT, and for a packing without forces.
     """
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
         if not 0 <= value <= LARGEST_UNIT or (name == "missed" and value >= 1):
@@ -148,7 +150,7 @@ def synthetic_frame(
 
 
 def _near_pairs(packing: Packing, contacts: Contacts, count: int) -> Integers:
-    """The `count` nearest pairs inside the box that are no contacts."""
+    """The `count` nearest pairs inside the box that are not contacts."""
     pairs = cKDTree(packing.x).query_pairs(2.5 * packing.r.max(), output_type="ndarray")
     pairs = np.sort(pairs.astype(np.int64))
     touching = np.sort(np.column_stack([contacts.i, contacts.j]))

@@ -1,15 +1,15 @@
-"""Walls of a photoelastic frame: bodies that grains press on, in known directions.
+"""Walls of a photoelastic frame: bodies on which grains press, in known directions.
 
-A wall is one more body of the packing. Its contacts have lever arm 0 on its side, so that its
-torque does not count; what holds it is not known, and its balance is left open. Where a load cell
-tells the force on a straight wall, the wall is balanced, and held by one more contact in the same
-direction: the sum of the forces on the wall lies in the same cone as each of them, and is what was
-measured.
+A wall is an additional body of the packing. Its contacts have lever arm 0 on its side, so that its
+torque does not count; its support is unknown, and its balance is left open. If a load cell measures
+the force on a straight wall, the wall is balanced and held by an additional contact in the same
+direction: the sum of the forces on the wall is in the same cone as each of them, and equals the
+measured force.
 
-Directions come from the angles that a solver lists, or from the nearest side of an outline: a box,
-or an annulus (a circle where no grain is flagged −1, for the inner wall). Which grains are at walls
-is what their flags say. A flag of nearly all grains says something else: then, and without a flag,
-they are those at the boundary of the frame.
+Directions come from the angles listed by a solver, or from the nearest side of an outline: a box,
+or an annulus (a circle if no grain is flagged −1, for the inner wall). Flags mark the grains at
+walls. A flag on nearly all grains has another meaning; in that case, and without a flag, the grains
+at the boundary of the frame are used.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,25 +28,25 @@ from granforce.types import Floats, Integers, Mask
 SIDES = ("left", "right", "bottom", "top")  # least and largest x, least and largest y
 _NORMALS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
 _SHAPES = {"box": 4, "annulus": 4, "circle": 3}
-# Name of the one wall whose contacts have angles and no outline.
+# Name of the only wall if contacts have angles but no outline.
 _ANY = "wall"
-# Grains at a side lie within so many mean radii of the outermost.
+# Grains at a side are within this many mean radii of the outermost grain.
 _AT_SIDE = 1.0
-# A flag of more than this part of the grains is none of walls, unless there are fewer grains.
+# A flag on more than this fraction of the grains does not mark walls, unless there are few grains.
 _NEARLY_ALL, _FEW = 0.9, 20
-# A shape is that of the outline where grains at walls are so near to it on average, in mean radii.
+# Largest mean distance, in mean radii, of the grains at walls from an outline that fits.
 _NEAR = 0.75
 
 
 class WallOutline(NamedTuple):
-    """Walls about a frame."""
+    """Walls around a frame."""
 
     shape: str  # box: x0, x1, y0, y1; annulus: centre x, y, inner and outer radius; circle: x, y, R
     numbers: tuple[float, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What its walls are called."""
+        """The names of its walls."""
         return {"box": SIDES, "annulus": ("inner", "outer"), "circle": ("outer",)}[self.shape]
 
     def gaps(self, x: Floats, r: Floats) -> tuple[Floats, Floats]:
@@ -65,7 +65,7 @@ class WallOutline(NamedTuple):
         return np.stack(gaps, axis=1), np.stack(ways, axis=1)
 
     def place(self, wall: int, reach: float) -> Floats:
-        """Where the body of a wall is drawn: `reach` outside of its middle."""
+        """Where the body of a wall is drawn: `reach` beyond its middle."""
         if self.shape == "box":
             x0, x1, y0, y1 = self.numbers
             half = np.array([x1 - x0, y1 - y0]) / 2 + reach
@@ -81,14 +81,14 @@ class WallContacts(NamedTuple):
     grain: Integers  # (w,) int64
     wall: Integers  # (w,) int64, number of the wall
     normal: Floats  # (w, 2) from the grain to the wall
-    forces: Floats  # (w, 2) f_n, f_t as measured; NaN where they were not
+    forces: Floats  # (w, 2) f_n, f_t as measured; NaN if not measured
     factor: Floats  # (w,) of the variance
     names: tuple[str, ...]  # of the walls
     outline: WallOutline | None
 
 
 def read_outline(text: str) -> str | WallOutline:
-    """'open', 'box', 'annulus', 'circle' or 'auto' (found from the grains), or an WallOutline.
+    """'open', 'box', 'annulus', 'circle' or 'auto' (found from the grains), or a WallOutline.
 
     With its numbers, such as box:0,100,0,80 or annulus:500,500,200,450. auto: the shape that fits
     best. Raises InputError.
@@ -118,7 +118,7 @@ def _outline(shape: str, numbers: str) -> WallOutline:
 
 
 def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
-    """(name, (f_x, f_y, σ)) of 'right: fx fy sigma', the force that grains exert on a wall."""
+    """(name, (f_x, f_y, σ)) of 'right: fx fy sigma', the force of grains on a wall."""
     name, _, numbers = str(text).partition(":")
     try:
         values = tuple(float(part) for part in numbers.replace(",", " ").split())
@@ -133,9 +133,9 @@ def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
 def flagged(
     listing: Listing, flag: str | None, walls: str | WallOutline | None
 ) -> tuple[Floats, str | None]:
-    """(N,) what tells grains at walls: not 0, below 0 at an inner wall; and a note, if it is due.
+    """(N,) flags of grains at walls: not 0, and below 0 at an inner wall; and a note or None.
 
-    flag: "ignore" if those in the listing tell nothing. walls: as `read_outline` gives it, or None.
+    flag: "ignore" to ignore those in the listing. walls: as returned by `read_outline`, or None.
     Raises InputError for another flag.
     """
     if flag not in (None, "ignore"):
@@ -179,9 +179,9 @@ def wall_contacts(
     walls: str | WallOutline | None,
     reach: float,
 ) -> WallContacts | None:
-    """The WallContacts of a frame, or None where its walls stay open.
+    """The WallContacts of a frame, or None if its walls are open.
 
-    at_wall (N,): grains at walls. walls: as `read_outline` gives it, or None for angles where they
+    at_wall (N,): grains at walls. walls: as returned by `read_outline`, or None for angles if they
     are listed. reach: gap in mean radii up to which a grain at a wall touches a side.
     """
     rows = rows_of(listing)
@@ -217,7 +217,7 @@ def wall_contacts(
     m, f = np.full((len(g), 2), np.nan), np.ones(len(g))
     for k, of in enumerate(grain):
         mine = np.flatnonzero(g == of)
-        if np.isfinite(beta[k]):  # the side that the angle points to
+        if np.isfinite(beta[k]):  # the side to which the angle points
             best = mine[np.argmax(ways[g[mine], w[mine]] @ normal[k])]
         else:
             best = mine[np.argmin(gap[g[mine], w[mine]])]
@@ -228,7 +228,7 @@ def wall_contacts(
 
 
 def _occurrence(grain: Integers) -> Integers:
-    """(w,) how often the grain came before: two contacts of one grain are with two bodies."""
+    """(w,) earlier occurrences of the grain: two contacts of one grain are with two bodies."""
     order = np.argsort(grain, kind="stable")
     new = np.concatenate([[True], np.diff(grain[order]) != 0])
     first = np.maximum.accumulate(np.where(new, np.arange(len(grain)), 0))
@@ -238,7 +238,7 @@ def _occurrence(grain: Integers) -> Integers:
 
 
 def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> WallOutline:
-    """Walls of a shape that the grains at walls touch; "auto": of the one that fits best."""
+    """Walls of a shape, fitted to the grains at walls; "auto": of the shape that fits best."""
     if shape == "auto":
         return _best_fitted(x, r, at_wall, flag)
     if at_wall.sum() < 4:
@@ -294,7 +294,7 @@ def _misfit(outline: WallOutline, x: Floats, r: Floats, at_wall: Mask) -> float:
 
 
 def bad_fit(outline: WallOutline, x: Floats, r: Floats, at_wall: Mask) -> str | None:
-    """A note if the grains at walls lie far from the outline, or if there are none."""
+    """A note if the grains at walls are far from the outline, or if there are none."""
     if not at_wall.any():
         return f"walls {outline.shape}: no grain lies at these walls; check the numbers"
     off = _misfit(outline, x, r, at_wall)
@@ -308,14 +308,14 @@ def bad_fit(outline: WallOutline, x: Floats, r: Floats, at_wall: Mask) -> str | 
 
 
 class Bodies(NamedTuple):
-    """Walls as bodies after the N grains, their contacts, and what load cells measured."""
+    """Walls as bodies after the N grains, their contacts, and measurements by load cells."""
 
     x: Floats  # (b, 2)
     r: Floats  # (b,)
-    load: Floats  # (b, 3) 0 where a load cell holds the wall, else NaN
-    contacts: Contacts  # Contacts with walls, then those that load cells hold
+    load: Floats  # (b, 3) 0 if a load cell holds the wall, otherwise NaN
+    contacts: Contacts  # contacts with walls, then those held by load cells
     measured: Floats  # (w + cells, 2)
-    sigma: Floats  # (w + cells, 2) NaN, and the errors of load cells
+    sigma: Floats  # (w + cells, 2) NaN for walls, errors for load cells
     factor: Floats  # (w + cells,)
     names: tuple[str, ...]  # (b,)
 
@@ -325,7 +325,7 @@ def bodies(
 ) -> Bodies:
     """The Bodies of WallContacts; forces: {name: (f_x, f_y, σ)} of load cells.
 
-    Raises InputError for a force on a wall that is not there, or not straight.
+    Raises InputError for a force on a missing wall, or on one that is not straight.
     """
     straight = found.outline is not None and found.outline.shape == "box"
     for name in forces:

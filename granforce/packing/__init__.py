@@ -1,1 +1,1 @@
-"""Packings: how they are made, brought in from elsewhere and kept."""
+"""Packings: compaction, scenes, import, export and storage."""

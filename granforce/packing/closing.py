@@ -1,9 +1,8 @@
 """Contacts of a finished packing, and the linear programs that finish one without friction.
 
-At μ = 0 contact dynamics does not reach isostaticity: there linear programs shrink the box under
-linearised non-overlap. A box that is free in its shape strains in three ways, not one (e_x, e_y, g
-as in `box_motion`), and its networks have to carry the same pressure along x and y, and no shear
-stress.
+At μ = 0 contact dynamics does not reach isostaticity; instead linear programs shrink the box under
+linearised non-overlap. A box with a free shape has three strains instead of one (e_x, e_y, g as in
+`box_motion`), and its networks must carry the same pressure along x and y and no shear stress.
 """
 
 from typing import Any, NamedTuple
@@ -31,9 +30,9 @@ from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
-# Largest move of a grain in one of the linear programs, along each axis.
+# Largest displacement of a grain per linear program, along each axis.
 TRUST = 0.05
-# Bounds of each strain of the box and its part of the area's change, by the number of strains.
+# Bounds of each strain of the box, and its share of the change of area, by the number of strains.
 STRAINS = {
     1: ((-TRUST / 2,), (0.0,), (1.0,)),
     3: ((-TRUST / 3,) * 3, (TRUST / 3,) * 3, (0.5, 0.5, 0.0)),
@@ -41,35 +40,35 @@ STRAINS = {
 
 
 def _rates(motion: Motion) -> int:
-    """In how many ways the box may strain."""
+    """Number of strain rates of the box."""
     return motion.dilation.size
 
 
 def prescribed_of(motion: Motion) -> dict[str, Any]:
-    """What the ensemble prescribes besides the pressure, in units of it."""
+    """What the ensemble prescribes in addition to the pressure, in units of it."""
     if _rates(motion) == 1:
         return {}
     return {"prescribed": "stress", "stress": (1.0, 1.0, 0.0)}
 
 
 class Margin(NamedTuple):
-    """How clearly contacts are told from other pairs; gaps in largest radii."""
+    """How clearly contacts differ from other pairs; gaps in largest radii."""
 
     contact: float  # largest |gap| of a contact
-    other: float  # least gap of any other pair of disks; SKIN / 2 where none is that near
+    other: float  # least gap of any other pair of disks; SKIN / 2 if none is that close
 
     @property
     def certain(self) -> bool:
-        """Whether no gap lies between rounding and what is clearly apart."""
+        """Whether every gap is either rounding or clearly open."""
         return self.contact < CLOSED and self.other > TOUCHING
 
 
 @takes(Packing)
 def margin(packing: Packing) -> Margin:
-    """The Margin of a packing's contacts, by the gaps of all its pairs.
+    """The Margin of a packing's contacts, from the gaps of all its pairs.
 
-    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs are apart; soft or
-    measured disks overlap, and their contacts have no such margin.
+    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs are clearly apart;
+    soft or measured disks overlap, and their contacts have no such margin.
     """
     if not len(packing.r):
         return Margin(0.0, SKIN / 2)
@@ -84,14 +83,14 @@ def margin(packing: Packing) -> Margin:
 
 
 def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int) -> Mask:
-    """Which of the pairs i < j (P,) with their normals (P, 2) are contacts of a list."""
+    """Mask of the pairs i < j (P,) with normals (P, 2) that are contacts of a list."""
     turned = contacts.i > contacts.j
     direction = np.where(turned[:, None], -contacts.normal, contacts.normal)
     key = np.minimum(contacts.i, contacts.j) * n + np.maximum(contacts.i, contacts.j)
     order = np.argsort(key, kind="stable")
     first, last = (np.searchsorted(key[order], i * n + j, side) for side in ("left", "right"))
     found = np.zeros(len(i), bool)
-    # Two grains touch twice only through different images, whose normals differ by 60° or more.
+    # Two grains touch twice only through different images, with normals at 60° or more.
     for k in range(int((last - first).max(initial=0))):
         some = np.flatnonzero(first + k < last)
         same = direction[order[first[some] + k]]
@@ -100,7 +99,7 @@ def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int
 
 
 def _on_backbone(packing: Packing, **asked: Any) -> Packing | None:
-    """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
+    """The packing with forces on its backbone alone, balanced to rounding, or None."""
     try:
         S = ensemble(packing, **asked)
     except (NotJammedError, UndecidedError):
@@ -115,7 +114,7 @@ def packing_of(
     i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
     normal, length, _ = separations(x, motion.r, cell, i, j, shift)
     contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
-    # Overlap that contact dynamics left is closed before the packing is handed out: rigid arms.
+    # Overlap left by contact dynamics is removed from the finished packing: rigid arms.
     contacts = contacts._replace(arm_i=motion.r[i], arm_j=motion.r[j])
     return make_packing(x, motion.r, cell.box, contacts, force[touching], mu, 1.0, tilt=cell.tilt)
 
@@ -147,11 +146,11 @@ def _approach(i: Integers, j: Integers, normal: Floats, n: int) -> sparse.csc_ma
 
 
 def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Packing | None:
-    """Frictionless finish: linear programs that shrink the box until no grain can make room.
+    """Finish a frictionless packing by linear programs that shrink the box until no grain can move.
 
-    minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex
-    in the displacements, so no step makes an overlap; at the end the contacts that carry force
-    are exactly isostatic, N_c = 2M − 1.
+    minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex in
+    the displacements, so no step creates an overlap; at the end the contacts that carry force are
+    exactly isostatic, N_c = 2M − 1.
     """
     x, cell = _without_overlap(motion)
     for _ in range(60):
@@ -163,7 +162,7 @@ def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Pack
         work["linear_programs"] += 1
         x, cell = strained(x, cell, strain)
         x = x + move
-        # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
+        # Rattlers move arbitrarily to the end; only the box shows that nothing is left to do.
         if strain[:2].mean() > -1e-13:
             break
     i, j, shift = find_pairs(x, motion.r, cell, TOUCHING)
@@ -174,7 +173,7 @@ def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Pack
 
 
 def _without_overlap(motion: Motion) -> tuple[Floats, Cell]:
-    """Centres and cell, expanded until the largest overlap is gone: the programs start feasible."""
+    """Centres and cell, expanded until no disks overlap: a feasible start for the programs."""
     pairs = motion.i, motion.j, motion.shift
     _, length, gap = separations(motion.x, motion.r, cell_of(motion), *pairs)
     growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
@@ -184,13 +183,13 @@ def _without_overlap(motion: Motion) -> tuple[Floats, Cell]:
 def _shrink_program(
     i: Integers, j: Integers, normal: Floats, stretch: Floats, gap: Floats, n: int
 ) -> tuple[Floats, Floats]:
-    """Displacements (n, 2) and strain (1,) or (3,) of the box of the linear program, by HiGHS."""
+    """Displacements (n, 2) and strain (1,) or (3,) that solve the linear program, by HiGHS."""
     R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(stretch)])
-    # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
+    # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the list's reach.
     least, most, along = STRAINS[stretch.shape[1]]
     lower = np.append(np.full(2 * n, -TRUST), least)
     upper = np.append(np.full(2 * n, TRUST), most)
-    # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
+    # The duals are the contact forces: this cost makes their mean about 1, as tolerances expect.
     cost = np.append(np.zeros(2 * n), 4.0 * n * np.array(along))
     rows = -gap, np.full(len(gap), np.inf)
     model = programs.bounded(R, rows, (lower, upper), cost)

@@ -1,10 +1,10 @@
 """From a dilute gas of disks to a jammed packing at rest, at constant pressure (arXiv:0803.3566).
 
 Each time step of contact dynamics is solved by Gauss–Seidel sweeps, over- or under-relaxed, to a
-stated accuracy; steps grow longer as grains slow down. Once grains are nearly in balance the last
-phase (`settling`) brings them to rest, which a certificate shows; grains that move on are handed
-back to the dynamics. At μ = 0 contact dynamics alone does not reach isostaticity, and below 1e-4 it
-takes ever longer to come to rest: there linear programs finish (`closing`).
+given accuracy; steps grow as grains slow down. Once grains are nearly in balance the last phase
+(`settling`) brings them to rest and certifies it; if grains keep moving, the dynamics resumes. At μ
+= 0 contact dynamics alone does not reach isostaticity, and below 1e-4 it takes very long to come to
+rest; there, linear programs finish the packing (`closing`).
 """
 
 from collections.abc import Callable
@@ -40,44 +40,43 @@ from granforce.system.memory import check_memory
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
-# The last phase is tried every so many steps, once no grain's momentum changes by more than this in
-# a step, in ⟨f_n⟩.
+# The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
+# NEARLY_BALANCED in a step, in ⟨f_n⟩.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
-# Longest time step, and most sweeps in it. From SETTLED_FROM on steps of 0.1 leave wider intervals
-# than shorter ones do, by 8 % at μ = 0.3, 13 % at 0.5, half at 1; those of 0.03 and less all leave
-# the same if the last sweeps of a step settle, of which a quarter are enough, too.
+# Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
+# than shorter ones, by 8 % at μ = 0.3, 13 % at 0.5, half at 1. Steps of 0.03 and less agree if the
+# last sweeps of a step settle, and then a quarter of the sweeps is enough.
 LONGEST, SWEEPS = 0.1, 600
 SETTLED_FROM = 0.2
 LONGEST_SETTLED, SWEEPS_SETTLED = 0.03, 150
-SETTLING = 5  # one part in so many of the sweeps
-# Up to this μ a packing is finished like a frictionless one, from which its geometry differs by
-# order μ: contact dynamics takes ever longer to reach rest there.
+SETTLING = 5  # divisor: this fraction of the sweeps settles
+# Up to this μ a packing is finished like a frictionless one, as its geometry differs only by order
+# μ and contact dynamics takes very long to reach rest.
 NEARLY_FRICTIONLESS = 1e-4
-# Strain of the box per step below which frictionless grains are handed to the linear programs.
+# Strain of the box per step below which the linear programs finish a frictionless packing.
 BOX_AT_REST = 1e-6
-# Time steps begin with this part of the longest, and grow while no grain that carries moves farther
+# Time steps start at SHORTEST times the longest, and grow while no carrying grain moves farther
 # than STRIDE (in largest radii).
 SHORTEST, STRIDE = 0.1, 0.02
-# What the box may be, with the number of its strain rates.
+# Shapes of the box, with the number of strain rates.
 BOXES = {"square": 1, "isotropic": 3}
-# What is counted of a compaction besides its steps and sweeps.
+# Counters of a compaction besides its steps and sweeps.
 WORK = (
     *("list_rebuilds", "linear_programs", "certificates_tried", "implicit_steps"),
     *("linear_systems", "touching_without_force"),
 )
-# Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
-# balance.
+# Least memory per disk of a packing: the lists of pairs and one factor of its balance.
 DISK_BYTES = 2000
-# Coarsest accuracy of a step: as fast as the fastest grain, nothing has been solved.
+# Coarsest accuracy of a step: an error as fast as the fastest grain means nothing was solved.
 COARSEST = 1.0
-# Steps between two looks of whoever watches.
+# Steps between two calls of `watch`.
 WATCH_EVERY = 5
 
 
 @notebook.brief
 class Glimpse(NamedTuple):
-    """A packing while it is compressed, as `watch` of `pack` gets it; all arrays are its own."""
+    """A packing while it is compressed, as passed to `watch` of `pack`; all arrays are copies."""
 
     step: int
     x: Floats  # (N, 2) centres inside the box, length
@@ -89,11 +88,11 @@ class Glimpse(NamedTuple):
     forces: Floats  # (k, 2) f_n, f_t, force
     packing_fraction: float
     unbalance: float  # largest change of a grain's momentum per step, ⟨f_n⟩
-    tilt: float = 0.0  # of the cell, length
+    tilt: float = 0.0  # tilt of the cell, length
 
     @property
     def state(self) -> str:
-        """How dense it is, and how far from rest, in words."""
+        """Density and distance from rest, in words."""
         return _state(self.packing_fraction, self.unbalance)
 
 
@@ -119,19 +118,18 @@ def pack(
 
     radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii.
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
-    radius, P0 and the mass density; dt is the longest step, taken while no grain that carries moves
-    farther than STRIDE. accuracy: largest velocity by which a step may breach the laws of Signorini
-    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step. dt and
-    sweeps by default: `default_steps`. box: "square", or "isotropic", whose sides and tilt follow
-    the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear too.
-    progress(steps done, None) is called now and then, as nobody knows how many it takes, and
-    watch(Glimpse) at least every WATCH_EVERY steps; neither changes a bit of the result. cancel()
-    returning True raises Cancelled.
+    radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
+    farther than STRIDE. accuracy: largest violation of the laws of Signorini and Coulomb after a
+    step, as a velocity relative to the fastest carrying grain; sweeps: most sweeps per step. For
+    the defaults of dt and sweeps see `default_steps`. box: "square", or "isotropic", whose sides
+    and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear too.
+    progress(steps done, None) is called repeatedly, as the total is unknown, and watch(Glimpse) at
+    least every WATCH_EVERY steps; neither changes a bit of the result. cancel() returning True
+    raises Cancelled.
 
     Returns a Packing whose forces balance to BALANCED ⟨f_n⟩, whose overlaps are below OVERLAP, and
-    whose contacts are certain: see `margin`, which `info` holds, with the part of steps that ended
+    whose contacts are certain: `info` contains their `margin`, and the fraction of steps that ended
     before they were accurate (`unfinished_steps`).
-    Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
     """
     mu = friction(mu)
     pressure = moderate(pressure, "pressure")
@@ -190,7 +188,7 @@ def pack(
 
 
 def number_of_disks(n: int) -> int:
-    """n as an int; InputError for fewer than 3, and for more than fit into memory."""
+    """n as an int; InputError for fewer than 3, or for more than fit into memory."""
     n = whole(n, "the number of disks", most=None)
     if n < 3:
         raise InputError(f"a packing needs at least 3 disks, got {n!s:.40}")
@@ -204,7 +202,7 @@ def _state(packing_fraction: float, unbalance: float) -> str:
 
 
 def _check_neighbours(packing: Packing) -> None:
-    """NotJammedError where two disks touch more than once: they are neighbours of themselves."""
+    """NotJammedError if two disks touch more than once: they are their own neighbours."""
     pairs = np.sort(np.stack([packing.contacts.i, packing.contacts.j]), axis=0)
     if np.unique(pairs, axis=1).shape[1] < pairs.shape[1]:
         raise NotJammedError(
@@ -214,16 +212,16 @@ def _check_neighbours(packing: Packing) -> None:
 
 
 def default_steps(mu: float, dt: float | None, sweeps: int | None) -> tuple[float, int]:
-    """The longest time step Δt and the most sweeps in it, each by μ where it is None.
+    """The longest time step Δt and the most sweeps in it; None selects the default for μ.
 
-    0.1 and 600; 0.03 and 150 from μ = 0.2 on.
+    The defaults are 0.1 and 600, and from μ = 0.2 on 0.03 and 150.
     """
     usual = (LONGEST, SWEEPS) if mu < SETTLED_FROM else (LONGEST_SETTLED, SWEEPS_SETTLED)
     return usual[0] if dt is None else dt, usual[1] if sweeps is None else sweeps
 
 
 def check_box(box: str) -> str:
-    """The name of a box; InputError where there is none of this name."""
+    """The name of a box; InputError if the name is unknown."""
     return choice(box, BOXES, "box")
 
 
@@ -261,7 +259,7 @@ def _dilute_gas(r: Floats, rng: np.random.Generator, rates: int) -> dynamics.Mot
         cancelling.check("compaction")
         if placed:
             break
-        # Few or very unequal disks may not fit at once: begin more dilute.
+        # Few or very unequal disks may not fit: start more dilute.
         fraction *= 0.9
     n = len(r)
     velocity = np.zeros((n, 3))
@@ -292,9 +290,9 @@ def _insert(
     attempts: int,
     stop: Mask,
 ) -> tuple[Floats, bool]:
-    """Random sequential insertion in a periodic square; False where a disk found no place.
+    """Random sequential insertion in a periodic square; False if a disk could not be placed.
 
-    Ends early once stop[0] is raised.
+    Returns early once stop[0] is set.
     """
     x = np.empty((len(r), 2))
     for k in range(len(order)):
@@ -327,7 +325,7 @@ def _looking(
     pressure: float,
     counters: Integers,
 ) -> Callable[[dynamics.Motion, float], object]:
-    """look(motion, unbalance): have it watched, in the user's units."""
+    """look(motion, unbalance), which calls `watch` in the user's units."""
 
     def look(motion: dynamics.Motion, unbalance: float) -> None:
         carrying = motion.force[:, 0] > 0
@@ -359,7 +357,7 @@ def _advance(
     work: dict[str, Any],
     look: Callable[[dynamics.Motion, float], object] | None = None,
 ) -> tuple[dynamics.Motion, float, float]:
-    """CHECK_EVERY time steps; returns the motion, mean overlap and unbalance."""
+    """Do CHECK_EVERY time steps; return the motion, mean overlap and unbalance."""
     goal = counters[dynamics.STEPS] + CHECK_EVERY
     while (left := int(goal - counters[dynamics.STEPS])) > 0:
         steps = left if look is None else min(left, WATCH_EVERY)
@@ -390,7 +388,7 @@ def _finish(
     work: dict[str, Any],
     look: Callable[[dynamics.Motion, float], object] | None,
 ) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
-    """The finished packing in natural units with its certificate, or None while it moves."""
+    """The finished packing in natural units with its certificate, or None if it still moves."""
     if mu > NEARLY_FRICTIONLESS:
         if unbalance > NEARLY_BALANCED:
             return motion, None, None

@@ -1,4 +1,4 @@
-"""Force networks as files of other programs: VTK XML for ParaView, dumps of LAMMPS."""
+"""Force networks in files of other programs: VTK XML for ParaView, dumps of LAMMPS."""
 
 import base64
 import struct
@@ -23,10 +23,10 @@ def save_vtk(
     """Write a packing as two .vtp files (VTK XML PolyData), which ParaView opens.
 
     grains: points with radius, number of contacts, load (F_x, F_y, 0) and torque. contacts: lines
-    from grain i along the branch to j, across periodic sides too, to the wall where j is one; with
-    i, j, f_n, f_t, the force on j (a vector) and the gap, as data of the lines, and f_n of their
-    ends as well, for tubes. forces (N_c, 2): f_n, f_t, by default the packing's own. Lengths and
-    forces are in the packing's units. Raises InputError where a file cannot be written.
+    from grain i along the branch to j, also across periodic sides, or to the wall if j is one; with
+    i, j, f_n, f_t, the force on j (a vector) and the gap as data of the lines, and f_n also at
+    their ends, for tubes. forces (N_c, 2): f_n, f_t, by default the packing's own. Lengths and
+    forces are in the packing's units. Raises InputError if a file cannot be written.
     """
     forces, c = _forces(packing, forces), packing.contacts
     count, links = len(packing.r), len(c.i)
@@ -37,7 +37,7 @@ def save_vtk(
         "load": _spatial(packing.load[:, :2]),
         "torque": packing.load[:, 2],
     }
-    # A wall has no lever arm: the line ends at it.
+    # A wall has no lever arm: the line ends at the wall.
     reach = np.where(c.arm_j == 0, c.arm_i, c.length)
     start = packing.x[c.i]
     both = np.stack([start, start + reach[:, None] * c.normal], axis=1).reshape(-1, 2)
@@ -69,9 +69,9 @@ def save_lammps(
 
     particles: ``dump custom`` with id, type, x, y and radius. contacts: ``dump local`` with atom1,
     atom2, distance and, on atom1, the normal force fx, fy and the tangential force px, py. forces
-    (N_c, 2): f_n, f_t, by default the packing's own. A dump holds no friction coefficient, no loads
-    (those that are read back balance the forces) and no gaps. Raises InputError where a file cannot
-    be written.
+    (N_c, 2): f_n, f_t, by default the packing's own. A dump has no friction coefficient, no loads
+    (when it is read back, the loads balance the forces) and no gaps. Raises InputError if a file
+    cannot be written.
     """
     forces, c = _forces(packing, forces), packing.contacts
     ids = np.arange(1, len(packing.r) + 1)
@@ -93,7 +93,7 @@ def _forces(packing: Packing, forces: npt.ArrayLike | None) -> Floats:
 
 
 def _write(*files: tuple[str | Path, bytes]) -> None:
-    """Write both files, or none of them."""
+    """Write both files or neither."""
     (first, one), (second, two) = files
     with written(first) as file, written(second) as other:
         file.write(one)
@@ -134,7 +134,7 @@ def _poly_data(
 
 
 def _data_array(name: str, array: Any) -> str:
-    """A DataArray in base64: its number of bytes, and its numbers."""
+    """A DataArray in base64: its number of bytes, then its numbers."""
     array = np.asarray(array)
     kind, wide = array.dtype.kind, array.shape[1] if array.ndim == 2 else 1
     data = array.astype(f"<{kind}8").tobytes()
@@ -146,7 +146,7 @@ def _data_array(name: str, array: Any) -> str:
 
 
 def _bounds(packing: Packing) -> str:
-    """The box as a dump tells it: bounds of a tilted one are those of the rectangle around it."""
+    """The box of a dump; the bounds of a tilted box are those of the rectangle around it."""
     cell, tilt = packing.cell, packing.tilt
     is_open, reach = np.isinf(cell.box), packing.r[:, None]
     low = np.where(is_open, (packing.x - reach).min(axis=0), 0.0)
@@ -162,7 +162,7 @@ def _bounds(packing: Packing) -> str:
 
 
 def _dump(title: str, columns: str, box: str, table: Floats) -> bytes:
-    """A dump of one snapshot, the first two columns whole numbers."""
+    """A dump of one snapshot, with integers in the first two columns."""
     rows = "".join(
         f"{row[0]:.0f} {row[1]:.0f} {' '.join(f'{v:.17g}' for v in row[2:])}\n"
         for row in table.tolist()
@@ -171,14 +171,14 @@ def _dump(title: str, columns: str, box: str, table: Floats) -> bytes:
     return f"{head}ITEM: {title} {columns}\n{rows}".encode()
 
 
-# Formats by the end of the names of both files.
+# Formats by the suffix of both file names.
 FORMATS = {".vtp": save_vtk, ".dump": save_lammps}
 
 
 def export(packing: Packing, grains: str | Path, contacts: str | Path) -> None:
-    """Write a packing as two files in the format that the ends of their names tell.
+    """Write a packing as two files in the format given by their suffix.
 
-    Raises InputError for ends that are none of FORMATS, or two.
+    Raises InputError for suffixes that are not in FORMATS or differ.
     """
     ends = {Path(path).suffix.lower() for path in (grains, contacts)}
     save = FORMATS.get(ends.pop()) if len(ends) == 1 else None

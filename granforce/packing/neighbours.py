@@ -1,4 +1,4 @@
-"""Pairs of neighbouring disks in a periodic (or open, or tilted) cell, by a cell list."""
+"""Pairs of neighbouring disks in a periodic, open or tilted cell, from a cell list."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from granforce.numerics.lanes import compiled, within
 
 @compiled
 def find_pairs(x, r, cell, cutoff):
-    """All pairs with gap < cutoff, each periodic image apart.
+    """All pairs with gap < cutoff, each periodic image separately.
 
     x (N, 2), r (N,), cell: a Cell. Returns i, j (P,) with i < j and shift (P, 2): the image of j at
     x_j + shift · cell.vectors is the neighbour of i.
@@ -28,8 +28,8 @@ def find_pairs(x, r, cell, cutoff):
             high[k] = size[k]
         cells[k] = max(1, min(int(high[k] / reach), int(2 * np.sqrt(n)) + 1))
     periodic = np.isfinite(box)
-    # Fewer than three cells along a periodic side: one pair may touch through several images, or
-    # the stencil would visit a cell twice; there every image is tried in turn.
+    # With fewer than three cells along a periodic side, one pair may touch through several images,
+    # or the stencil would visit a cell twice; then every image is tried in turn.
     for k in range(2):
         if periodic[k] and cells[k] < 3:
             return _every_image(x, r, cell, cutoff, reach)
@@ -38,7 +38,7 @@ def find_pairs(x, r, cell, cutoff):
 
 @within
 def _heights(cell):
-    """Distances between the sides of the cell that face each other along a and b."""
+    """Distances between opposite sides of the cell, along a and b."""
     high = cell.box.copy()
     if cell.tilt != 0.0:
         high[0] *= cell.box[1] / np.hypot(cell.tilt, cell.box[1])
@@ -47,13 +47,13 @@ def _heights(cell):
 
 @within
 def _across(cell, d_x, d_y):
-    """Length along x at which a step would be if it went along a and b: in a straight cell, d_x."""
+    """Component of a step along a, in length along x; equal to d_x in a cell without tilt."""
     return d_x - cell.tilt * (d_y / cell.box[1])
 
 
 @within
 def _nearest_shift(cell, d_x, d_y):
-    """The image that takes a step to at most half of a and of b."""
+    """The image that reduces a step to at most half of a and of b."""
     s_x = s_y = 0
     if np.isfinite(cell.box[0]):
         s_x = -int(np.round(_across(cell, d_x, d_y) / cell.box[0]))
@@ -90,7 +90,7 @@ def _append(rows, x, r, cell, cutoff, i, j, s_x, s_y):
 
 @within
 def _step(x, cell, i, j, s_x, s_y):
-    """From the centre of i to that of an image of j."""
+    """Vector from the centre of i to that of an image of j."""
     d_x = x[j, 0] - x[i, 0] + (s_x * cell.box[0] if s_x != 0 else 0.0)
     d_y = x[j, 1] - x[i, 1] + (s_y * cell.box[1] if s_y != 0 else 0.0)
     return d_x + s_y * cell.tilt, d_y
@@ -138,7 +138,7 @@ def _by_cells(x, r, cell, cutoff, low, size, cells):
 
 @within
 def _columns(rows):
-    # rows[0] only told the compiler the type of the list.
+    # rows[0] only defines the type of the list for the compiler.
     count = len(rows) - 1
     i = np.empty(count, np.int64)
     j = np.empty(count, np.int64)

@@ -1,4 +1,4 @@
-"""The list of pairs that may touch, made anew while a packing moves."""
+"""The list of pairs that may touch, rebuilt while a packing moves."""
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from granforce.packing.neighbours import find_pairs
 from granforce.records import NotJammedError
 from granforce.types import Floats, Integers
 
-# Pairs nearer than SKIN (in largest radii) are listed. The list is made anew once two grains may
-# have approached by MOVED.
+# Pairs closer than SKIN (in largest radii) are listed. The list is rebuilt once two grains may have
+# approached by MOVED.
 SKIN = 0.2
 MOVED = SKIN - REACH
 
@@ -23,7 +23,7 @@ def cell_of(motion: Motion) -> Cell:
 def relisted(motion: Motion) -> Motion:
     """The motion with a new list of pairs, whose forces are carried over.
 
-    Raises NotJammedError where the box is as small as a disk.
+    Raises NotJammedError if the box is as small as a disk.
     """
     motion = _leant_back(motion)
     if cell_of(motion).shortest <= 2 * motion.r.max():
@@ -31,7 +31,7 @@ def relisted(motion: Motion) -> Motion:
             "the box shrank to the largest disk's diameter without jamming: too few disks"
         )
     i, j, shift = find_pairs(motion.x, motion.r, cell_of(motion), SKIN)
-    # In an order of their own, pairs are swept in the same order however often the list is made.
+    # Sorted, so that the order of sweeps does not depend on when the list was built.
     order = np.lexsort((shift[:, 1], shift[:, 0], j, i))
     i, j, shift = i[order], j[order], shift[order]
     force = _carry_over(motion.i, motion.j, motion.shift, motion.force, i, j, shift)
@@ -68,7 +68,7 @@ def _carry_over(
     for a in i:
         grains = max(grains, a + 1)
     start = np.zeros(grains + 1, np.int64)
-    # Lists come grouped by i, so the old pairs of one grain lie side by side.
+    # Lists are grouped by i, so the old pairs of one grain are adjacent.
     for a in old_i:
         start[a + 1] += 1
     for a in range(grains):

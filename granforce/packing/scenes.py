@@ -1,11 +1,11 @@
-"""Scenes: small sets of disks, walls and weights whose whole S can be seen, and counted by hand.
+"""Scenes: small sets of disks, walls and weights with an S small enough to see and count by hand.
 
-Disks rest on each other and on straight walls. A wall takes part as a grain behind each place where
-a disk touches it, whose balance is left open (load NaN); weight is a load on each disk, r² in units
-of that of the largest disk; nothing prescribes a pressure, and the box is open on all sides. A wall
-that presses is one grain, touched by all its disks, with the force on it as a load: it may slide
-along itself, so that its forces f_t add up to 0, and does not tilt, since f_n act on its middle.
-Such a set is a Packing like any other, and nothing else in granforce knows of scenes.
+Disks rest on each other and on straight walls. Behind each place where a disk touches a wall is a
+grain whose balance is not required (load NaN). Weight is a load on each disk, r² in units of that
+of the largest disk; no pressure is prescribed, and the box is open on all sides. A pressing wall is
+one grain, touched by all its disks, with the force on it as a load: it may slide along itself, so
+its forces f_t sum to 0, and it does not tilt, since f_n act on its centre. Such a set is a Packing
+like any other, and nothing else in granforce depends on scenes.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,13 +33,12 @@ from granforce.records import (
 )
 from granforce.types import Floats, Integers, Mask
 
-# A disk touches a wall or another disk where the gap (in largest radii) is below this, if nothing
-# else is said.
+# Default gap (in largest radii) below which a disk touches a wall or another disk.
 SNAPPED = 1e-9
-# Radius of the grain behind a place where a wall is touched, relative to the disk's; of a wall that
-# presses, relative to the largest disk's.
+# Radius of the grain behind a touched place, relative to the disk's; of a pressing wall, relative
+# to the largest disk's.
 STUD = 0.25
-MOST_SEEDS = 100  # tried for a packing with the dimensions that a scene is to have
+MOST_SEEDS = 100  # tried for a packing with the dimension of a scene
 
 
 class Sketch(NamedTuple):
@@ -49,30 +48,30 @@ class Sketch(NamedTuple):
     r: Floats  # (N,) radii
     walls: Floats  # (k, 4) both ends x, y, x, y of each wall
     load: Floats  # (N, 3) force and torque on each disk
-    pressing: Floats | None = None  # (k,) force with which each wall presses; 0: it is held
+    pressing: Floats | None = None  # (k,) force of each pressing wall; 0 for held walls
 
 
 class _Scene(NamedTuple):
     title: str  # on screen
-    mu: float  # unless another is asked for
-    make: Callable[..., Sketch | Packing]  # make(mu, **options) gives a Sketch, or a Packing
-    packed: bool = False  # whether its disks are pressed together first, which takes a while
+    mu: float  # default friction coefficient
+    make: Callable[..., Sketch | Packing]  # make(mu, **options) returns a Sketch or a Packing
+    packed: bool = False  # whether its disks are compressed first, which takes a while
 
 
 def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
-    """The Packing of the scene of this name, with the admissible network nearest to equal f_n.
+    """The Packing of a named scene, with the admissible network nearest to equal f_n.
 
     name: one of SCENES. mu: friction coefficient, by default the scene's. options: angle (degrees)
     of the opening of the "groove" and of the lines of centres with the vertical in the "pyramid"
     and the "column"; disks in the "column".
 
-    Raises InputError for another name, option or geometry, NotJammedError where nothing balances.
+    Raises InputError for an unknown name, option or geometry, NotJammedError if nothing balances.
     """
     return with_network(sketched(name, mu, **options))
 
 
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
-    """The same Packing, whether or not anything balances: its forces are 0, or of another μ."""
+    """The same Packing even if nothing balances; its forces are 0, or those at another μ."""
     if not isinstance(name, str) or name not in SCENES:
         raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(SCENES)}")
     kind = SCENES[name]
@@ -97,14 +96,14 @@ def assembled(
     pressing: npt.ArrayLike | None = None,
     tolerance: float = SNAPPED,
 ) -> Packing:
-    """The Packing of a Sketch, with a contact wherever disks and walls touch, without a network.
+    """The Packing of a Sketch, with contacts where disks and walls touch, without a network.
 
-    Its info has the walls, as lists of four numbers, and which of them press; grains are the disks,
-    the walls that press, and what is behind the places of the others. tolerance: gap (in largest
+    Its info contains the walls, as lists of four numbers, and which of them press; its grains are
+    the disks, the pressing walls, and the grains behind held walls. tolerance: gap (in largest
     radii) up to which a disk touches.
 
-    Raises InputError where disks overlap each other or a wall, lie on both sides of a wall that
-    presses or at its end, and as `make_packing`.
+    Raises InputError if disks overlap each other or a wall, or lie on both sides of a pressing wall
+    or at its end, and as `make_packing`.
     """
     r = float_array(r, (-1,), "radii")
     x = float_array(x, (len(r), 2), "centres")
@@ -140,9 +139,9 @@ def assembled(
 
 
 def with_network(packing: Packing) -> Packing:
-    """The Packing with the admissible network nearest to its own, or to equal f_n without one.
+    """The Packing with the admissible network nearest to its own forces, or to equal f_n.
 
-    Raises NotJammedError where none exists, UndecidedError where none was reached.
+    Raises NotJammedError if no network exists, UndecidedError if none was reached.
     """
     if not packing.forces.any():
         equal = np.zeros_like(packing.forces)
@@ -175,9 +174,9 @@ def _touching(gap: Floats, r: Floats, what: str, tolerance: float) -> Mask:
 
 
 def _places(x: Floats, walls: Floats) -> tuple[Integers, Integers, Floats]:
-    """Each disk with each wall: disk and wall (k,) and the wall's nearest place (k, 2), each once.
+    """Pairs of disk and wall (k,), and the wall's nearest place (k, 2), each once.
 
-    Walls that meet have one place for a disk in the open angle between them, their common end.
+    Walls that meet share one place, their common end, for a disk in the open angle between them.
     """
     begin, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
     size = (along**2).sum(axis=1)
@@ -193,19 +192,19 @@ def _places(x: Floats, walls: Floats) -> tuple[Integers, Integers, Floats]:
 
 
 class Behind(NamedTuple):
-    """Grains behind walls: those that press, then one for each place where another is touched."""
+    """Grains behind walls: one per pressing wall, then one per touched place of the other walls."""
 
-    disk: Integers  # (k,) that touches
-    grain: Integers  # (k,) which it touches, among these
-    away: Floats  # (k, 2) unit vector from one to the other
+    disk: Integers  # (k,) touching disk
+    grain: Integers  # (k,) the grain that it touches, among these
+    away: Floats  # (k, 2) unit vector from disk to grain
     x: Floats  # (m, 2) centres
     r: Floats  # (m,) radii
-    load: Floats  # (m, 3) the force of walls that press, NaN else
-    lids: Integers  # (l,) which walls press
+    load: Floats  # (m, 3) force of pressing walls, otherwise NaN
+    lids: Integers  # (l,) indices of pressing walls
 
 
 def places_behind(x: Floats, r: Floats, walls: Floats, tolerance: float) -> Behind:
-    """Grains behind the places where disks touch walls that are held."""
+    """Grains behind the places where disks touch held walls."""
     return _behind(x, r, walls, np.zeros(len(walls)), tolerance)
 
 
@@ -251,7 +250,7 @@ def _inwards(x: Floats, wall: Floats, away: Floats) -> Floats:
     return across * np.copysign(1.0, side[0])
 
 
-# The scenes: centres from school geometry, radius 1.
+# The scenes: centres from elementary geometry, radius 1.
 
 
 def _resting(x: Sequence[Any] | Floats, walls: npt.ArrayLike) -> Sketch:
@@ -289,7 +288,7 @@ def _pyramid(mu: float, angle: float = 30.0) -> Sketch:
 
 
 def _press(mu: float) -> Sketch:
-    """The close pyramid without weight, under a wall that presses with 1."""
+    """The close pyramid without weight, under a wall that presses with force 1."""
     made = _pyramid(mu)
     lid = 2 + np.sqrt(3)
     walls = [*made.walls.tolist(), [-1.6, lid, 1.6, lid]]
@@ -312,7 +311,7 @@ def _column(mu: float, disks: int = 10, angle: float = 30.0) -> Sketch:
 
 
 def _pressed(mu: float, disks: int, packed_mu: float, dimension: int) -> Packing:
-    """So many disks pressed together in a periodic box: the first seed with that many of h."""
+    """A number of disks compressed in a periodic box: the first seed with this dimension h."""
     for seed in range(1, MOST_SEEDS):
         try:
             made = pack(disks, mu=packed_mu, seed=seed)
@@ -327,7 +326,7 @@ def _many(mu: float) -> Packing:
     return pack(400, mu=mu, seed=1)
 
 
-# In order of their size, as lists have them.
+# In order of size, as lists show them.
 SCENES = {
     "groove": _Scene("One disk in a groove", 0.5, _groove),
     "box": _Scene("Two disks in a box", 0.3, _box),

@@ -1,15 +1,16 @@
 """The last phase of a compaction: from slow grains to a packing at rest, with a certificate.
 
-1. Overdamped motion of stiff disks (`forces.overdamped`) from the forces of the dynamics, until
-   every grain and the box are in balance to rounding. Disks then overlap by about the softness.
-2. Overlaps are closed with the forces as they are: the least motion Σ M u² that brings the gaps of
-   pressing contacts to 0 and leaves no other pair overlapping. As that turns contacts, forces are
-   out of balance by about the displacements, and the motion goes on with stiffer disks; overlaps
-   are again closed, and so on. Each round takes what is left by a factor of its own size, so that
-   three end at rounding: what presses is a contact, what does not press has a gap.
+1. Overdamped motion of stiff disks (`motion.overdamped`), starting with the forces of the dynamics,
+   until every grain and the box are in balance to rounding. Disks then overlap by about the
+   softness.
+2. Overlaps are closed at constant forces: the least motion Σ M u² that brings the gaps of pressing
+   contacts to 0 and leaves no other pair overlapping. As contacts turn, forces become unbalanced by
+   about the displacements, and the motion resumes with stiffer disks; overlaps are closed again,
+   and so on. The error converges quadratically, so that three rounds reach rounding: pressing pairs
+   are contacts, all others have a gap.
 3. The certificate of rest (`motion.rest`): from the forces of the last round, and with noise on all
-   of them, the exact step of contact dynamics comes to rest without moving. Where something sets
-   off, it moves on from there by the first.
+   of them, the exact step of contact dynamics comes to rest without moving. If grains move, the
+   motion resumes at 1.
 """
 
 from collections.abc import Callable
@@ -35,30 +36,29 @@ from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
-# Softness ε of the overdamped motion: the overlap of a contact that presses, in largest radii. At
-# 10⁻⁴ packings come to rest with more contacts than rigid disks have: h is 13.0 ± 1.0 in place of
-# 5.9 ± 0.9 (μ = 1, N = 200), and 8.1 ± 0.7 at 10⁻⁵.
+# Softness ε of the overdamped motion: the overlap of a pressing contact, in largest radii. At 10⁻⁴
+# packings come to rest with more contacts than rigid disks: h is 13.0 ± 1.0 instead of 5.9 ± 0.9 (μ
+# = 1, N = 200), and 8.1 ± 0.7 at 10⁻⁵.
 SOFTNESS = 1e-6
-# Displacement after which the geometry is made anew, in largest radii: what it leaves out of the
-# gaps, its square, changes forces by a hundredth.
+# Displacement after which the geometry is updated, in largest radii: the neglected quadratic terms
+# of the gaps change forces by a hundredth.
 STRIDE = 0.1 * SOFTNESS**0.5
-# Implicit steps between two looks; linear systems, beyond which what still moves is left to the
-# dynamics.
+# Implicit steps between two calls of `look`; linear systems after which the dynamics takes over.
 STEPS_A_LOOK, MOST_SYSTEMS = 50, 500
 FIRST_PACE = 100.0
-# Pairs nearer than NEAR take part; they are chosen anew once two grains may have approached by
+# Pairs closer than NEAR take part; they are chosen again once two grains may have approached by
 # APPROACHED (both in largest radii).
 NEAR, APPROACHED = 0.02, 0.015
-# Rounds of closing at most, and the largest displacement in one of them, in largest radii.
+# Most rounds of closing, and the largest displacement in one of them, in largest radii.
 CLOSINGS, FARTHEST = 8, 1e-2
-# A closing starts from forces this many times as large as they are: only a contact that presses far
-# less than others do is opened by a displacement.
+# Factor on forces at the start of a closing, so that displacements open only contacts that press
+# far less than others.
 ENLARGED = 1e3
-# Part of its gap that a closing may take from a pair that does not press: all of it would leave
-# pairs that touch by the closing alone.
+# Fraction of its gap that a closing may remove from a pair that does not press: with the whole gap,
+# pairs would touch because of the closing alone.
 KEPT_APART = 0.5
 CLOSING_STEPS = 60
-# Times that grains that set off under noise are moved on, before the dynamics takes over again.
+# How often grains that move under noise continue here before the dynamics takes over again.
 ATTEMPTS = 20
 
 Look = Callable[[Motion, float], object]
@@ -69,11 +69,11 @@ class _Near(NamedTuple):
 
     pairs: Integers  # (K,) of the motion's list
     network: Network
-    drift: float  # of the motion when they were chosen
+    drift: float  # drift of the motion when they were chosen
 
 
 class _Place(NamedTuple):
-    """What a geometry gives: the step problem, and where its rows are."""
+    """The step problem of a geometry, and the places of its rows."""
 
     step: Step
     gap: Floats  # (K,)
@@ -84,10 +84,9 @@ class _Place(NamedTuple):
 def come_to_rest(
     motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None
 ) -> tuple[Motion, Packing | None, Rest | None]:
-    """The motion at rest, its packing in natural units and the certificate; None if it moves on.
+    """The motion at rest, its packing in natural units and the certificate; None if it moves.
 
-    work: counts of what was done, which are added to. look(motion, unbalance) is called now and
-    then.
+    work: counters to increase. look(motion, unbalance) is called repeatedly.
     """
     motion.velocity[:], motion.dilation[:] = 0.0, 0.0
     for _ in range(ATTEMPTS):
@@ -112,7 +111,7 @@ def come_to_rest(
 def _creep(
     motion: Motion, mu: float, work: dict[str, Any], look: Look | None
 ) -> tuple[Motion, bool]:
-    """Overdamped motion; whether all came to rest."""
+    """Overdamped motion; returns whether everything came to rest."""
     pace = FIRST_PACE
     counts, near, ended = np.zeros(3, dtype=np.int64), None, overdamped.MOVED
     while counts[overdamped.SYSTEMS] < MOST_SYSTEMS:
@@ -144,7 +143,7 @@ def _creep(
 
 
 def _chosen(motion: Motion, near: _Near | None) -> tuple[Motion, _Near]:
-    """The pairs that take part, chosen anew where others may have come near."""
+    """Choose the pairs that take part again if others may have come close."""
     if near is not None and motion.drift[0] - near.drift < APPROACHED:
         return motion, near
     motion = relisted(motion)
@@ -165,7 +164,7 @@ def _geometry(motion: Motion, pairs: Integers) -> tuple[Floats, Floats, Floats]:
 def _columns(
     motion: Motion, pairs: Integers, normal: Floats, length: Floats, frictionless: bool = False
 ) -> tuple[Floats, Floats, Floats]:
-    """What unit f_n, f_t do to the rows of both grains (K, 3, 2) and of the box (K, m, 2)."""
+    """Action of unit f_n, f_t on the rows of both grains (K, 3, 2) and of the box (K, m, 2)."""
     first, second = np.zeros((2, len(pairs), 3, 2))
     second[:, :2, 0] = normal
     second[:, :2, 1] = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
@@ -202,7 +201,7 @@ def _place(motion: Motion, near: _Near, mu: float) -> _Place:
 
 
 def _displace(motion: Motion, moved: Floats, strain: Floats) -> None:
-    """Move grains (N, 3) and the box, by the strains (m,) that go with its rows."""
+    """Move grains (N, 3) and the box, by the strains (m,) conjugate to its rows."""
     if len(strain) == 3:
         mean, half, shear = strain
         strain = np.array([mean + 0.5 * half, mean - 0.5 * half, shear])
@@ -213,7 +212,7 @@ def _displace(motion: Motion, moved: Floats, strain: Floats) -> None:
 
 
 def _correct(motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped) -> None:
-    """Keep the forces, with what the squares of displacements change in the gaps."""
+    """Keep the forces when the quadratic terms of displacements change the gaps."""
     gap = _geometry(motion, near.pairs)[2]
     forces = moving.flows.forces.reshape(-1, 2).copy()
     forces[:, 0] -= step.stiffness[:, 0] * (gap - moving.gap) / SOFTNESS
@@ -229,7 +228,7 @@ def _unbalance(step: Step, velocity: Any) -> float:
 def _closed(
     motion: Motion, mu: float, work: dict[str, Any], look: Look | None
 ) -> tuple[Motion, bool]:
-    """The motion with overlaps closed, at rest again; whether it got there."""
+    """The motion with overlaps closed and at rest again; returns whether it succeeded."""
     for _ in range(CLOSINGS):
         motion, near = _chosen(motion, None)
         if not _close(motion, near, work):
@@ -244,16 +243,16 @@ def _closed(
 
 
 def _gaps(motion: Motion) -> tuple[Floats, Mask]:
-    """Gaps of all listed pairs, and which of them press."""
+    """Gaps of all listed pairs, and a mask of the pressing ones."""
     gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
     return gap, motion.force[:, 0] > 0
 
 
 def _close(motion: Motion, near: _Near, work: dict[str, Any]) -> bool:
-    """Move grains and box by the least that closes pressing contacts and leaves no overlap.
+    """Move grains and box by the least motion that closes pressing contacts without overlaps.
 
-    It is a frictionless step from rest in which nothing but the gaps is out of balance. Where
-    overlaps had jammed more contacts than rigid disks can close at once, the weakest open.
+    It is a frictionless step from rest in which only the gaps are unbalanced. If overlaps had
+    jammed more contacts than rigid disks can close at once, the weakest contacts open.
     """
     place = _place(motion, near, 0.0)
     forces = motion.force[near.pairs] * [ENLARGED, 0.0]

@@ -1,1 +1,1 @@
-"""What a packing does when two grains in contact are pushed apart."""
+"""The response of a packing when two grains in contact are pushed apart."""

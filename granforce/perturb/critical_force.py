@@ -2,17 +2,17 @@
 
 Protocol. The geometry is fixed and grains are rigid. From the packing's own force network F is
 raised step by step; each step starts from the last equilibrium and follows the flow of contact
-dynamics (`flow`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
-found no equilibrium. As long as grains come to rest, each load lies RISE of the way to the static
-limit load, beyond which no equilibrium exists; after the first motion, F is halved in from the
-last equilibrium. Motion above the bracket that was not steady yet is followed for STEADY_STEPS;
-if it comes to rest, the rise goes on from there. The critical force F_crit is the largest load at
-rest, known to `precision` ⟨f_n⟩. The pair counts in the balance of the grains and in the pressure
-like a force of the contact itself, but not in its Coulomb cone, and the box may dilate at constant
-pressure.
+dynamics (`flow`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps have
+found no equilibrium. As long as grains come to rest, each load is RISE of the way to the static
+limit load, beyond which no equilibrium exists; after the first motion, F is bisected from the last
+equilibrium. Motion above the bracket that is not yet steady is followed for STEADY_STEPS; if it
+comes to rest, the rise resumes from there. The critical force F_crit is the largest load at rest,
+with a precision of `precision` ⟨f_n⟩. The pair counts in the balance of the grains and in the
+pressure like a force of the contact itself, but not in its Coulomb cone, and the box may dilate at
+constant pressure.
 
-F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the law is not
-associated), so grains can set off although an equilibrium exists.
+F_crit ≤ limit load. They differ because sliding contacts do not dilate (the law is not associated):
+grains may start to move although an equilibrium exists.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -46,38 +46,38 @@ from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask
 
-# Part of the way from the last load at rest to the limit load that the next load goes.
+# Fraction of the way from the last load at rest to the limit load of the next load.
 RISE = 0.4
-# Implicit steps after which no equilibrium is said to be found.
+# Implicit steps after which the search for an equilibrium ends.
 MOST_STEPS = 150
-# What steady motion may still breach Coulomb's law by, relative to the fastest contact, and the
-# steps spent on that.
+# Largest violation of Coulomb's law in steady motion, relative to the fastest contact, and the
+# steps spent on it.
 STEADY, STEADY_STEPS = 1e-3, 500
 
-# Finest precision of F_crit, ⟨f_n⟩: limit loads are certified to this; and the coarsest: beyond, a
-# bracket says nothing of a force.
+# Finest precision of F_crit, ⟨f_n⟩, to which limit loads are certified; and the coarsest, beyond
+# which a bracket is meaningless.
 LEAST_PRECISION, MOST_PRECISION = INTERVAL_GAP, 1.0
 
-# How loads ended, implicit steps of the flow, and linear systems solved for them.
+# Numbers of loads by outcome, implicit steps of the flow, and linear systems solved.
 COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
 
 
 @notebook.brief
 class CriticalForce(NamedTuple):
-    """Largest force pair on one contact under which grains come to rest, and the motion above."""
+    """Largest force pair on one contact under which grains rest, and the motion above it."""
 
     contact: int  # its number in the packing
     mu: float  # friction coefficient of the ensemble
     low: float  # F_crit, force: largest load that ended at rest
-    high: float  # least load above that did not, or the limit load if none was tried
+    high: float  # smallest load that did not, or the limit load if none was tried
     limit_load: float  # force
     forces: Floats  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
     residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
     violation: float  # ⟨f_n⟩, by Ensemble.violation
-    moving: Outcome | None  # the end under `high`; None where that was not tried
+    moving: Outcome | None  # the outcome under `high`; None if that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
     counts: dict[str, float]  # COUNTS
-    seconds: float  # of following flows, shared among those side by side
+    seconds: float  # time of the flows, shared among those computed together
 
 
 @notebook.brief
@@ -92,22 +92,22 @@ class Response(NamedTuple):
     opening: Integers  # (N_c,) normal relative displacement of the ensemble's contacts
     opened: Mask  # (N_c,) bool, contacts without force
     slid: Mask  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
-    kept: Mask  # (N_c,) bool, all others
-    breach: float  # of Coulomb's law, relative to the fastest relative velocity
+    kept: Mask  # (N_c,) bool, sticking contacts
+    breach: float  # largest violation of Coulomb's law, relative to the fastest contact
     fastest: float  # largest relative displacement at a contact
     converged: bool  # breach ≤ STEADY
 
 
-# Work for `works.follow` that asks for flows, is sent their outcomes, and returns a result.
+# A generator for `works.follow` that yields flows, is sent their outcomes, and returns a result.
 T = TypeVar("T")
 Asking = Generator[Push, Outcome, T]
 
 
 class Protocol(NamedTuple):
-    """How loads are raised on a contact."""
+    """How the load on a contact is raised."""
 
     precision: float = 0.01  # of the bracket, ⟨f_n⟩
-    rise: float = RISE  # part of the way from the last load at rest to the limit load
+    rise: float = RISE  # fraction of the way from the last load at rest to the limit load
     max_steps: int = MOST_STEPS  # of the flow per load
 
 
@@ -127,7 +127,7 @@ def critical_force(
     limit_load: force, computed if not given. protocol: fields of Protocol. cancel() returning True
     raises Cancelled.
 
-    Raises InputError for a contact that carries nothing in any state of S.
+    Raises InputError for a contact without force in any state of S.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
     loads = None if limit_load is None else [limit_load]
@@ -147,13 +147,13 @@ def critical_forces(
     cancel: Cancel | None = None,
     **protocol: Any,
 ) -> list[CriticalForce]:
-    """F_crit of contacts (numbers in the packing), several side by side: a list of CriticalForce.
+    """F_crit of contacts (numbers in the packing), computed together: a list of CriticalForce.
 
     limit_loads (k,): force, computed if not given. workers: threads; no result depends on their
     number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
     ends. Other options and errors as for `critical_force`.
 
-    Raises UndecidedError where a limit load cannot be certified, or is given as NaN.
+    Raises UndecidedError if a limit load cannot be certified, or is given as NaN.
     """
     S, protocol = ensemble, Protocol(**protocol)
     precision = positive(
@@ -171,7 +171,7 @@ def critical_forces(
             raise InputError(f"give one limit load ≥ 0 for each of the {len(positions)} contacts")
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
-        cancelling.check("critical force")  # which leaves limit loads open
+        cancelling.check("critical force")  # cancelling leaves limit loads uncomputed
     for number in np.asarray(contacts)[np.isposinf(limit_loads)]:
         raise InputError(
             f"the balance of both grains of contact {number} is not required: no load moves them"
@@ -204,7 +204,7 @@ def _raised(
     start: Floats,
     protocol: Protocol,
 ) -> Asking[CriticalForce]:
-    """Work for `works.follow`: the CriticalForce of a contact."""
+    """Generator for `works.follow`: the CriticalForce of a contact."""
     counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     forces, low, high = start, 0.0, limit
     while True:
@@ -213,7 +213,7 @@ def _raised(
         )
         if moving is None or moving.breach <= STEADY:
             break
-        # What was taken for motion is followed on: it may come to rest after all.
+        # Follow the apparent motion further: it may come to rest.
         asked = Push(moving.forces, position, high, STEADY_STEPS, STEADY)
         followed = yield from _relaxed(asked, counts)
         if not followed.at_rest:
@@ -246,9 +246,9 @@ def _bracket(
     protocol: Protocol,
     counts: dict[str, float],
 ) -> Asking[tuple[float, float, Floats, Outcome | None]]:
-    """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
+    """Raise loads from `low` until rest and motion are `precision` apart, or rest reaches `high`.
 
-    Returns the bracket, the last equilibrium and the motion above it, None where there was none.
+    Returns the bracket, the last equilibrium and the motion above it, or None without motion.
     """
     moving, precision = None, protocol.precision
     while high - low > precision:
@@ -264,7 +264,7 @@ def _bracket(
 
 
 def _relaxed(asked: Push, counts: dict[str, float]) -> Asking[Outcome]:
-    """The outcome of what is asked, counted."""
+    """The outcome of a flow, counted."""
     outcome = yield asked
     counts["flow_steps"] += outcome.steps
     counts["linear_systems"] += outcome.iterations
@@ -290,12 +290,12 @@ def response(
     """The first motion under a force pair on one contact, beyond its critical force.
 
     force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
-    above the limit load where the bracket ends there). critical: the CriticalForce, computed if not
-    given. The motion is that of one step of contact dynamics from rest, followed until Coulomb's
-    law is breached by at most STEADY of the fastest relative velocity. cancel() returning True
-    raises Cancelled.
+    above the limit load if the bracket ends there). critical: the CriticalForce, computed if not
+    given. The motion is that of one step of contact dynamics from rest, followed until the
+    violation of Coulomb's law is at most STEADY times the fastest relative velocity. cancel()
+    returning True raises Cancelled.
 
-    Raises InputError where the grains come to rest under this load.
+    Raises InputError if the grains come to rest under this load.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
     precision = positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)

@@ -1,10 +1,10 @@
 """How the motion under a force pair decays with distance: |u|(r) and its exponent α.
 
-|u|(r) is averaged over the grains of each shell, then over contacts, each field scaled to rms 1.
-α is the slope of −log⟨|u|⟩ against log r by least squares over the shells whose middle lies in the
-fit range, FIT_INNER mean diameters to FIT_OUTER of the shorter box side (of the distance between
-images, where the cell is tilted); its interval comes from
-contacts drawn anew, and exponents of all FIT_RANGES are kept beside it.
+|u|(r) is averaged over the grains of each shell, then over contacts, with each field scaled to rms
+1. α is the least-squares slope of −log⟨|u|⟩ against log r over the shells whose centre is in the
+fit range, FIT_INNER mean diameters to FIT_OUTER of the shorter box side (in a tilted cell, of the
+distance between images). Its interval comes from resampled contacts, and the exponents of all
+FIT_RANGES are reported too.
 """
 
 import itertools
@@ -21,25 +21,25 @@ FIT_RANGES = tuple(itertools.product((1.0, 1.5, 2.0, 3.0), (0.3, 0.4, 0.5)))
 
 
 class Decay(NamedTuple):
-    """The exponent of ⟨|u|⟩ ~ r^−α, and how sure it is."""
+    """The exponent of ⟨|u|⟩ ~ r^−α and its uncertainty."""
 
     exponent: float  # α
-    low: float  # 95 % interval of α, from contacts drawn anew
+    low: float  # 95 % interval of α, from resampled contacts
     high: float
     fit: tuple[float, float]  # smallest and largest r of the fit, length
-    ranges: Floats  # (fits, 2) the same of other fits
-    exponents: Floats  # (fits,) α of those
+    ranges: Floats  # (fits, 2) r ranges of the other fits
+    exponents: Floats  # (fits,) their α
 
 
 def distances(packing: Packing, contact: int) -> Floats:
-    """Distance (N,) of every grain from the point of contact, by the nearest periodic image."""
+    """Distance (N,) of every grain from the contact point, by the nearest periodic image."""
     c = packing.contacts
     centre = packing.x[c.i[contact]] + c.arm_i[contact] * c.normal[contact]
     return np.linalg.norm(packing.cell.nearest(packing.x - centre), axis=1)
 
 
 def shells(packing: Packing) -> Floats:
-    """Edges of shells half a mean diameter wide, out to half the distance between images."""
+    """Edges of shells half a mean diameter wide, up to half the distance between images."""
     width = float(packing.r.mean())
     return width * np.arange(int(_side(packing) / 2 / width) + 1, dtype=np.float64)
 
@@ -53,9 +53,9 @@ def _side(packing: Packing) -> float:
 
 
 def profile(packing: Packing, displacement: Floats, contact: int, edges: Floats) -> Floats:
-    """Mean |u| of the grains in shells around a contact, (shells,); NaN where there are none.
+    """Mean |u| of the grains in shells around a contact, (shells,); NaN in empty shells.
 
-    displacement (N, 2), NaN for grains that do not count; edges (shells + 1,): `distances`.
+    displacement (N, 2), NaN for grains to ignore; edges (shells + 1,) in terms of `distances`.
     """
     size = np.linalg.norm(displacement, axis=1)
     known = np.isfinite(size)
@@ -67,7 +67,7 @@ def profile(packing: Packing, displacement: Floats, contact: int, edges: Floats)
 
 
 def decay(packing: Packing, radius: Floats, profiles: Floats) -> Decay:
-    """The Decay of profiles (contacts, shells) with the middles (shells,) of their shells."""
+    """The Decay of profiles (contacts, shells) at radii (shells,), the centres of their shells."""
     diameter, side = 2 * float(packing.r.mean()), _side(packing)
     ranges = np.array([(a * diameter, b * side) for a, b in FIT_RANGES])
     fit = FIT_INNER * diameter, FIT_OUTER * side
@@ -83,7 +83,7 @@ def decay(packing: Packing, radius: Floats, profiles: Floats) -> Decay:
 def decay_exponent(radius: Floats, profiles: Floats, inner: float, outer: float) -> float:
     """α of ⟨|u|⟩ ~ r^−α over inner ≤ r ≤ outer; radius (shells,), profiles (contacts, shells).
 
-    NaN where fewer than three shells hold grains.
+    NaN if fewer than three shells contain grains.
     """
     profiles = np.asarray(profiles)
     known = np.isfinite(profiles).any(axis=0) & (radius >= inner) & (radius <= outer)

@@ -1,12 +1,12 @@
 """Networks under a force pair that pushes the two grains of one contact apart.
 
 The pair ±F counts in the balance of the grains, and in the pressure, like a normal force of the
-contact c itself, but not in its Coulomb cone: A (f + F e_c) = b. So the networks under F are those
-of the same cones with b − F A e_c in place of b, and what is nearest to a given network among them
-is found as in S (`forces.nearest`). The pairs (f, F) form a convex set: between two networks under
-two loads the straight line is admissible under the load in between.
+contact c itself, but not in its Coulomb cone: A (f + F e_c) = b. So the networks under F have the
+same cones with b − F A e_c in place of b, and the nearest of them to a given network is computed as
+in S (`forces.nearest`). The pairs (f, F) form a convex set: the straight line between two networks
+under two loads is admissible under the loads in between.
 
-Such a network exists up to the limit load. Grains may set off before (`critical_force`).
+Such a network exists up to the limit load. Grains may start to move earlier (`critical_force`).
 """
 
 from dataclasses import replace
@@ -47,12 +47,12 @@ def loaded_networks(
 ) -> Loaded:
     """The networks nearest to `state` that balance force pairs on one contact; a Loaded.
 
-    contact: its number in the packing. loads (k,), force, positive where they push its grains
-    apart. state (N_c, 2), force: by default the original network. Nearest: the least
-    Σ |F_c − F_state,c|². cancel() returning True raises Cancelled.
+    contact: its number in the packing. loads (k,), force, positive if they push its grains apart.
+    state (N_c, 2), force: by default the original network. Nearest means the least Σ |F_c −
+    F_state,c|². cancel() returning True raises Cancelled.
 
-    Raises InputError for a contact that carries nothing, and for a load under which no network was
-    found (above the limit load there is none).
+    Raises InputError for a contact that carries no force, and for a load without a network (there
+    is none above the limit load).
     """
     position = ensemble.position(contact)
     loads = float_array(np.atleast_1d(real_array(loads, "loads")), (-1,), "loads")
@@ -68,7 +68,7 @@ def loaded_networks(
     for k, load in enumerate(loads):
         cancelling.check()
         under = replace(ensemble, b=ensemble.b - load * turned, found=None)
-        # Beyond, the rounding of the load alone breaks the balance.
+        # Beyond this, the rounding error of the load alone exceeds the tolerance of the balance.
         possible = abs(load) * np.finfo(float).eps <= BALANCED * ensemble.force_scale
         if possible:
             states[k] = some_network(under, state)

@@ -1,6 +1,6 @@
-"""Packings from files: our own NPZ, LAMMPS, YADE, MercuryDPM, and tables.
+"""Packings from files: NPZ, LAMMPS, YADE, MercuryDPM, and tables.
 
-Whatever a file holds, these functions return a validated Packing or raise InputError.
+These functions return a validated Packing or raise InputError.
 """
 
 from granforce.packing.importers.dem import open_mercury, read_mercury, read_yade

@@ -1,19 +1,19 @@
-"""Packings of simulations by YADE and MercuryDPM, from the text files that they write.
+"""Packings from text files written by YADE and MercuryDPM.
 
-YADE: bodies by `export.textExt` (format x_y_z_r, id_x_y_z_r_matId, or x_y_z_r_attrs with a column
-id in its comment; without ids, these count the lines from 0), and a line for each interaction with
+YADE: bodies from `export.textExt` (format x_y_z_r, id_x_y_z_r_matId, or x_y_z_r_attrs with a column
+id in its comment; without ids, lines are numbered from 0), and a line for each interaction with
 id1, id2 and the vectors phys.normalForce and phys.shearForce, which its documentation
-(NormShearPhys) gives in global coordinates, as sustained by particle #2 from particle #1.
+(NormShearPhys) defines in global coordinates, as acting on particle #2 from particle #1.
 
-MercuryDPM: $name.data and $name.fstat as its documentation ("Output files", docs.mercurydpm.org)
-has them: for each time step a line N, time and the domain, then the particles (x, y, z, velocity,
-radius, angles, angular velocity, info; in two dimensions x, y, velocity, radius, angle, angular
-velocity, info); and comments, then a line for each contact with time, i, j (below 0: a wall), the
-contact point, overlap, tangential spring, |f_n|, |f_t|, the unit vectors n and t. n and t are those
-of the force on i where n points from j to i, and of the force on j otherwise.
+MercuryDPM: $name.data and $name.fstat as documented ("Output files", docs.mercurydpm.org): for each
+time step a line with N, time and the domain, then the particles (x, y, z, velocity, radius, angles,
+angular velocity, info; in two dimensions x, y, velocity, radius, angle, angular velocity, info);
+and comments, then a line for each contact with time, i, j (below 0: a wall), the contact point,
+overlap, tangential spring, |f_n|, |f_t|, the unit vectors n and t. n and t are those of the force
+on i if n points from j to i, and of the force on j otherwise.
 
-Both are three-dimensional; a layer of disks (spheres) is taken, in the plane in which its centres
-lie. What walls and gravity do to grains becomes their load.
+Both are three-dimensional; a layer of disks (spheres) is read, in the plane that contains its
+centres. Forces of walls and gravity on grains become their load.
 """
 
 from collections.abc import Mapping, Sequence
@@ -46,17 +46,17 @@ from granforce.records import (
 )
 from granforce.types import Floats, Integers
 
-# Centres lie in a plane where they leave it by less than this part of a radius.
+# Centres lie in a plane if they leave it by less than this fraction of a radius.
 _FLAT = 1e-3
-# Of a force that is nothing, so that its direction is none.
+# Forces below this are zero and have no direction.
 _TINY = 1e-300
-# What walls may be, as grains.
+# How walls take part, as grains.
 WALLS = "held", "pressing"
 _BODY = ("x", "y", "z", "r", "id")
 _INTERACTION = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")
 _FSTAT = ("time", "i", "j", "x", "y", "z", "delta", "deltat", "fn", "ft")
 _FSTAT += ("nx", "ny", "nz", "tx", "ty", "tz")
-# Columns of a line of particles by their number, and whether the line before has the domain in 3-D.
+# Columns of a particle line by their number, and whether the line before has the 3-D domain.
 _DATA = {
     (14, 8): ("x", "y", "z", "vx", "vy", "vz", "r", "q1", "q2", "q3", "wx", "wy", "wz", "info"),
     (8, 8): ("x", "y", "z", "vx", "vy", "vz", "r", "info"),
@@ -89,14 +89,13 @@ def read_yade(
     """A Packing from YADE's bodies and interactions (paths or open files).
 
     box: (L_x, L_y) of the plane, inf for an open direction; None: open. tilt: of the cell, whose
-    upper side begins at (tilt, L_y). columns: {name here: name in the files} of columns x, y, z, r,
-    id, id1, id2, fnx … fsz that are called otherwise. reverse: take shear forces with the other
-    sign.
+    upper side begins at (tilt, L_y). columns: {name here: name in the files} for columns x, y, z,
+    r, id, id1, id2, fnx … fsz with other names. reverse: change the sign of shear forces.
 
-    Bodies that interact and are not listed are walls, where the list has ids. What they do to
-    grains becomes the grains' load or, with `walls`, forces of contacts: each wall is then one more
-    grain, "held" (its balance is left open, so that it takes any force) or "pressing" (with the
-    force that it has in the simulation as its load). packing.info has notes of this.
+    Bodies that interact but are not listed are walls, if the list has ids. Their forces on grains
+    become the grains' load or, with `walls`, contact forces: each wall is then one more grain,
+    "held" (its balance is not required, so it takes any force) or "pressing" (its load is its force
+    in the simulation). packing.info has notes about this.
     Raises InputError naming file and line.
     """
     cell = _cell(box, tilt)
@@ -119,7 +118,7 @@ def read_yade(
     if len(at_wall):
         there = links.some(at_wall)
         normal, shear = _yade_forces(there, plane)
-        # Forces are on the second of both.
+        # Forces act on the second body.
         wall = one[at_wall].astype(int)
         ends = np.array([there.fields("id1"), there.fields("id2")])
         places = np.arange(len(wall))
@@ -162,8 +161,8 @@ def read_mercury(
 ) -> Packing:
     """A Packing from MercuryDPM's .data and .fstat (paths or open files).
 
-    frame: number of the time step in the files, from 0; by default the last that is whole in both.
-    Other options as for `read_yade`. Raises InputError naming file and line.
+    frame: number of the time step in the files, from 0; by default the last that is complete in
+    both. Other options as for `read_yade`. Raises InputError naming file and line.
     """
     found = open_mercury(
         *(data, fstat, mu),
@@ -222,7 +221,7 @@ class _TimeStep(NamedTuple):
 
     name: str
     time: float
-    domain: int  # fields of the line before
+    domain: int  # number of fields of the line before
     rows: list[tuple[int, list[str]]]  # line numbers and fields
 
     def table(self) -> Table:
@@ -259,13 +258,13 @@ def _mercury_packing(
         out = cell.nearest(point - x[grain])
         normal, force = _mercury_forces(there, plane)
         names, number = np.unique(there.fields("j"), return_inverse=True)
-        # The force is on the grain where n points to it, away from the wall.
+        # The force acts on the grain if n points to it, away from the wall.
         sign = np.where(np.sum(normal * out, axis=1) < 0, -1.0, 1.0)[:, None]
         on_walls = _OnWalls(grain, number, sign * normal, sign * force, names.tolist())
     links = links.some(np.flatnonzero((first >= 0) & (second >= 0)))
     i, j = links.lookup("i", ids), links.lookup("j", ids)
     normal, force = _mercury_forces(links, plane)
-    # That of the grain that n points to.
+    # The force acts on the grain that n points to.
     to_first = np.sum(normal * cell.nearest(x[j] - x[i]), axis=1) < 0
     force[to_first] *= -1
     return _packing(
@@ -298,7 +297,7 @@ def _packing(
     most_grains: int | None,
     source: str,
 ) -> Packing:
-    """The packing of disks and of the forces (k, 2) on j, and of walls or what they do."""
+    """The packing of disks with forces (k, 2) on j, and with walls or their forces."""
     check_grains(len(grains.rows), most_grains, grains.name)
     x = cell.wrapped(np.column_stack([grains.numbers(axis) for axis in plane]))
     r = grains.numbers("r")
@@ -337,7 +336,7 @@ def _packing(
 
 
 def _note_of(on_walls: _OnWalls, walls: str | None, cell: Cell) -> str:
-    """What became of contacts with walls; InputError for walls in a periodic box."""
+    """A note on contacts with walls; InputError for walls in a periodic box."""
     count, names = len(on_walls.grain), some_of(on_walls.names)
     if not np.isinf(cell.box).any():
         if walls:
@@ -354,10 +353,10 @@ def _note_of(on_walls: _OnWalls, walls: str | None, cell: Cell) -> str:
 def _as_grains(on_walls: _OnWalls, x: Floats, r: Floats) -> tuple[Floats, Floats, Contacts, Floats]:
     """Centres and radii of grains and walls, the contacts of walls, and their forces (w, 2).
 
-    A wall lies behind the places where it is touched; forces on it have no lever arm, so that its
+    A wall is a grain behind the places where it is touched; forces on it have no lever arm, so its
     torque does not count.
     """
-    # Walls along the plane carry nothing in it.
+    # Walls parallel to the plane exert no force in it.
     pressed = np.flatnonzero(on_walls.normal.any(axis=1) & on_walls.force.any(axis=1))
     grain, normal = on_walls.grain[pressed], on_walls.normal[pressed]
     seen, wall = np.unique(on_walls.wall[pressed], return_inverse=True)
@@ -377,7 +376,7 @@ def _cell(box: npt.ArrayLike | None, tilt: float) -> Cell:
 
 
 def _plane(table: Table, dimensions: int) -> str:
-    """The two axes of the plane in which centres lie."""
+    """The two axes of the plane that contains the centres."""
     if dimensions == 2:
         return "xy"
     spread = {axis: float(np.ptp(table.numbers(axis))) for axis in "xyz"}
@@ -405,7 +404,7 @@ def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str]]
 
 
 def _yade_links(source: Source, named: bool) -> Table:
-    """A Table of interactions, under the names in the file if these are right, or to be."""
+    """A Table of interactions, with the names of the file if valid, otherwise the standard ones."""
     name, rows, comments = _split(source)
     words = [word.lower() for word in rows[0][1]]
     if words[0].lstrip("+-").replace(".", "").isdigit():
@@ -420,7 +419,7 @@ def _yade_links(source: Source, named: bool) -> Table:
 
 
 def _yade_bodies(source: Source) -> Table:
-    """A Table of bodies, whose columns the format and the last comment tell."""
+    """A Table of bodies, with columns given by the format and the last comment."""
     name, rows, comments = _split(source)
     formats = [words[-1] for words in map(str.split, comments) if words[:1] == ["format"]]
     header = (formats[0] if formats else "x_y_z_r").removesuffix("_attrs").split("_")
@@ -436,7 +435,7 @@ def _yade_bodies(source: Source) -> Table:
 
 
 def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
-    """The time steps that are whole, at least one, and which one is cut off, in words."""
+    """The complete time steps, at least one, and a description of one that is cut off."""
     name, rows, _ = _split(source)
     at = 0
     steps: list[_TimeStep] = []

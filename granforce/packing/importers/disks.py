@@ -40,14 +40,14 @@ def from_disks(
     """A Packing of disks, with the force network nearest to equal normal forces.
 
     x (N, 2): centres. r (N,): radii. mu: friction coefficient. Disks closer than tolerance (in
-    largest radii) touch. box: sides (L_x, L_y) of a periodic cell with this pressure, and its tilt;
-    by default the set is open, and needs walls and gravity. walls: "floor", "box" (a floor and two
-    sides), as far out as the disks reach, or segments (k, 4) x, y, x, y. Walls are held: behind
-    each place that a disk touches is one more grain, whose balance is left open. gravity: g times
-    the mass density, downwards: a disk weighs g π r².
+    largest radii) touch. box: sides (L_x, L_y) of a periodic cell at this pressure, and its tilt;
+    by default the set is open and needs walls and gravity. walls: "floor", "box" (a floor and two
+    sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held: behind each
+    place that a disk touches is one more grain, whose balance is not required. gravity: g times the
+    mass density, downwards: a disk weighs g π r².
 
-    Raises InputError for disks that overlap and for what makes no sense together, NotJammedError
-    where no network exists.
+    Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
+    network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     r = float_array(r, (-1,), "radii")
@@ -75,9 +75,9 @@ def enclosed(
     gravity: float = 0.0,
     tolerance: float = LISTED_TOUCHING,
 ) -> Packing:
-    """A packing without forces, with walls and gravity as `from_disks` has them.
+    """A packing without forces, with walls and gravity as in `from_disks`.
 
-    Raises InputError in a periodic box, and where no disk touches a wall.
+    Raises InputError in a periodic box, or if no disk touches a wall.
     """
     gravity = positive(gravity, "gravity", or_zero=True, most=LARGEST_UNIT)
     if walls is None and not gravity:

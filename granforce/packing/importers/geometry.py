@@ -1,4 +1,4 @@
-"""Contacts of given disks in a cell, and the checks that contacts and positions of a file agree."""
+"""Contacts of given disks in a cell, and checks that a file's contacts match its positions."""
 
 from collections.abc import Callable
 
@@ -10,21 +10,21 @@ from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Contacts, InputError, make_contacts, make_packing, positive, repeated
 from granforce.types import Floats, Integers, Mask
 
-# Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
+# Contacts may overlap, or have a gap, up to this fraction of the smaller radius.
 OVERLAP_ALLOWED = 0.2
 
-# Largest misfit, in largest radii, between a given centre distance or branch and the positions:
-# dumps with six digits pass, a wrong box or a wrong grain does not.
+# Largest difference, in largest radii, between a given distance or branch and the positions: dumps
+# with six digits pass; a wrong box or a wrong grain does not.
 MISFIT = 1e-3
 
-# Positions and box sides in largest radii: beyond, float64 cannot resolve a contact's gap.
+# Largest positions and box sides, in largest radii; beyond, float64 cannot resolve a gap.
 EXTENT = 1e7
 
-# Pairs within one largest diameter that may be looked at for overlaps: above, grains lie on top
-# of each other (or sizes differ too much), and the list of pairs would not fit into memory.
+# Most pairs within one largest diameter that are checked for overlaps. Beyond, grains lie on top of
+# each other (or sizes differ too much), and the list of pairs would not fit into memory.
 CLOSE_PAIRS = 20_000_000
 
-# Contacts a grain needs at least to be judged by its balance, and what is rounding of it, in Σ |f|.
+# Least contacts of a grain for its balance to count, and its rounding error in Σ |f|.
 _ENOUGH, _ROUNDING = 3, 1e-12
 
 # No direction is periodic.
@@ -47,7 +47,7 @@ def largest_gap(tolerance: float) -> float:
 
 
 def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, Floats]:
-    """Grains i, j (P,) of all pairs that overlap, and their gaps (P,) < 0; centres may coincide."""
+    """Grains i, j (P,) of all overlapping pairs, and their gaps (P,) < 0; centres may coincide."""
     i, j, shift = find_pairs(x, r, cell, 0.0)
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
@@ -61,10 +61,10 @@ def listed(
     place: Callable[[int], str],
     branch: Floats | None = None,
 ) -> Contacts:
-    """Contacts between grains i, j (N_c,), their branch vectors (N_c, 2) given or nearest images.
+    """Contacts between grains i, j (N_c,), with given branches (N_c, 2) or nearest images.
 
-    place(c) names contact c in messages. Raises InputError where a given branch does not lead
-    from i to an image of j, where disks overlap or gape too much, and for contacts given twice.
+    place(c) names contact c in messages. Raises InputError if a given branch does not lead from i
+    to an image of j, if disks overlap or are apart too much, and for contacts given twice.
     """
     nearest = cell.nearest(x[j] - x[i])
     if branch is None:
@@ -82,10 +82,10 @@ def listed(
 def once(
     i: Integers, j: Integers, force: Floats, allowed: float, place: Callable[[int], str]
 ) -> Integers:
-    """Rows that are left where pairs that are listed twice, either way around, count once.
+    """Rows that remain when pairs listed twice, in either order, count once.
 
-    force (k, 2): on j. Raises InputError where both rows of a pair differ by more than `allowed`,
-    a part of the mean force.
+    force (k, 2): on j. Raises InputError if the two rows of a pair differ by more than `allowed`, a
+    fraction of the mean force.
     """
     if len(i) < 2:
         return np.arange(len(i))
@@ -106,7 +106,7 @@ def once(
 def check_contacts(
     contacts: Contacts, r: Floats, place: Callable[[int], str], allowed: float = OVERLAP_ALLOWED
 ) -> None:
-    """InputError naming a contact whose disks overlap or gape too much, or that is given twice."""
+    """InputError naming a repeated contact, or one whose disks overlap or are apart too much."""
     i, j, gap = contacts.i, contacts.j, contacts.gap
     for c in np.flatnonzero(np.abs(gap) > allowed * np.minimum(r[i], r[j]))[:1]:
         state = "overlap" if gap[c] < 0 else "are apart"
@@ -125,7 +125,7 @@ def check_contacts(
 def check_disks(
     x: Floats, r: Floats, cell: Cell, place: Callable[[int], str], allowed: float = OVERLAP_ALLOWED
 ) -> None:
-    """InputError where radii, positions or cell cannot be a packing; place(g) names grain g."""
+    """InputError if radii, positions or cell cannot form a packing; place(g) names grain g."""
     for g in np.flatnonzero(r <= 0)[:1]:
         raise InputError(
             f"{place(g)}: radius {r[g]:g} is not positive; correct or remove the grain"
@@ -156,14 +156,15 @@ def check_disks(
 
 
 def _check_crowding(x: Floats, r: Floats, cell: Cell) -> None:
-    # Without pairs across a side, as the tree knows no tilted cell: a crowd shows without them.
+    # Pairs across a side are left out, as the tree does not support tilted cells; crowding still
+    # shows.
     tree = cKDTree(cell.wrapped(x))
     if tree.count_neighbors(tree, 2 * r.max()) > CLOSE_PAIRS:
         raise InputError("too many grains lie within one diameter of each other; check the unit")
 
 
 def _check_branches(misfit: Floats, largest: float, place: Callable[[int], str]) -> None:
-    """A given branch may lead to any image: misfit is what is left without vectors of the cell."""
+    """InputError if a branch leads to no image; misfit: its remainder without cell vectors."""
     for c in np.flatnonzero(np.hypot(*misfit.T) > MISFIT * largest)[:1]:
         raise InputError(
             f"{place(c)}: normal and length lead {np.hypot(*misfit[c]):.2g} past the second "
@@ -176,7 +177,7 @@ def _pair(i: Integers, j: Integers, c: int) -> str:
 
 
 def components(force: Floats, normal: Floats) -> Floats:
-    """f_n and f_t (k, 2) of forces (k, 2) on contacts of these normals n; t = (−n_y, n_x)."""
+    """f_n and f_t (k, 2) of forces (k, 2) on contacts with normals n (k, 2); t = (−n_y, n_x)."""
     across = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.column_stack([np.sum(force * way, axis=1) for way in (normal, across)])
 
@@ -190,11 +191,11 @@ def vectors(forces: Floats, normal: Floats) -> Floats:
 def gain_by_reversing(
     contacts: tuple[Integers, Integers, Floats], forces: Floats, load: Floats, inner: Mask
 ) -> float:
-    """By what part the unbalance of inner grains falls if all f_t change sign; below 0: it grows.
+    """Fraction by which the unbalance of inner grains falls if all f_t change sign; below 0: grows.
 
     Programs differ in the sign of f_t. contacts: i, j (k,) and the normals (k, 2); forces (k, 2),
-    load (N, 2); inner (N,): grains that count, of which those with _ENOUGH contacts do. Unbalance
-    that is rounding counts as none.
+    load (N, 2); inner (N,): grains that count, if they have _ENOUGH contacts. Unbalance at the
+    level of rounding counts as none.
     """
     i, j, normal = contacts
     inner = inner & (np.bincount(np.concatenate([i, j]), minlength=len(load)) >= _ENOUGH)

@@ -14,11 +14,11 @@ _EARLIER = {"_min": "_low", "_max": "_high"}
 def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
-    f_n, f_t: known exactly; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as `granforce intervals
-    --out` writes them (earlier versions: f_n_min, f_n_max, f_t_min, f_t_max). Forces are in the
+    f_n, f_t: exact values; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as written by `granforce
+    intervals --out` (earlier versions: f_n_min, f_n_max, f_t_min, f_t_max). Forces are in the
     packing's unit, which names may end with: ``f_n [packing]``. Empty fields and other columns are
-    ignored. source: a path or an open file. Raises InputError naming the line of what is wrong, and
-    for a column in another unit.
+    ignored. source: a path or an open file. Raises InputError naming the offending line, and for a
+    column in another unit.
     """
     table = _renamed(read_csv(source).in_packing_unit())
     contacts = table.whole("contact")
@@ -44,7 +44,7 @@ def read_known(source: Source) -> Known:
 
 
 def _renamed(table: Table) -> Table:
-    """The table with earlier names of bounds replaced; InputError where both names are there."""
+    """The table with earlier names of bounds replaced; InputError if both names are present."""
     header = [
         f"{name[:3]}{_EARLIER[name[3:]]}"
         if name[:3] in _COMPONENTS and name[3:] in _EARLIER

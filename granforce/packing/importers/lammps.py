@@ -24,40 +24,40 @@ from granforce.types import Floats
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
-# Columns of positions, wrapped and unwrapped, and in parts of the box's sides (``dump atom``).
+# Columns of positions, wrapped and unwrapped, in fractions of the box sides (``dump atom``).
 SCALED = ("xs", "ys"), ("xsu", "ysu")
 AXES = ("x", "y"), ("xu", "yu"), *SCALED
 NAMES = ("id", *itertools.chain(*AXES), "radius", "diameter", *CONTACT_COLUMNS)
 
-# The normal force may point this far beside the line of centres, in the mean force of a contact:
-# more, and its columns are not what they are taken for.
+# Largest deviation of the normal force from the line of centres, in mean contact forces; beyond,
+# the columns are not what their order suggests.
 SKEW = 1e-2
 
-# Titles of items that are more than one word.
+# Titles of items that have more than one word.
 _TITLES = ("NUMBER OF", "BOX BOUNDS")
 
 
 class _Item(NamedTuple):
     line: int  # line number of its title
-    words: list[str]  # what follows the title on its line
+    words: list[str]  # the rest of the title line
     body: list[list[str]]  # the lines below, as lists of words
 
 
 class _Box(NamedTuple):
     low: Floats  # (2,) origin
-    vectors: Floats  # (2, 2) its sides, in rows, whether or not it is periodic along them
+    vectors: Floats  # (2, 2) its sides, in rows, periodic or not
     cell: Cell
 
 
 class Dump(NamedTuple):
-    """A dump, cut into its snapshots."""
+    """A dump, divided into its snapshots."""
 
     name: str
     lines: list[str]
-    at: dict[int, range]  # {timestep: its lines}, in the file's order; of equal ones, the last
+    at: dict[int, range]  # {timestep: its lines}, in the file's order; the last of equal ones
 
     def items(self, step: int) -> dict[str, _Item]:
-        """The parts of a snapshot by their titles."""
+        """The items of a snapshot by their titles."""
         found: dict[str, _Item] = {}
         item = None
         for k in self.at[step]:
@@ -70,7 +70,7 @@ class Dump(NamedTuple):
         return found
 
     def is_cut(self, step: int) -> bool:
-        """Whether a snapshot ends the file before all rows that it announces."""
+        """Whether the file ends before all rows of a snapshot."""
         if self.at[step].stop != len(self.lines):
             return False
         items = self.items(step)
@@ -99,17 +99,16 @@ def read_lammps(
 
     particles: ``dump custom`` with id, x y (or xu yu, xs ys, xsu ysu) and radius (or diameter), in
     any order. contacts: ``dump local`` with the two grains, their distance, normal and tangential
-    force on the first: columns named atom1 atom2 distance fx fy px py, or seven in this order,
-    beside an index; where they are named, the distance, which is only checked, may be missing.
-    columns: {name here: name in the dumps} of columns that are called otherwise. Pairs without
-    force are neighbours, not contacts; pairs that are listed from both sides (newton off) count
-    once.
+    force on the first: columns named atom1 atom2 distance fx fy px py, or seven in this order and
+    possibly an index; if they are named, the distance, which is only a check, may be missing.
+    columns: {name here: name in the dumps} for columns with other names. Pairs without force are
+    neighbours, not contacts; pairs listed from both sides (newton off) count once.
 
-    frame: the timestep, by default the last that is whole in both files. reverse: take tangential
-    forces with the other sign. Grains are sorted by id. The box may be tilted in the plane (xy).
-    Directions that are not periodic are open, what grains lack to balance is their load there.
-    packing.info holds timestep, residual and violation (in ⟨f_n⟩), rattlers, contacts_skipped and
-    notes. most_grains: how many are taken.
+    frame: the timestep, by default the last that is complete in both files. reverse: change the
+    sign of tangential forces. Grains are sorted by id. The box may be tilted in the plane (xy).
+    Directions that are not periodic are open; unbalanced forces of grains become their load there.
+    packing.info contains timestep, residual and violation (in ⟨f_n⟩), rattlers, contacts_skipped
+    and notes. most_grains: largest number of grains.
 
     Raises InputError naming file and line.
     """
@@ -163,7 +162,7 @@ def open_lammps(
 
 
 def read_dump(source: Source) -> Dump:
-    """The Dump in a file; InputError for what is none."""
+    """The Dump in a file; InputError if it is not a dump."""
     name, text = read_text(source)
     lines = text.splitlines()
     first = next(k for k, line in enumerate(lines) if line.strip())
@@ -174,7 +173,7 @@ def read_dump(source: Source) -> Dump:
     for start, end in itertools.pairwise([*starts, len(lines)]):
         number = next((k for k in range(start + 1, end) if lines[k].strip()), None)
         if number is None and at and end == len(lines):
-            break  # cut off before its number
+            break  # cut off before the number
         line = start if number is None else number
         step = _whole("" if number is None else lines[line].split()[0], name, line + 1)
         at.pop(step, None)
@@ -183,7 +182,7 @@ def read_dump(source: Source) -> Dump:
 
 
 def _title(heading: str) -> tuple[str, list[str]]:
-    """The title of an item, one word but for _TITLES, and the words behind it."""
+    """The title of an item, one word except for _TITLES, and the words after it."""
     for title in (*_TITLES, heading.split(" ")[0]):
         if heading == title or heading.startswith(title + " "):
             return title, heading[len(title) :].split()
@@ -191,7 +190,7 @@ def _title(heading: str) -> tuple[str, list[str]]:
 
 
 def _label(items: dict[str, _Item]) -> str:
-    """What a dump of contacts calls its rows: ENTRIES, or what `dump_modify label` makes of it."""
+    """The label of rows in a contact dump: ENTRIES, or one set by `dump_modify label`."""
     label = " ".join(items["NUMBER OF"].words) if "NUMBER OF" in items else ""
     return label if label not in ("", "ATOMS") else "ENTRIES"
 
@@ -237,7 +236,7 @@ def box_of(name: str, items: dict[str, _Item]) -> _Box:
             f"{place}: a box of kind {' '.join(item.words)!r}, which is not read; dump it with its "
             "first side along x (without triclinic/general)"
         )
-    # The height of the layer does not matter, its tilts do.
+    # The height of the layer does not matter, but its tilts do.
     columns = ["lo", "hi", "tilt"] if tilted else ["lo", "hi"]
     rows = [row[: len(columns)] for row in item.body[: len(columns)]]
     if len(rows) < len(columns):
@@ -251,7 +250,7 @@ def box_of(name: str, items: dict[str, _Item]) -> _Box:
     high[0] -= max(0.0, tilt[0])
     for k in np.flatnonzero(high <= low)[:1]:
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
-    # Dumps of old versions have no flags, and were periodic by default.
+    # Dumps of old versions have no flags; they were periodic by default.
     is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
     (width, height), lean = high - low, tilt[0]
     try:
@@ -262,7 +261,7 @@ def box_of(name: str, items: dict[str, _Item]) -> _Box:
 
 
 def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int]]:
-    """Centres and radii in the order of ids, and the row {id: row} of each."""
+    """Centres and radii in order of ids, and the row of each id, {id: row}."""
     order = np.argsort(table.numbers("id"), kind="stable")
     rank = np.argsort(order)
     index = {label: int(rank[row]) for label, row in table.index("id").items()}
@@ -281,7 +280,7 @@ def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int
 def _contacts(
     table: Table, x: Floats, r: Floats, cell: Cell, index: Mapping[Any, int]
 ) -> tuple[Contacts, Floats, int]:
-    """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
+    """Contacts that carry force, their forces (N_c, 2), and the number of pairs without force."""
     i, j = (table.lookup(column, index) for column in ("atom1", "atom2"))
     normal_force, tangential_force = (
         np.column_stack([table.numbers(column) for column in pair])
@@ -290,7 +289,7 @@ def _contacts(
     active = np.flatnonzero(normal_force.any(axis=1) | tangential_force.any(axis=1))
     if not len(active):
         raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
-    # Forces are on atom1 = i; ours are on j.
+    # Forces are on atom1 = i; granforce uses those on j.
     on_j = -(normal_force + tangential_force)[active]
     left = once(i[active], j[active], on_j, LOAD_MISFIT, lambda c: table.place(active[c]))
     skipped, active = len(i) - len(active), active[left]
@@ -306,9 +305,9 @@ def _contacts(
 
 
 def _with_names(table: Table, named: bool) -> Table:
-    """The table of contacts with CONTACT_COLUMNS in its header, if not by name then by order.
+    """The table of contacts with CONTACT_COLUMNS as header, matched by name or else by order.
 
-    By name it may lack the distance, which is a check only.
+    By name, the distance may be missing, as it is only a check.
     """
     needed = set(CONTACT_COLUMNS) - {"distance"}
     if named or needed <= set(table.header):

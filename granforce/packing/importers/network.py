@@ -1,4 +1,4 @@
-"""The force network of an imported packing: taken as given or found, judged, and reported."""
+"""The force network of an imported packing: given or computed, checked, and reported."""
 
 from typing import Any
 
@@ -14,20 +14,20 @@ from granforce.records import InputError, NotJammedError, Packing, UndecidedErro
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 from granforce.types import Floats, Integers
 
-# The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
-# difference is then taken off them, since S would be empty otherwise.
+# Unbalance of the loads of an open set, in ⟨f_n⟩, that is attributed to digits lost in the file and
+# removed, since S would be empty otherwise.
 LOAD_MISFIT = 1e-3
-# A note tells that f_t may have the other sign where that takes off this part of the unbalance.
+# Fraction of the unbalance that reversing f_t must remove for a note.
 WORTH_REVERSING = 0.5
 
 
 def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
-    """The packing with the pressure (or, in an open box, the boundary loads) its forces carry.
+    """The packing with the pressure (or, in an open box, the boundary loads) of its forces.
 
-    P = Σ f_n ℓ / (2V); a grain's load is what its contact forces leave over, unless loads were
-    given. reverse: the tangential forces change sign. Residual, violation and rattlers go to
-    packing.info, beside the given entries, and a note where the other sign balances better.
-    Raises InputError where the forces do not press.
+    P = Σ f_n ℓ / (2V); a grain's load balances its contact forces, unless loads were given.
+    reverse: change the sign of tangential forces. Residual, violation and rattlers are added to
+    packing.info with the given entries, and a note if the other sign balances better. Raises
+    InputError if the forces do not press.
     """
     if reverse:
         packing = packing._replace(forces=packing.forces * [1, -1])
@@ -53,19 +53,19 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
 
 
 def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
-    """The first `count` bodies under what all others, and what was left open, do to them.
+    """The first `count` bodies under the forces of all others and of contacts left open.
 
-    forces (N_c, 2): a network of all contacts in which those bodies are to stay as they are. It
-    becomes their own, and what it leaves over on each of them its load: by their loads the sum
-    Σ f_n ℓ is given, so that S is bounded. Lengths are then in its largest radii, as those of
-    compacted packings. Raises InputError where it does not press.
+    forces (N_c, 2): a network of all contacts in which those bodies stay at rest. It becomes their
+    own network, and the unbalance of each body its load; the loads fix the sum Σ f_n ℓ, so that S
+    is bounded. Lengths are in the largest radius of these bodies, as in compacted packings. Raises
+    InputError if the network does not press.
     """
     c, unit = packing.contacts, packing.r[:count].max()
     inner = (c.i < count) & (c.j < count)
     c = c._replace(
         **{name: getattr(c, name) / unit for name in ("length", "gap", "arm_i", "arm_j")}
     )
-    # Noise, which grains that carry nothing could not balance without it.
+    # Without this, noise on grains that carry nothing could not be balanced.
     carrying = forces[:, :1] > CARRYING * np.abs(forces[:, 0]).mean()
     forces = np.where(carrying, forces, 0.0)
     return adopt(
@@ -83,8 +83,8 @@ def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
 def find(packing: Packing, **info: Any) -> Packing:
     """The packing with the admissible force network nearest to equal normal forces.
 
-    Needs a pressure, or loads in an open box; loads that miss balance by rounding are corrected
-    (info["load_change"]). Raises NotJammedError where no network exists.
+    Needs a pressure, or loads in an open box; rounding errors in the balance of the loads are
+    corrected (info["load_change"]). Raises NotJammedError if no network exists.
     """
     if not len(packing.contacts.i):
         raise NotJammedError("no grains touch; check the radii, or raise the tolerance")
@@ -106,13 +106,13 @@ def find(packing: Packing, **info: Any) -> Packing:
 
 @takes(Packing)
 def report(packing: Packing, ens: Ensemble | None = None) -> dict[str, Any]:
-    """What a packing is, as a dict of plain numbers (None where a quantity is not defined).
+    """Properties of a packing, as a dict of plain numbers (None if a quantity is undefined).
 
     ens: the packing's ensemble if known. Lengths in largest radii, residual and violation of the
     packing's own network in ⟨f_n⟩, mean normal force (over the backbone) and pressure in the
-    packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts, which
-    soft disks (overlaps beyond RIGID_OVERLAP) do not have. Raises NotJammedError where no
-    admissible network exists.
+    packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts,
+    undefined for soft disks (overlaps beyond RIGID_OVERLAP). Raises NotJammedError if no admissible
+    network exists.
     """
     ens = ensemble(packing) if ens is None else ens
     loaded = bool(packing.forces.any())
@@ -138,9 +138,9 @@ def report(packing: Packing, ens: Ensemble | None = None) -> dict[str, Any]:
 
 
 def judged(packing: Packing) -> dict[str, Any]:
-    """Residual and violation of the packing's own forces, and the grains they leave without load.
+    """Residual and violation of the packing's own forces, and the grains without force.
 
-    Without pruning, so that it can be said of any network, also where S is empty.
+    Without pruning, so that they exist for any network, even if S is empty.
     """
     whole = ensemble(packing, prune=False)
     return {
@@ -173,9 +173,9 @@ def _largest_overlap(packing: Packing) -> float:
 def _left_over(packing: Packing) -> Floats:
     """Loads (N, 3) that balance every grain under the packing's own contact forces.
 
-    All that carry force, not only those with a large rest: then the network lies in S to rounding,
-    and what rigid lever arms lack of the centre distance stays consistent. Rattlers get none: what
-    noise leaves on them need not lie in any cone.
+    All contacts with force are included, not only those with a large unbalance: then the network is
+    in S to rounding, even where rigid lever arms do not add up to the centre distance. Rattlers get
+    no load, because noise on them need not lie in any cone.
     """
     whole = ensemble(packing, prune=False)
     rest = (whole.A @ whole.to_vector(packing.forces)).reshape(len(whole.grains), -1)
@@ -190,7 +190,7 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     """The packing of an open set, its loads in balance to rounding, and its ensemble.
 
     Lever arms meet midway: with a_i + a_j = ℓ the balance of all grains implies that of the loads,
-    while arms that miss ℓ by a gap would demand one particular Σ gap f_t.
+    while arms that differ from ℓ by a gap would require one particular Σ gap f_t.
     """
     if not packing.load.any():
         raise InputError(
@@ -203,7 +203,7 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     )
     force = np.abs(packing.load / [1.0, 1.0, r.max()]).max(axis=1)
     forces = np.zeros_like(packing.forces)
-    forces[:, 0] = force[force > 0].mean()  # the scale that tolerances are relative to
+    forces[:, 0] = force[force > 0].mean()  # the scale of tolerances
     packing = packing._replace(contacts=contacts, forces=forces)
     settled = _settled(packing)
     try:

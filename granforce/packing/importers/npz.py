@@ -1,4 +1,4 @@
-"""granforce's own file of one packing: an NPZ of plain arrays, never pickled."""
+"""granforce's file format for one packing: an NPZ of plain arrays, never pickled."""
 
 import json
 from contextlib import nullcontext
@@ -26,7 +26,7 @@ _GRAINS = ("x", "r", "P", "mu")
 _ARMS = "arm_i", "arm_j"
 _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
 
-# Bytes of the unpacked arrays: a small archive may announce far more than memory holds.
+# Most bytes of the unpacked arrays: a small archive may declare far more than fits into memory.
 _UNPACKED = 10**9
 
 
@@ -36,9 +36,9 @@ def load_packing(
     """The Packing in an NPZ file, its contacts as they are.
 
     source: a path or an open binary file. Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if
-    none), mu, i, j, nx, ny, branch, fn, ft; seed, load, tilt, arm_i, arm_j and info (JSON) if
-    there. unpacked: most bytes of all arrays together; most_grains: how many are taken. Raises
-    InputError naming what is wrong.
+    none), mu, i, j, nx, ny, branch, fn, ft; optionally seed, load, tilt, arm_i, arm_j and info
+    (JSON). unpacked: most bytes of all arrays together; most_grains: largest number of grains.
+    Raises InputError naming the error.
     """
     name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
     arrays = _arrays(source, name, unpacked, most_grains)
@@ -54,11 +54,11 @@ def load_packing(
 
 @takes(Packing)
 def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
-    """Write a packing as NPZ, to be read by `load_packing` exactly.
+    """Write a packing as NPZ; `load_packing` reads it back exactly.
 
-    target: a path, which gets the whole file or none, or an open binary file.
+    target: a path, which is written completely or not at all, or an open binary file.
 
-    Raises InputError where info is not plain numbers and strings, or the path cannot be written.
+    Raises InputError if info has other values than numbers and strings, or on a write error.
     """
     try:
         info = json.dumps(packing.info, default=lambda value: value.item())
@@ -94,7 +94,7 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
 
 
 def _seed(info: dict[str, Any]) -> dict[str, Any]:
-    """The seed as an array of its own, for other readers; one that int64 cannot hold is in info."""
+    """The seed as a separate array, for other readers; in info if int64 cannot represent it."""
     seed = np.array(info.get("seed"))
     return {"seed": seed} if seed.dtype.kind in "iu" else {}
 
@@ -102,10 +102,10 @@ def _seed(info: dict[str, Any]) -> dict[str, Any]:
 def _arrays(
     source: Source, name: str, unpacked: int, most_grains: int | None
 ) -> dict[str, npt.NDArray[Any]]:
-    """The archive's arrays but those that loading ignores, {name: array}."""
+    """The archive's arrays except those that loading ignores, {name: array}."""
     ignored = {"lo", "hi", "fcrit", "gap"}
     try:
-        # Opened here: of an archive that it cannot read, numpy would leave the file open.
+        # Opened here: numpy would leave the file open if it cannot read the archive.
         with (
             nullcontext(source) if hasattr(source, "read") else open(source, "rb") as file,
             np.load(cast("IO[bytes]", file), allow_pickle=False) as archive,
@@ -122,7 +122,7 @@ def _arrays(
     except OSError as error:
         raise InputError(f"{name}: cannot be read ({error.strerror or error})") from None
     except Exception:
-        # A damaged archive fails anywhere: in zipfile, zlib, or numpy's header parser.
+        # Reading a damaged archive may fail in zipfile, in zlib, or in numpy's header parser.
         raise InputError(f"{name}: not an NPZ archive of plain arrays, or damaged") from None
 
 
@@ -161,24 +161,24 @@ def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, An
     check_contacts(contacts, r, "contact {}".format, _gap_allowed(info))
     if not set(_ARMS) <= set(arrays):
         return contacts
-    # Single precision is taken as it is; what it leaves out of balance is for the judges to tell.
+    # Single precision is accepted; residual and violation show the resulting unbalance.
     exact = all(arrays[key].dtype != np.float32 for key in ("r", "nx", "ny", "branch", *_ARMS))
     rounding = 1e-9 if exact else 1e-6
     arms = {}
     for key, grain in zip(_ARMS, (contacts.i, contacts.j), strict=True):
         arms[key] = float_array(arrays[key], grain.shape, key)
-        # From the rigid disk's radius to the middle of the overlap, and no farther; 0 for a wall.
+        # From the rigid disk's radius to the middle of the overlap at most; 0 for a wall.
         far = np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + rounding * r[grain]
         if np.any(far & (arms[key] != 0)):
             raise InputError(f"lever arms {key} do not fit the radii; remove them")
-    # A file written by save_packing: its normals have been divided by their length before.
+    # Written by save_packing: its normals were already normalised.
     if exact:
         contacts = contacts._replace(normal=normal)
     return contacts._replace(arm_i=arms["arm_i"], arm_j=arms["arm_j"])
 
 
 def _gap_allowed(info: dict[str, Any]) -> float:
-    """Where radii were measured only roughly, the importer noted how far contacts gape."""
+    """Largest allowed gap, which importers store in info if radii were measured only roughly."""
     noted = info.get("largest_gap")
     return max(OVERLAP_ALLOWED, noted) if isinstance(noted, float) else OVERLAP_ALLOWED
 

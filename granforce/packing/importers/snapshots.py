@@ -1,4 +1,4 @@
-"""Snapshots of a simulation: which ones its files have, and the packing of one."""
+"""Snapshots of a simulation: their numbers, and the packing of each."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from granforce.types import Floats
 
 @notebook.brief
 class Snapshot(NamedTuple):
-    """A packing, and the names of its grains in the files; −1, −2, … for walls."""
+    """A packing, and the ids of its grains in the files; −1, −2, … for walls."""
 
     packing: Packing
     ids: Floats  # (N,)
@@ -18,15 +18,15 @@ class Snapshot(NamedTuple):
 
 @notebook.brief
 class Snapshots(NamedTuple):
-    """The snapshots in the files of a simulation that are whole."""
+    """The complete snapshots in the files of a simulation."""
 
-    word: str  # what their numbers are: timestep, …
+    word: str  # kind of number: timestep, …
     numbers: Sequence[int]  # in the order of the files, at least one
     read: Callable[[int], Snapshot]
-    lost: str = ""  # in words, what was cut off after the last of them
+    lost: str = ""  # description of what was cut off after the last of them
 
     def snapshot(self, number: int | None = None) -> Snapshot:
-        """One Snapshot, by default the last; InputError for a number that is not there."""
+        """One Snapshot, by default the last; InputError for a number that is not in the files."""
         if number is None:
             last = self.numbers[-1]
             note = f"{self.lost}; {self.word} {last} is read" if self.lost else None
@@ -40,7 +40,7 @@ class Snapshots(NamedTuple):
 
 
 def _noted(found: Snapshot, note: str) -> Snapshot:
-    """The snapshot with one more of its packing's notes."""
+    """The snapshot with one more note on its packing."""
     info = found.packing.info
     notes = [*info.get("notes", []), note]
     return found._replace(packing=found.packing._replace(info={**info, "notes": notes}))

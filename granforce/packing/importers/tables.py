@@ -23,7 +23,7 @@ from granforce.records import (
 from granforce.tolerances import LISTED_TOUCHING
 from granforce.types import Floats
 
-# Columns of grains, then of contacts.
+# Columns of grains.
 NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open")
 NAMES += ("i", "j", "nx", "ny", "length", "fn", "ft")
 
@@ -44,21 +44,21 @@ def read_table(
     tolerance: float = LISTED_TOUCHING,
     most_grains: int | None = None,
 ) -> Packing:
-    """A Packing from a CSV of grains and, if there is one, a CSV of contacts (paths or open files).
+    """A Packing from a CSV of grains and, optionally, a CSV of contacts (paths or open files).
 
-    grains: columns x, y, r; optionally id, and fx, fy, torque (external load in an open set), and
-    open, 1 where the balance of a grain is left open and 0 elsewhere.
-    contacts: columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny,
-    length (else the nearest images are joined) and fn, ft. Without it, grains closer than
-    tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
-    tilt: of the cell, whose upper side begins at (tilt, L_y). columns: {name here: name in the
-    files} of columns that are called otherwise. forces: whether to take fn, ft, by default if they
-    are there; the pressure is then what they carry (in an open set: the loads). reverse: ft has the
-    other sign. Otherwise the network nearest to equal normal forces at the given pressure (or the
-    given loads) is found; pressure is not used with fn, ft. walls ("floor", "box" or segments) and
-    gravity, for tables without forces: see `from_disks`. most_grains: how many are taken.
+    grains: columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and open,
+    1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
+    numbers from 0 without an id column); optionally nx, ny, length (otherwise nearest images are
+    joined) and fn, ft. Without contacts, grains closer than tolerance (in largest radii) touch.
+    box: (L_x, L_y), inf for an open direction; None: open. tilt: of the cell, whose upper side
+    begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
+    forces: whether to read fn, ft, by default if present; they then determine the pressure (in an
+    open set: the loads). reverse: change the sign of ft. Without forces, the network nearest to
+    equal normal forces at the given pressure (or loads) is computed; pressure is not used with fn,
+    ft. walls ("floor", "box" or segments) and gravity, for tables without forces: see `from_disks`.
+    most_grains: largest number of grains.
 
-    Raises InputError naming file and line, NotJammedError where no network exists.
+    Raises InputError naming file and line, NotJammedError if no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     pressure = positive(pressure, "pressure")
@@ -127,7 +127,7 @@ def _loads(table: Table, cell: Cell) -> Floats:
 def _joined(
     table: Table, grains: Table, x: Floats, r: Floats, cell: Cell, forces: bool | None, mu: float
 ) -> tuple[Contacts, Floats | None]:
-    """Contacts of a table and their forces (N_c, 2), or None without."""
+    """Contacts of a table and their forces (N_c, 2), or None without forces."""
     count = len(grains.rows)
     index = grains.index("id") if "id" in grains.header else {row: row for row in range(count)}
     i, j = table.lookup("i", index), table.lookup("j", index)
@@ -143,7 +143,7 @@ def _joined(
 
 
 def _given_branches(table: Table) -> Floats | None:
-    """Branch vectors (N_c, 2) from columns nx, ny, length, or None where there is none of them."""
+    """Branch vectors (N_c, 2) from columns nx, ny, length, or None if they are missing."""
     if not {"nx", "ny", "length"} & set(table.header):
         return None
     normal = np.column_stack([table.numbers("nx"), table.numbers("ny")])

@@ -1,4 +1,4 @@
-"""Text from a path or an open file, and tables of it whose errors name file and line."""
+"""Text from a path or an open file, and tables whose errors name file and line."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from granforce.records import InputError, are_whole
 from granforce.system.files import content_of
 from granforce.types import Floats, Integers, Mask
 
-# Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
+# Larger numbers cannot be lengths or forces, and their squares would overflow.
 LARGEST = 1e100
 
-# Compressed text may unpack to this many times its size, and small files to so many bytes: dumps
-# have 3 to 20 times theirs, and what has far more is no dump.
+# Compressed text may unpack to _RATIO times its size, and small files to _SMALL bytes: dumps reach
+# 3 to 20 times their size, and files with a far larger ratio are not dumps.
 _RATIO, _SMALL = 100, 2**24
-# What compressed files begin with.
+# First bytes of compressed files.
 _GZIP, _ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
 
-# What names of columns of forces in the packing's unit may end with.
+# Suffix allowed in the names of columns of forces in the packing's unit.
 PACKING = " [packing]"
 
 
 class Table(NamedTuple):
     """Rows of text fields under named columns."""
 
-    name: str  # of the file, for messages
+    name: str  # file name, for messages
     header: tuple[str, ...]  # column names
     rows: list[list[str]]  # as many fields as columns
     lines: list[int]  # line number of each row in the file
@@ -48,14 +48,14 @@ class Table(NamedTuple):
         return f"{self.name}, line {self.lines[row]}"
 
     def some(self, rows: Iterable[int]) -> Table:
-        """Some of the rows, in this order."""
+        """The table with some of its rows, in this order."""
         chosen = list(rows)
         return self._replace(
             rows=[self.rows[k] for k in chosen], lines=[self.lines[k] for k in chosen]
         )
 
     def in_packing_unit(self) -> Table:
-        """The table without the unit ``[packing]`` at the end of names; InputError for another."""
+        """The table without the suffix ``[packing]`` of names; InputError for another unit."""
         for name in self.header:
             if name.endswith("]") and not name.endswith(PACKING):
                 raise InputError(
@@ -66,7 +66,7 @@ class Table(NamedTuple):
         return make_table(self.name, header, self.rows, self.lines)
 
     def require(self, *columns: str) -> None:
-        """InputError unless all these columns are there."""
+        """InputError unless all these columns are present."""
         missing = [column for column in columns if column not in self.header]
         if missing:
             raise InputError(
@@ -81,7 +81,7 @@ class Table(NamedTuple):
         return [row[position] for row in self.rows]
 
     def numbers(self, column: str) -> Floats:
-        """One column as float64 (rows,); InputError names the line of what is not a number."""
+        """One column as float64 (rows,); InputError names the line of an invalid number."""
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
             try:
@@ -96,7 +96,7 @@ class Table(NamedTuple):
         return values
 
     def whole(self, column: str) -> Integers:
-        """One column as int64 (rows,) ≥ 0; InputError names the line of what is not whole."""
+        """One column as int64 (rows,) ≥ 0; InputError names the line of an invalid entry."""
         values = self.numbers(column)
         for row in np.flatnonzero(~are_whole(values))[:1]:
             raise InputError(
@@ -106,7 +106,7 @@ class Table(NamedTuple):
         return values.astype(np.int64)
 
     def index(self, column: str) -> dict[int | str, int]:  # type: ignore[override]
-        """Row number of each label in a column, a dict; InputError for a label given twice."""
+        """Row number of each label in a column, a dict; InputError for a repeated label."""
         rows: dict[int | str, int] = {}
         for row, text in enumerate(self.fields(column)):
             first = rows.setdefault(_label(text), row)
@@ -118,11 +118,11 @@ class Table(NamedTuple):
         return rows
 
     def among(self, column: str, index: Mapping[Any, int]) -> Mask:
-        """(rows,) whether the label in a column is one of the index."""
+        """Mask (rows,) of the labels in a column that are in the index."""
         return np.array([_label(text) in index for text in self.fields(column)], dtype=bool)
 
     def lookup(self, column: str, index: Mapping[Any, int]) -> Integers:
-        """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown one."""
+        """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown label."""
         found = np.empty(len(self.rows), dtype=np.int64)
         for row, text in enumerate(self.fields(column)):
             position = index.get(_label(text))
@@ -136,9 +136,9 @@ class Table(NamedTuple):
 
 
 def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: list[int]) -> Table:
-    """A Table, once every row is seen to have as many fields as there are column names.
+    """A Table, checked to have as many fields in every row as column names.
 
-    Raises InputError naming the row that has not, or the column name that is there twice.
+    Raises InputError naming a row of another length, or a repeated column name.
     """
     for column, times in Counter(header).items():
         if column and times > 1:
@@ -156,16 +156,16 @@ def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: l
 
 
 def some_of(columns: Sequence[str]) -> str:
-    """The names of columns for a message, the first where there are many."""
+    """The names of columns for a message, only the first of many."""
     names = [name if len(name) <= 40 else name[:37] + "…" for name in columns[:12]]
     return ", ".join([*names, *(["…"] if len(columns) > len(names) else [])])
 
 
 def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) -> list[Table]:
-    """The tables with columns under the names that are used here.
+    """The tables with columns renamed to the names used here.
 
-    columns: {name here: name in the files}, in any case. Raises InputError for a name that is none
-    of `names`, or a column that no table has.
+    columns: {name here: name in the files}, case-insensitive. Raises InputError for a name that is
+    not in `names`, or a column that no table has.
     """
     if not isinstance(columns, Mapping) or not all(isinstance(v, str) for v in columns.values()):
         raise InputError(f"columns must be {{name here: name in the files}}, got {columns!r:.60}")
@@ -182,7 +182,7 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
     def ours(column: str, header: Sequence[str]) -> str:
         if column.lower() in here:
             return here[column.lower()]
-        # A column of a name that is given to another stands aside.
+        # A column whose name is assigned to another column is renamed.
         taken = columns.get(column, "").lower() in map(str.lower, header)
         return f"other {column}" if taken else column
 
@@ -204,15 +204,15 @@ def read_columns(text: str) -> dict[str, str]:
 
 
 def check_grains(count: int, most: int | None, name: str) -> None:
-    """InputError for a file of more grains than are taken (most; None: any number)."""
+    """InputError if a file has more grains than allowed (most; None: any number)."""
     if most is not None and count > most:
         raise InputError(f"{name}: {count} grains, where at most {most} are taken")
 
 
 def read_text(source: Source) -> tuple[str, str]:
-    """Name and text (UTF-8) of a path or of an open text or bytes file; InputError otherwise.
+    """Name and text (UTF-8) of a path or of an open text or binary file; InputError otherwise.
 
-    Files compressed by gzip are unpacked, and those by Zstandard where Python has a module for it.
+    Files compressed by gzip are unpacked, as are those by Zstandard if Python has a module for it.
     """
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
@@ -233,7 +233,7 @@ def read_text(source: Source) -> tuple[str, str]:
 def read_csv(source: Source) -> Table:
     """A Table from text with a header line, separated by commas, semicolons, tabs or blanks.
 
-    Column names are taken in lower case; blank lines are skipped. Raises InputError.
+    Column names are converted to lower case; blank lines are skipped. Raises InputError.
     """
     name, text = read_text(source)
     lines = text.splitlines()
@@ -255,7 +255,7 @@ def read_csv(source: Source) -> Table:
 
 
 def _unpacked(name: str, content: bytes) -> bytes:
-    """The content, decompressed; InputError for what is damaged or unpacks to far too much."""
+    """The content, decompressed; InputError if it is damaged or unpacks to far too much."""
     if content.startswith(_GZIP):
         module: Any = gzip
     elif content.startswith(_ZSTD):
@@ -278,7 +278,7 @@ def _unpacked(name: str, content: bytes) -> bytes:
 
 
 def _zstd(name: str) -> Any:
-    """The module that unpacks Zstandard: Python's own from 3.14 on, or its backport."""
+    """The module that unpacks Zstandard: Python's own (3.14 or later), or its backport."""
     for module in ("compression.zstd", "backports.zstd"):
         try:
             return import_module(module)
@@ -290,14 +290,14 @@ def _zstd(name: str) -> Any:
 
 
 def _label(text: str) -> int | str:
-    """Grain names compare as whole numbers where they are ('7', '7.0', '+7'), else as text."""
+    """An integer if the grain's name is one ('7', '7.0', '+7'), otherwise its text."""
     try:
         number = float(text)
     except ValueError:
         return text
     if not number.is_integer():
         return text
-    # Past 2⁵³ a float no longer tells neighbouring numbers apart.
+    # Beyond 2⁵³ floats do not distinguish consecutive integers.
     return int(number) if abs(number) < 2**53 else text
 
 
