@@ -130,6 +130,8 @@ def pack(
     Returns a Packing whose forces balance to BALANCED ⟨f_n⟩, whose overlaps are below OVERLAP, and
     whose contacts are certain: `info` contains their `margin`, and the fraction of steps that ended
     before they were accurate (`unfinished_steps`).
+
+    Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
     """
     mu = friction(mu)
     pressure = moderate(pressure, "pressure")
