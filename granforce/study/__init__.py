@@ -1,1 +1,1 @@
-"""Results that are kept: kinds, cells, schema, store, scans."""
+"""Stored results: kinds, cells, schema, store and scans."""

@@ -51,7 +51,7 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
 
 
 def informative_dataset(S: Ensemble, found: Informative, *, seconds: float = 0.0) -> xr.Dataset:
-    """An Informative as a dataset; its contacts are its backbone, the best first."""
+    """An Informative as a dataset; its backbone lists its contacts, the best first."""
     return labelled(
         {
             "backbone": found.contacts,
@@ -123,7 +123,7 @@ def volume_dataset(S: Ensemble, found: Volume) -> xr.Dataset:
 def outline_dataset(
     S: Ensemble, axes: Floats, found: Outline, *, seconds: float = 0.0
 ) -> xr.Dataset:
-    """An Outline in the plane of these axes (2, N_c, 2) as a dataset."""
+    """An Outline in the plane of axes (2, N_c, 2) as a dataset."""
     return labelled(
         {
             "backbone": S.index,

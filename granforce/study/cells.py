@@ -1,7 +1,7 @@
-"""Cells of a study: one dataset each, found in the store or computed and kept.
+"""Cells of a study: one dataset each, loaded from the store or computed and stored.
 
-A cell is one result of one kind (`granforce.study.kinds`), named by plain parameters. Cells are
-independent and seeded: they may be computed anywhere and in any order (`granforce.study.scan`).
+A cell is one result of one kind (`granforce.study.kinds`), identified by plain parameters. Cells
+are independent and seeded: they may be computed anywhere and in any order (`granforce.study.scan`).
 """
 
 from collections.abc import Callable, Mapping
@@ -15,8 +15,8 @@ from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 from granforce.types import Cancel, Progress
 
-# Version of the algorithm that makes packings, certified to be at rest. It is among their
-# parameters, so that everything that rests on a packing is named by it.
+# Version of the algorithm that makes packings certified to be at rest. It is among their
+# parameters, so that it enters the key of everything that depends on a packing.
 PACKING_VERSION = 6
 
 
@@ -25,17 +25,17 @@ def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
 
 
 class Kind(NamedTuple):
-    """One kind of result: what it is called, what names one of it, and how one is computed."""
+    """One kind of result: its name, its parameters, and how it is computed."""
 
-    name: str  # in the store: entries are called <name>-<key>
-    version: int  # raised when the algorithm gives other numbers: older entries are not used
+    name: str  # in the store: entries are named <name>-<key>
+    version: int  # raised when the algorithm gives other numbers; older entries are then ignored
     title: str  # in words
     unit: str  # what progress counts: progress(done, total)
-    # (…) → the plain parameters that name one; InputError for what is wrong
+    # (…) → the plain parameters that identify one; InputError if they are invalid
     parameters: Callable[..., Parameters]
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
-    # (parameters, dataset) → what names the dataset: it may have ended before all was there
+    # (parameters, dataset) → the parameters of the dataset, which may have ended early
     reached: Callable[[Parameters, xr.Dataset], Parameters] = _as_asked
 
 
@@ -43,7 +43,7 @@ class StudyCell(NamedTuple):
     """One dataset of a study."""
 
     kind: Kind
-    parameters: Parameters  # that name it in the store
+    parameters: Parameters  # its key in the store
 
 
 @cancelling.cancellable
@@ -58,13 +58,13 @@ def get(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> tuple[xr.Dataset, bool]:
-    """The dataset of a kind and parameters, and whether the store had it; if not, it is kept.
+    """The dataset of a kind and parameters, and whether it was in the store; if not, it is saved.
 
-    One that cannot be written, as the disk is full, is returned all the same, with a warning.
+    If it cannot be written, for example because the disk is full, it is returned with a warning.
 
-    workers: threads, which change nothing in the result. dtypes: as for Store.save, of states.
-    options: as the kind's compute takes them beside; where they end it early, what is there is kept
-    under the parameters that it has `reached`. Raises what compute raises.
+    workers: threads, which do not change the result. dtypes: as for Store.save, for states.
+    options: further arguments of the kind's compute; if they end it early, the result is stored
+    under the parameters that it has `reached`. Raises the errors of compute.
     """
     found = load(store, kind, parameters)
     if found is not None:
@@ -77,7 +77,7 @@ def get(
 
 
 def load(store: Store, kind: Kind, parameters: Parameters) -> xr.Dataset | None:
-    """The dataset of a kind and parameters, or None where the store has none."""
+    """The dataset of a kind and parameters, or None if it is not in the store."""
     return store.load(kind.name, parameters, version=kind.version)
 
 
@@ -89,12 +89,12 @@ def save(
     *,
     dtypes: Mapping[str, str] | None = None,
 ) -> str:
-    """Keep a dataset under its kind and parameters, as Store.keep; returns the entry's name."""
+    """Save a dataset under its kind and parameters, as Store.keep; returns the entry's name."""
     return store.keep(kind.name, parameters, dataset, version=kind.version, dtypes=dtypes)
 
 
 def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:
-    """Name of the entry of a kind and parameters, whether the store has it or not."""
+    """Name of the entry of a kind and parameters, which need not be in the store."""
     return store.name(kind.name, parameters, version=kind.version)
 
 
@@ -105,9 +105,9 @@ def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
 
 
 def is_current(kind: Kind, entry: Entry) -> bool:
-    """Whether an entry is of the current version of its kind, and of its packing's."""
+    """Whether an entry has the current version of its kind and of its packing's algorithm."""
     packing = entry.params.get("packing")
-    # Imported ones are named by what they are.
+    # Imported packings are identified by their contents.
     older = (
         isinstance(packing, dict) and "n" in packing and packing.get("version") != PACKING_VERSION
     )
@@ -119,7 +119,7 @@ ROW_COUNTS = ("accepted", "rejected", "unconverged", "skipped", "rattlers", "unl
 
 
 def row(parameters: Parameters, dataset: xr.Dataset, cached: bool) -> dict[str, Any]:
-    """One line of a table of walks: plain numbers of one cell."""
+    """One row of a table of walks: plain numbers of one cell."""
     packing = parameters["packing"]
     return {
         "mu": packing["mu"],
@@ -131,10 +131,10 @@ def row(parameters: Parameters, dataset: xr.Dataset, cached: bool) -> dict[str, 
 
 
 def scan_rows(store: Store) -> list[dict[str, Any]]:
-    """The rows of a scan, by μ and seed: of every walk in a store.
+    """The rows of a scan, by μ and seed, for every walk in a store.
 
     Raises InputError for a store without walks, and for one whose walks differ in more than μ and
-    seed, as means over them would mean nothing.
+    seed, because means over them would be meaningless.
     """
     entries = store.find("walk")
     if not entries:
@@ -154,11 +154,11 @@ def scan_rows(store: Store) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda line: (line["mu"], line["seed"] or 0))
 
 
-# What may differ among the walks of a scan: Δt and sweeps of a compaction follow μ.
+# Parameters that may differ among the walks of a scan: Δt and sweeps of a compaction depend on μ.
 _SCANNED = ("mu", "seed", "dt", "sweeps")
 
 
 def _settings(parameters: Parameters) -> dict[str, Any]:
-    """Parameters of a walk and of its packing, but those that a scan varies."""
+    """Parameters of a walk and its packing, except those that a scan varies."""
     packing = {k: v for k, v in parameters["packing"].items() if k not in _SCANNED}
     return packing | {k: v for k, v in parameters.items() if k not in ("packing", "mu")}

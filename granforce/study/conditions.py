@@ -1,4 +1,4 @@
-"""What is prescribed and known, as parameters of entries: plain, and absent where it is usual."""
+"""Prescribed and known quantities as parameters of entries: plain, and absent by default."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,8 +17,8 @@ def conditions(
 ) -> Parameters:
     """The parameters of conditions other than the pressure alone.
 
-    known: a Known, or rows [contact, least f_n, largest f_n, least f_t, largest f_t] with None
-    where nothing is known. Raises InputError for what no packing could be asked.
+    known: a Known, or rows [contact, least f_n, largest f_n, least f_t, largest f_t] with None for
+    unknown bounds. Raises InputError for conditions that no packing could satisfy.
     """
     prescribed = choice(prescribed, PRESCRIBED, "prescribed")
     if stress is not None and prescribed != "stress":
@@ -50,7 +50,7 @@ def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
 
 
 def of(parameters: Parameters) -> dict[str, Any]:
-    """Arguments of `ensemble` for the conditions among the parameters of an entry."""
+    """Arguments of `ensemble` for the conditions in the parameters of an entry."""
     given: dict[str, Any] = {
         name: parameters[name] for name in ("prescribed", "stress") if name in parameters
     }

@@ -1,4 +1,4 @@
-"""One entry of a store, a folder and Zarr group: described, written, and checked in full."""
+"""One entry of a store, a folder and Zarr group: description, writing, and full verification."""
 
 import functools
 import hashlib
@@ -39,7 +39,7 @@ _PROVENANCE = (
 
 
 def conforming(dataset: xr.Dataset, dtypes: Mapping[Any, str]) -> dict[Any, xr.Variable]:
-    """The dataset's variables as they will be stored; ValueError where VARIABLES says otherwise."""
+    """The dataset's variables as they will be stored; ValueError if they violate VARIABLES."""
     stored: dict[Any, xr.Variable] = {}
     for name, variable in dataset.variables.items():
         row = declared(str(name))
@@ -61,14 +61,14 @@ def attributes(
     given: Mapping[str, Any],
     variables: Variables,
 ) -> dict[str, Any]:
-    """Attributes of an entry: the caller's own, what it is, what made it when, its checksum."""
+    """Attributes of an entry: the caller's, its identity, its origin and time, and its checksum."""
     attrs = {key: value for key, value in given.items() if key not in (*_IDENTITY, *_PROVENANCE)}
     attrs |= {"kind": kind, "parameters": keys.canonical(params)}
     if "seed" in params:
         attrs["seed"] = params["seed"]
     attrs |= {"algorithm_version": version, "schema_version": keys.SCHEMA_VERSION}
     attrs |= {"created": datetime.now(UTC).isoformat(timespec="seconds"), **_library_versions()}
-    # What comes back from JSON is what the checksum must see.
+    # The checksum must be computed from values as read back from JSON.
     attrs = json.loads(json.dumps(attrs, default=to_builtin))
     return attrs | {"checksum": _checksum(variables, attrs)}
 
@@ -79,7 +79,7 @@ def _library_versions() -> dict[str, str]:
 
 
 def _checksum(variables: Variables, attrs: Mapping[str, Any]) -> str:
-    """sha256 over arrays and attributes; the same for the same result made elsewhere or later."""
+    """sha256 of arrays and attributes; equal for the same result computed elsewhere or later."""
     lasting = {key: value for key, value in attrs.items() if key not in _PROVENANCE}
     digest = hashlib.sha256(json.dumps(lasting, sort_keys=True).encode())
     for name in sorted(variables):
@@ -93,8 +93,8 @@ def _checksum(variables: Variables, attrs: Mapping[str, Any]) -> str:
 def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
     """Write an entry into a new folder.
 
-    Zarr compresses into memory and the files are written here, one after the other: where one
-    cannot be written, no thread of Zarr's is left that would go on writing the others.
+    Zarr compresses into memory and the files are written here, one after the other: if one cannot
+    be written, no thread of Zarr continues to write the others.
     """
     encoded: dict[str, Buffer] = {}
     memory = MemoryStore(encoded)
@@ -109,7 +109,7 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
             compressors=(ZstdCodec(level=3),),
             dimension_names=[str(name) for name in variable.dims],
             attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
-            config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
+            config={"write_empty_chunks": True},  # otherwise Zarr 3.0 loses a chunk of −0.0
             zarr_format=3,
         )
         arrays[str(name)] = json.loads(encoded[f"{name}/zarr.json"].to_bytes())
@@ -120,18 +120,18 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
 
 
 def encoded(dataset: xr.Dataset) -> dict[str, Buffer]:
-    """The files, by key, of any dataset as a Zarr group whose metadata are consolidated."""
+    """The files, by key, of any dataset as a Zarr group with consolidated metadata."""
     files: dict[str, Buffer] = {}
     with warnings.catch_warnings():
-        # Of names as text and of consolidated metadata, which Zarr has not laid down for good;
-        # xarray reads both, and warns where metadata are not consolidated.
+        # Zarr warns that strings and consolidated metadata are not in its specification; xarray
+        # reads both, and warns if metadata are not consolidated.
         warnings.simplefilter("ignore")
         dataset.to_zarr(MemoryStore(files), mode="w", zarr_format=3, consolidated=True)
     return files
 
 
 def move(encoded: dict[str, Buffer], folder: Path) -> None:
-    """Write out what Zarr has encoded, by its keys."""
+    """Write the files encoded by Zarr, by their keys."""
     for key in list(encoded):
         path = folder / key
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -139,9 +139,9 @@ def move(encoded: dict[str, Buffer], folder: Path) -> None:
 
 
 def seal(folder: Path, arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> None:
-    """Write an entry's own metadata, those of its arrays among them ("consolidated").
+    """Write an entry's own metadata, with those of its arrays ("consolidated").
 
-    xarray and Zarr look for these first, and warn where there are none.
+    xarray and Zarr look for these first, and warn if they are missing.
     """
     group = {
         "attributes": {**attrs, "metadata_checksum": _metadata_checksum(arrays, attrs)},
@@ -158,13 +158,13 @@ def _consolidated(arrays: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _metadata_checksum(arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> str:
-    """sha256 over what `checksum` leaves out: units, names, and what made the entry when."""
+    """sha256 of the attributes that `checksum` leaves out: units, names, origin and time."""
     told = {key: value for key, value in attrs.items() if key != "metadata_checksum"}
     return hashlib.sha256(json.dumps([arrays, told], sort_keys=True).encode()).hexdigest()
 
 
 def _by_chunks(variable: xr.Variable) -> Iterator[Any]:
-    """Indices of a variable's chunks, which divide its first dimension at most."""
+    """Indices of a variable's chunks, which divide at most its first dimension."""
     if not variable.ndim:
         yield ()
         return
@@ -174,7 +174,7 @@ def _by_chunks(variable: xr.Variable) -> Iterator[Any]:
 
 
 def _chunks(variable: xr.Variable) -> tuple[int, ...]:
-    """Whole arrays, but a hundred states at a time."""
+    """Whole arrays, except for states, in chunks of a hundred."""
     chunks = [max(1, size) for size in variable.shape]
     if variable.ndim > 1 and variable.dims[0] == "state":
         chunks[0] = min(chunks[0], STATES_PER_CHUNK)
@@ -182,7 +182,7 @@ def _chunks(variable: xr.Variable) -> tuple[int, ...]:
 
 
 def read_attributes(folder: Path) -> dict[str, Any] | None:
-    """An entry's attributes, or None where they are unreadable or belong to another name."""
+    """An entry's attributes, or None if they are unreadable or belong to another name."""
     try:
         attrs = json.loads((folder / "zarr.json").read_bytes())["attributes"]
         params = json.loads(attrs["parameters"])
@@ -193,15 +193,15 @@ def read_attributes(folder: Path) -> dict[str, Any] | None:
         return None
 
 
-# What a look at an entry gives: what was found, and the reason why it was not.
+# The result of reading an entry: the value, or the reason for its absence.
 Look = tuple[T | None, str]
 UNREADABLE = "its metadata cannot be read"
 
 
 def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
-    """look(folder); (None, "") where there is none.
+    """look(folder); (None, "") if there is no folder.
 
-    What others removed meanwhile is absent, and what they put in its place is looked at anew.
+    A folder that another process removed meanwhile is absent; if it was replaced, it is read again.
     """
     while True:
         before = _identity(folder)
@@ -211,18 +211,18 @@ def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
 
 
 def _identity(folder: Path) -> tuple[int, int, int] | None:
-    """Which folder has this name just now, or None; renaming one changes it."""
+    """Identity of the folder that has this name at present, or None; it changes on renaming."""
     try:
         found = (
             folder.stat() if folder.exists() else folder.lstat()
-        )  # a link to nothing is no entry
+        )  # a dangling link is not an entry
     except OSError:
         return None
     return found.st_dev, found.st_ino, found.st_ctime_ns
 
 
 def described(folder: Path) -> Look[dict[str, Any]]:
-    """(attributes, "") of an entry, or as `checked`."""
+    """(attributes, "") of an entry; errors as for `checked`."""
     return _unmoved(folder, _described)
 
 
@@ -232,10 +232,10 @@ def _described(folder: Path) -> Look[dict[str, Any]]:
 
 
 class _Metadata(NamedTuple):
-    """What the files of an entry say of it, beside its numbers."""
+    """Metadata of an entry."""
 
     group: dict[str, Any]
-    arrays: dict[str, Any]  # of each array, as its own file has it, whatever is consolidated
+    arrays: dict[str, Any]  # of each array, from its own file, not the consolidated metadata
 
 
 def _metadata(folder: Path) -> Look[_Metadata]:
@@ -250,13 +250,13 @@ def _metadata(folder: Path) -> Look[_Metadata]:
         try:
             found.arrays[name] = json.loads((folder / name / "zarr.json").read_bytes())
             ArrayV3Metadata.from_dict(dict(found.arrays[name]))
-        except Exception:  # what damage raises depends on zarr
+        except Exception:  # the exception depends on zarr
             return None, f"the metadata of its array {name} cannot be read"
     return found, ""
 
 
 def opened(folder: Path) -> Look[xr.Dataset]:
-    """As `checked`, its arrays not read yet; reading one that is lost raises InputError."""
+    """As `checked`, but arrays are read later; reading a lost array raises InputError."""
     return _unmoved(folder, lambda folder: _lazily(folder, *_metadata(folder)))
 
 
@@ -264,18 +264,18 @@ def _lazily(folder: Path, metadata: _Metadata | None, reason: str) -> Look[xr.Da
     if metadata is None:
         return None, reason
     try:
-        # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
+        # Not decoded: only plain numbers are saved, and "units" must not turn them into times.
         store = _Whole(folder, metadata)
         return xr.open_zarr(store, consolidated=True, chunks=None, decode_cf=False), ""
-    except Exception as error:  # what damage raises depends on codec, zarr and xarray
+    except Exception as error:  # the exception depends on codec, zarr and xarray
         return None, f"an array cannot be read: {type(error).__name__}"
 
 
 class _Whole(LocalStore):
-    """A folder whose metadata were read once, and of which every chunk must be there.
+    """A folder whose metadata were read once, and in which every chunk must exist.
 
-    Zarr takes a chunk that is missing for zeros; of several metadata that are missing it tells one,
-    and asyncio prints the tracebacks of the others.
+    Zarr replaces a missing chunk by zeros; of several missing metadata it reports one, and asyncio
+    prints the tracebacks of the others.
     """
 
     def __init__(self, root: Path, metadata: _Metadata) -> None:
@@ -289,7 +289,7 @@ class _Whole(LocalStore):
         prototype: BufferPrototype | None = None,
         byte_range: ByteRequest | None = None,
     ) -> Buffer | None:
-        """As LocalStore has it; raises InputError for a chunk that is missing."""
+        """As in LocalStore; raises InputError for a missing chunk."""
         if key == "zarr.json":
             return (prototype or default_buffer_prototype()).buffer.from_bytes(self._metadata)
         found = await super().get(key, prototype, byte_range)
@@ -302,7 +302,7 @@ class _Whole(LocalStore):
 
 
 def checked(folder: Path) -> Look[xr.Dataset]:
-    """(dataset in memory, "") of a whole entry, (None, reason) of another, (None, "") of none."""
+    """(dataset in memory, "") if intact, (None, reason) if damaged, (None, "") if absent."""
     return _unmoved(folder, _checked)
 
 
@@ -329,7 +329,7 @@ def _checked(folder: Path) -> Look[xr.Dataset]:
 
 
 def _is_sealed(metadata: _Metadata) -> bool:
-    """Whether metadata are as they were written; those of older entries have no checksum."""
+    """Whether metadata are as written; those of older entries have no checksum."""
     (group, arrays), attrs = metadata, metadata.group["attributes"]
     if "metadata_checksum" not in attrs:
         return "consolidated_metadata" not in group

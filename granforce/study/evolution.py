@@ -1,4 +1,4 @@
-"""The snapshots of a simulation: exact intervals, and walks, of each, in one dataset over time."""
+"""The snapshots of a simulation: exact intervals and walks of each, in one dataset over time."""
 
 import json
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ def _of_schema(*names: str) -> dict[str, tuple[str, str]]:
     return {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in names}
 
 
-# Numbers of a snapshot with their units and meaning, by the schema where it has them.
+# Numbers of a snapshot with units and meaning; those in the schema take them from there.
 SCALARS = {
     "time": ("", "timestep, or time"),
     "grains": ("1", "number of grains"),
@@ -48,17 +48,16 @@ def evolution(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> tuple[xr.Dataset | None, list[tuple[int, str]]]:
-    """Exact intervals of all snapshots, computed into the store at path, or found there.
+    """Exact intervals of all snapshots, computed into the store at path or loaded from it.
 
     numbers: of the snapshots, by default all. states: of a random walk from each, with this seed,
     for η1 and η2; 0: none. workers, scheduler, progress: as for `scan.run`. Returns a dataset
     (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact is a
-    pair of names, NaN where a snapshot does not have it) and SCALARS by frame (NaN where they are
-    not defined: η1 and η2 without a walk, φ and P in an open box), its attribute notes what was
-    noted of each; None where no snapshot could be used; and (number, message) of those
-    that could not.
+    pair of ids, NaN in snapshots without it) and SCALARS by frame (NaN if undefined: η1 and η2
+    without a walk, φ and P in an open box), whose attribute notes lists notes on each snapshot, or
+    None if no snapshot could be used; and (number, message) of the snapshots that failed.
 
-    Raises InputError where the store cannot be written.
+    Raises InputError if the store cannot be written.
     """
     store = open_store(path)
     failed: list[tuple[int, str]] = []
@@ -99,7 +98,7 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
     for k, ((_, found, (bounds, *_)), (here, into)) in enumerate(zip(done, places, strict=True)):
         arrays["forces"][k, into] = found.packing.forces[here]
         for name in ("low", "high"):
-            # Contacts that are not of the backbone carry nothing in any network.
+            # Contacts outside the backbone carry no force in any network.
             own = np.zeros_like(found.packing.forces)
             own[bounds["backbone"].values] = bounds[name].values
             arrays[name][k, into] = own[here]

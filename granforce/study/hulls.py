@@ -1,8 +1,8 @@
-"""All networks in balance on small sets, with or without their cones: what S is cut out of.
+"""All balanced networks on small sets, with or without friction cones: the space that contains S.
 
 The balance A x = b depends on the disks and their loads, not on friction: its solutions are an
-affine space, x = A⁺ b + u · axes. Cones of any μ cut S out of it, which whoever draws S can do anew
-for every μ and, b being linear in the loads, for every load.
+affine space, x = A⁺ b + u · axes. Cones of any μ cut S out of it; a drawing of S can do this again
+for every μ and, as b is linear in the loads, for every load.
 """
 
 from collections.abc import Sequence
@@ -19,25 +19,25 @@ from granforce.numerics import certificates
 from granforce.records import InputError, Packing, are_whole
 from granforce.types import Floats, Integers
 
-# Singular values of A below this, relative to the largest, are 0.
+# Singular values of A below this, relative to the largest, count as 0.
 _RANK = 1e-10
-# How far the outline may be from the half planes that hold all of S, relative to its extent.
+# Largest distance of the outline from the half planes that contain S, relative to its extent.
 _OUTLINED = 1e-4
 
 
 class BalanceSpace(NamedTuple):
-    """The affine space of all networks on the N_c contacts of a packing that are in balance."""
+    """The affine space of all balanced networks on the N_c contacts of a packing."""
 
-    A: Floats  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then P
+    A: Floats  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then pressure
     b: Floats  # (rows,)
     lift: Floats  # (2 N_c, rows) the pseudoinverse A⁺
     axes: Floats  # (h, 2 N_c) orthonormal
-    grains: Integers  # (M,) whose three rows come one after the other
+    grains: Integers  # (M,) grains with three consecutive rows each
     equations: int  # independent rows
 
 
 def hull(packing: Packing) -> BalanceSpace:
-    """The BalanceSpace of a packing whose every contact may carry, whatever its friction."""
+    """The BalanceSpace of a packing in which every contact may carry force, at any friction."""
     whole = ensemble(packing, 1.0, prune=False)
     A = whole.A.toarray()
     left, values, right = np.linalg.svd(A)
@@ -54,9 +54,9 @@ def fall(packing: Packing) -> Floats | None:
 
 
 def bounds(packing: Packing) -> Floats | None:
-    """Least and largest f_n (N_c, 2) of every contact, NaN where not certified; 0 where idle.
+    """Least and largest f_n (N_c, 2) of every contact, NaN if not certified; 0 for idle contacts.
 
-    None where S has no end, by a certificate.
+    None if S is unbounded, by a certificate.
     """
     S = ensemble(packing)
     if certificates.recession(S.scaled_form[0]) is not None:
@@ -68,13 +68,13 @@ def bounds(packing: Packing) -> Floats | None:
 
 
 def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -> Floats:
-    """Corners (k, 2) of the outline of S on two force components, in force; none without an area.
+    """Corners (k, 2) of the outline of S on two force components, in force; empty without an area.
 
     plane: two numbers, 2 c for f_n and 2 c + 1 for f_t of contact c of the packing. Its certified
-    outer polygon is _OUTLINED of the extent away at most. most: largest f_n of every contact, for
-    an S without an end.
+    outer polygon is at most _OUTLINED times the extent away. most: largest f_n of every contact,
+    for an unbounded S.
 
-    Raises InputError for other components, and where S is not bounded.
+    Raises InputError for other components, and if S is unbounded.
     """
     count = len(packing.contacts.i)
     limit = np.array([np.inf if most is None else most, np.inf])
@@ -96,6 +96,6 @@ def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -
 def stress_axes(packing: Packing, mu: float) -> Floats:
     """Axes (2, N_c, 2) of ((σ_xx − σ_yy)/2P, σ_xy/P) for the forces of a packing's S in ⟨f_n⟩.
 
-    Raises what `stress_outline` raises.
+    Raises the errors of `stress_outline`.
     """
     return stress_outline.stress_axes(ensemble(packing, mu))

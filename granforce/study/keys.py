@@ -1,4 +1,4 @@
-"""What names a result in a store: its kind, its parameters in canonical form, and their hash."""
+"""The name of a result in a store: its kind, its parameters in canonical form, and their hash."""
 
 import hashlib
 import json
@@ -11,20 +11,20 @@ import numpy as np
 
 from granforce.tolerances import MU_DIGITS
 
-Parameters = dict[str, Any]  # of a result: plain values by name, that a key is made of
+Parameters = dict[str, Any]  # plain values by name, from which a key is made
 
-# Raised when the meaning of a stored array changes; entries of another schema are never found.
+# Raised when the meaning of a stored array changes; entries of another schema are ignored.
 SCHEMA_VERSION = 1
 
-KEY_DIGITS = 20  # 80 bits: no collision among any number of entries that fits a disk
+KEY_DIGITS = 20  # 80 bits: no collision among as many entries as fit on a disk
 ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
 
 
 def canonical(value: Any) -> str:
     """Canonical JSON of parameters: equal values give equal text.
 
-    Floats are rounded to 15 significant digits and 1.0 is 1; numpy scalars, tuples and nested
-    dicts are taken. Raises TypeError for anything else, non-finite numbers included.
+    Floats are rounded to 15 significant digits and 1.0 equals 1; numpy scalars, tuples and nested
+    dicts are accepted. Raises TypeError for anything else, including non-finite numbers.
     """
     return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))
 
@@ -49,7 +49,7 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def _quantised(value: float | np.floating[Any], where: str) -> int | float:
-    # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
+    # By its shortest text: a float32 0.1 means 0.1, not 0.100000001.
     number = float(str(value)) if isinstance(value, np.floating) else float(value)
     if not math.isfinite(number):
         raise TypeError(f"{where} cannot be part of a key: {value} is not finite")

@@ -1,7 +1,8 @@
-"""Networks for whoever pulls or pushes: along the interval of a contact's f_n, over a plane of S,
-or under a growing load on a contact.
+"""Networks while a contact is pulled or pushed.
 
-Nothing is kept in a store: a rail or a fan takes some tenths of a second at 400 disks.
+They lie along the interval of a contact's f_n, over a plane of S, or under a growing load.
+
+Nothing is stored: a rail or a fan takes some tenths of a second for 400 disks.
 """
 
 from collections.abc import Iterator
@@ -20,59 +21,59 @@ from granforce.study import conditions
 from granforce.types import Floats, Mask
 
 STOPS = 17  # networks along a rail
-# Of more contacts so many that they go side by side, and so far within its ends (part of its
-# width) that each is found at once.
+# With more than MANY contacts a rail has fewer stops, enough for one batch of lanes, and starts
+# this fraction of its width inside its ends, where each network is found quickly.
 MANY, FEW_STOPS, INWARD = 5000, 5, 1e-4
 RIBS = 48  # directions of a fan
-LOADS = 9  # on the way to the largest; between two of their networks the line balances, too
-WORKERS = 2  # threads, while somebody waits with a force in hand
+LOADS = 9  # on the way to the largest; the line between two of their networks is balanced too
+WORKERS = 2  # threads, while a user is dragging
 
 
 class Rail(NamedTuple):
-    """Networks of S in which f_n of one contact goes from its least to its largest value."""
+    """Networks of S in which f_n of one contact ranges from its least to its largest value."""
 
     low: float  # exact bounds, force
     high: float
     values: Floats  # (k,) f_n of the contact in the states, force, ascending
-    states: Floats  # (k, N_c, 2) the networks nearest to the one pulled, force
+    states: Floats  # (k, N_c, 2) the networks nearest to the pulled one, force
     residual: Floats  # (k,) in ⟨f_n⟩
-    opened: Mask  # (2, N_c) bool, contacts without force at the lower and the upper end
+    opened: Mask  # (2, N_c) bool, contacts without force at the lower and upper ends
     sliding: Mask  # (2, N_c) bool, contacts at the limit of friction there
-    whole: bool = True  # False where values near the ends are still to come
+    whole: bool = True  # False while values near the ends are missing
 
 
 class Fan(NamedTuple):
-    """Networks of S at the corners of a convex polygon, almost the outline of S in a plane."""
+    """Networks of S at the corners of a convex polygon close to the outline of S in a plane."""
 
-    points: Floats  # (k, 2) corners, left about: (axes[0]·F, axes[1]·F)/⟨f_n⟩
-    states: Floats  # (k, N_c, 2) networks that lie there, force
+    points: Floats  # (k, 2) corners, anticlockwise: (axes[0]·F, axes[1]·F)/⟨f_n⟩
+    states: Floats  # (k, N_c, 2) the networks there, force
     residual: Floats  # (k,) in ⟨f_n⟩
 
 
 class Puller:
-    """Pulls contacts of one packing at one friction; keeps what all pulls have in common."""
+    """Pulls contacts of one packing at one friction, sharing what all pulls have in common."""
 
     def __init__(self, packing: Packing, mu: float, known: Any = None) -> None:
-        """known: forces that no pull changes, as for `conditions.conditions`."""
+        """known: forces that stay fixed, as for `conditions.conditions`."""
         self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
 
     def rail(self, contact: int, state: Floats, many: bool | None = None) -> Rail:
         """The whole Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
 
-        many: whether it has few stops; by default where S has more than MANY contacts. Raises what
-        `pull` and `reach` raise.
+        many: whether to use few stops; by default if S has more than MANY contacts. Raises the
+        errors of `pull` and `reach`.
         """
         *_, whole = self.rails(contact, state, many)
         return whole
 
     def rails(self, contact: int, state: Floats, many: bool | None = None) -> Iterator[Rail]:
-        """The same; of many contacts first a part of it, without the ends, which take longest."""
+        """The same; with many contacts first a part without the ends, which take longest."""
         ends = reach(self._S, contact, workers=WORKERS)
         (position,) = self._S.positions([contact])
         many = len(self._S.index) > MANY if many is None else many
         inward = (ends.high - ends.low) * (INWARD if many else 0.0)
         low, high = ends.low + inward, ends.high - inward
-        # The network itself is among them, so that nothing jumps when it is taken in hand.
+        # The network itself is included, so that nothing jumps when dragging starts.
         stops = np.linspace(low, high, FEW_STOPS if many else STOPS)
         values = np.union1d(stops, np.clip(state[position, 0], low, high))
         inner = (values > low) & (values < high)
@@ -88,22 +89,22 @@ class Puller:
     def at(self, contact: int, value: float, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) nearest to `state` with f_n = value on a contact, and its residual.
 
-        Raises what `pull` raises.
+        Raises the errors of `pull`.
         """
         found = pull(self._S, contact, [value], state)
         return found.states[0], float(found.residual[0])
 
     def loaded(self, contact: int, load: float) -> Loaded:
-        """Networks under force pairs on a contact, from none to `load` (force), a few on the way.
+        """Networks under force pairs on a contact, from none to `load` (force), with some between.
 
-        Raises what `loaded_networks` raises.
+        Raises the errors of `loaded_networks`.
         """
         return loaded_networks(self._S, contact, np.linspace(0.0, load, LOADS))
 
     def fan(self, axes: Floats) -> Fan:
         """The Fan of the plane of two axes (2, N_c, 2).
 
-        Raises InputError where S is a line or a point in this plane, and what `outline` raises.
+        Raises InputError if S is a line or a point in this plane, and the errors of `outline`.
         """
         S = self._S
         ends = extremes(S, axes, np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]))
@@ -124,9 +125,9 @@ class Puller:
     def mixed(self, fan: Fan, axes: Floats, point: Floats, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) at a point (2,) of a fan, and its residual.
 
-        On a straight line with `state` and a network of the polygon's edge behind it, all of which
-        is in S; of a point outside the polygon, the nearest one of its edge is meant. `state` may
-        be rounded: the network of S nearest to it is taken.
+        It is on a straight line between `state` and a network on the polygon's edge, which lies in
+        S; a point outside the polygon is replaced by the nearest one on its edge. `state` may be
+        rounded: the nearest network of S is used.
         """
         state = nearest(self._S, state).forces
         (here,) = self._points(axes, state[None])
@@ -137,7 +138,7 @@ class Puller:
 
 
 def _rail(ends: Reach, parts: list[Pull], whole: bool = True) -> Rail:
-    """The Rail of what was pulled to values between two ends."""
+    """The Rail of networks pulled to values between two ends."""
     values = np.concatenate([part.values for part in parts])
     order = np.argsort(values)
     return Rail(
@@ -153,7 +154,7 @@ def _rail(ends: Reach, parts: list[Pull], whole: bool = True) -> Rail:
 
 
 def _inside(corners: Floats, point: Floats) -> Floats:
-    """The point, or the nearest one of the polygon's edge where it lies outside."""
+    """The point, or the nearest one on the polygon's edge if it is outside."""
     edge = np.roll(corners, -1, axis=0) - corners
     away = point - corners
     if np.all(edge[:, 0] * away[:, 1] >= edge[:, 1] * away[:, 0]):
@@ -164,7 +165,7 @@ def _inside(corners: Floats, point: Floats) -> Floats:
 
 
 def _triangle(corners: Floats, here: Floats, point: Floats) -> tuple[int, Floats]:
-    """(k, weights (2,)): in which triangle of `here` and corners k, k + 1 a point lies, and how."""
+    """(k, weights (2,)) of a point in the triangle of `here` and corners k and k + 1."""
     first, second, away = corners - here, np.roll(corners, -1, axis=0) - here, point - here
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""What perturbed contacts say, as datasets: critical forces, first motions, |u|(r) and α."""
+"""Perturbed contacts as datasets: critical forces, first motions, |u|(r) and α."""
 
 import json
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from granforce.types import Floats
 
 
 def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> xr.Dataset:
-    """One perturbed contact as a dataset: its CriticalForce, known to `precision`, and response."""
+    """One perturbed contact as a dataset: its CriticalForce, with its `precision`, and response."""
     contact = critical.contact
     moved = perturb.response(S, contact, critical=critical, precision=precision)
     edges = decay.shells(S.packing)
@@ -67,7 +67,7 @@ def perturbation_dataset(S: Ensemble, parts: Sequence[xr.Dataset]) -> xr.Dataset
 
 
 def moved_grains(packing: Packing, dataset: xr.Dataset) -> tuple[Floats, Floats]:
-    """Distance (k,) from the first contact's point, and |u| (k,), of the grains that count."""
+    """Distance (k,) from the first contact's point, and |u| (k,), of the grains that moved."""
     u = dataset["displacement"].values[0]
     counts = np.isfinite(u).all(axis=1)
     distance = decay.distances(packing, dataset["backbone"].values[0])

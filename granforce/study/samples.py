@@ -1,4 +1,4 @@
-"""States of S, from whatever sampler, as datasets with all their measures."""
+"""States of S from any sampler, as datasets with all their measures."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ from granforce.types import Floats, Integers
 def walk_dataset(
     S: Ensemble, done: Walk, *, keep: int | None = None, seconds: float = 0.0
 ) -> xr.Dataset:
-    """A Walk with its measures as a dataset; `keep` evenly spaced states are kept, or all."""
+    """A Walk with its measures as a dataset; stores `keep` evenly spaced states, or all."""
     pick = _picked(len(done.states), keep)
     return labelled(
         {
@@ -36,7 +36,7 @@ def walk_dataset(
 
 
 def walk_of(dataset: xr.Dataset) -> Walk:
-    """The Walk of a dataset that has all its states."""
+    """The Walk of a dataset that contains all its states."""
     counted = ("accepted", "rejected", "unconverged", "skipped")
     return Walk(
         states=dataset["states"].values,
@@ -51,7 +51,7 @@ def walk_of(dataset: xr.Dataset) -> Walk:
 def uniform_dataset(
     S: Ensemble, drawn: UniformSample, *, keep: int | None = None, seconds: float = 0.0
 ) -> xr.Dataset:
-    """A UniformSample with its measures as a dataset; states kept as in `walk_dataset`."""
+    """A UniformSample with its measures as a dataset; states stored as in `walk_dataset`."""
     pick = _picked(len(drawn.flat), keep)
     return labelled(
         {
@@ -76,9 +76,9 @@ def inference_dataset(
     keep: int | None = None,
     seconds: float = 0.0,
 ) -> xr.Dataset:
-    """An Inference and what it came from as a dataset; draws kept as in `walk_dataset`.
+    """An Inference and its measurement as a dataset; draws stored as in `walk_dataset`.
 
-    sure: a Carrying of contacts that were not measured, if it was asked for.
+    sure: a Carrying of contacts that were not measured, if requested.
     """
     arrays: dict[str, Any] = {
         "backbone": S.index,
@@ -106,7 +106,7 @@ def inference_dataset(
 
 
 def _drawn(drawn: UniformSample | Draws, pick: slice | Integers) -> dict[str, Any]:
-    """How states were drawn by chains, and whether those mixed; states are picked."""
+    """Chains and mixing diagnostics of drawn states, and the picked states."""
     return {
         "residual": drawn.residual.ravel()[pick],
         "violation": drawn.violation.ravel()[pick],
@@ -128,7 +128,7 @@ def _picked(count: int, keep: int | None) -> slice | Integers:
 
 
 def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, Any]:
-    """What any states say: measures of all, and those that are picked; NaN where there are none."""
+    """Measures of all states, and the picked states; NaN without states."""
     known = {
         "states": states[pick],
         "backbone": S.index,

@@ -1,7 +1,7 @@
-"""Scans: many cells computed over processes or over a dask cluster, each kept as it ends.
+"""Scans: many cells computed by processes or by a dask cluster, each stored as it ends.
 
-Cells are independent and seeded, so a scan gives the same result for any number of workers, and
-one that was cut short, or lost a worker, goes on where it was.
+Cells are independent and seeded, so a scan gives the same result for any number of workers, and an
+interrupted scan, or one that lost a worker, resumes.
 """
 
 import logging
@@ -34,15 +34,14 @@ from granforce.study.store import open_store
 from granforce.system.terminal import one_line
 from granforce.types import Progress
 
-# How often it is asked what dask has finished, and how long it may have no worker until that is
-# said, s.
+# Time between two queries of dask, and time without workers before a message, s.
 LOOK, WORKERLESS = 0.2, 5.0
 
-CELL_BYTES = 2000  # of memory, that a cell takes until it is computed
+CELL_BYTES = 2000  # of memory, per cell that is not yet computed
 
-TRIES = 3  # a cell under way when a worker died is begun anew so often: it may have been its fault
+TRIES = 3  # attempts at a cell whose worker died: the cell may be the cause
 
-# What workers are to run: path of the store, cell, dtypes.
+# Work for workers: path of the store, cell, dtypes.
 Tasks = dict[int, tuple[str, StudyCell, Mapping[str, str] | None]]
 
 _SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -57,15 +56,15 @@ def scan(
 ) -> tuple[list[dict[str, Any]], list[tuple[Parameters, str]]]:
     """Run walks (their parameters); see `run` for the options.
 
-    on_row(row) after each walk. Returns the rows in the order of the cells and a list of (walk
-    parameters, error message).
+    on_row(row) is called after each walk. Returns the rows in the order of the cells and a list of
+    (walk parameters, error message).
     """
     store = open_store(path)
     rows: dict[int, dict[str, Any]] = {}
     named = [StudyCell(kinds.WALK, parameters) for parameters in cells]
 
     def done(k: int, cached: bool) -> None:
-        # Computed anew where others have removed it meanwhile.
+        # Computed again if another process removed it meanwhile.
         rows[k] = row(cells[k], get(store, *named[k])[0], cached)
         if on_row is not None:
             on_row(rows[k])
@@ -85,18 +84,18 @@ def run(
     on_done: Callable[[int, bool], object] | None = None,
     enough: Callable[[], bool] | None = None,
 ) -> list[tuple[StudyCell, str]]:
-    """Compute cells into the store at path, on one processor each; finished ones are found.
+    """Compute cells into the store at path, on one processor each; stored ones are skipped.
 
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
-    the same folder, in place of processes. dtypes: as for Store.save, for the states.
-    Cells are begun in their order; one whose packing is among them waits for it, and is left out,
-    without a word, where that fails.
-    progress(cells done, cells in all) counts quarters of cells and never goes back;
-    on_done(position in cells, whether it was found) after each. Once enough() is true no cell is
-    begun; those under way are finished (not asked with a scheduler, whose cells are all handed
-    over at once). Returns a list of (cell, error message). Interrupted, it loses the cells under
-    way only, and workers end with this process.
-    Raises InputError where the scheduler cannot be reached.
+    the same folder, to use instead of processes. dtypes: as for Store.save, for the states.
+    Cells are started in order; a cell whose packing is among them waits for it, and is skipped
+    silently if that fails. progress(cells done, cells in all) counts quarters of cells and never
+    decreases; on_done(position in cells, whether it was stored) is called after each. Once enough()
+    is true no further cell is started; running ones are finished (not called with a scheduler,
+    which gets all cells at once). An interruption loses only running cells, and workers end with
+    this process.
+
+    Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """
     store = open_store(path)
     store.make()
@@ -136,13 +135,13 @@ def run(
 
 
 class Waits(NamedTuple):
-    """What cells wait for: {cell: its packing, where that is to be made}, and what has failed."""
+    """Dependencies of cells: {cell: the cell of its packing}, and the failed cells."""
 
     needs: Mapping[int, int]
     failed: Mapping[int, str]
 
     def ready(self, todo: Sequence[int], left: Collection[int]) -> int | None:
-        """The first cell to do whose packing is not among those left; None where all wait."""
+        """The first cell to do whose packing is not among those left; None if all must wait."""
         return next((k for k in todo if self.needs.get(k) not in left), None)
 
     def lost(self, k: int) -> bool:
@@ -151,7 +150,7 @@ class Waits(NamedTuple):
 
 
 def _needs(cells: Mapping[int, StudyCell]) -> dict[int, int]:
-    """{cell: the one among them that makes its packing}."""
+    """{cell: the cell among them that makes its packing}."""
     made = {
         canonical(cell.parameters): k for k, cell in cells.items() if cell.kind == kinds.PACKING
     }
@@ -161,10 +160,10 @@ def _needs(cells: Mapping[int, StudyCell]) -> dict[int, int]:
 
 
 def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
-    """tell(parts), which calls progress(parts done, total), in quarters, and never goes back.
+    """A function of the fraction done that calls progress(done, total) and never decreases.
 
-    Cells may be counted as ended before they are seen to be, and anew where a worker died; quarters
-    add up exactly.
+    Fractions are in quarters, which add up exactly. Cells may be counted as ended before they are
+    reported, and again if a worker died.
     """
     reached = 0.0
 
@@ -197,7 +196,7 @@ def _over_processes(
 
 
 def _lost() -> NoReturn:
-    raise InputError(f"worker processes died {TRIES} times at it, or at cells beside it")
+    raise InputError(f"worker processes died {TRIES} times while computing this cell or others")
 
 
 def _one_pool(
@@ -209,7 +208,7 @@ def _one_pool(
     before: int,
     enough: Callable[[], bool],
 ) -> Tasks:
-    """Run tasks over processes, `before` have ended; those that a dead worker left are returned."""
+    """Run tasks in processes, `before` of which have ended; return those left by a dead worker."""
     context = multiprocessing.get_context("spawn")
     counter = context.Value("d", 0.0)
     left, todo, broken = dict(tasks), list(tasks), False
@@ -218,7 +217,7 @@ def _one_pool(
     pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
     try:
         while True:
-            # One for each worker: what the pool was given it would begin.
+            # One for each worker: the pool would start every task it was given.
             while len(waiting) < workers and not broken and not enough():
                 k = waits.ready(todo, left)
                 if k is None:
@@ -244,7 +243,7 @@ def _one_pool(
                     del left[k]
             advanced(before + counter.value)
     except BaseException:
-        # Workers would go on with the cell under way: what they hold is lost either way.
+        # Workers would continue the current cell, whose result is lost anyway.
         for process in list(pool._processes.values()):
             process.terminate()
         raise
@@ -255,7 +254,7 @@ def _one_pool(
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Processes started meanwhile use one thread in linear algebra: cells, not rows, are shared."""
+    """Within, started processes use one thread in linear algebra: cells are shared, not rows."""
     before = {name: os.environ.get(name) for name in _SINGLE}
     os.environ.update(dict.fromkeys(_SINGLE, "1"))
     try:
@@ -274,14 +273,14 @@ _counter = None
 def _share(counter: Any) -> None:
     global _counter
     _counter = counter
-    # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
+    # Ctrl-C goes to the whole process group: the parent ends the workers silently.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     warnings.formatwarning = one_line
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed has nobody to compute for."""
+    """End a worker whose parent was killed, as nobody needs its results."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -289,12 +288,12 @@ def _end_with_parent() -> None:
 
 
 def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None = None) -> bool:
-    """Compute one cell into the store at path; whether it was there. Runs in a worker process."""
+    """Compute one cell into the store at path, in a worker; return whether it was stored."""
     if not Path(path, "zarr.json").exists():
         raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
     seen = 0.0
 
-    def count(done: float, total: float | None) -> None:  # None: of a compaction
+    def count(done: float, total: float | None) -> None:  # None: for a compaction
         nonlocal seen
         if _counter is not None and total:
             part = min(done / total, 1.0)
@@ -313,7 +312,7 @@ def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None
 def _over_dask(
     tasks: Tasks, scheduler: str, finished: Callable[[int, Callable[[], bool]], object]
 ) -> None:
-    """Run tasks over the workers of a dask scheduler, which begins those of lost workers anew."""
+    """Run tasks on the workers of a dask scheduler, which restarts those of lost workers."""
     try:
         from dask.distributed import Client, KilledWorker, as_completed
     except ImportError:
@@ -325,7 +324,7 @@ def _over_dask(
         try:
             while waiting:
                 for future in completed.next_batch(block=False):
-                    if future.status == "cancelled":  # what became of it, nobody knows
+                    if future.status == "cancelled":  # its fate is unknown
                         raise gone
                     dead = isinstance(future.exception(), KilledWorker)
                     finished(waiting.pop(future), _lost if dead else future.result)
@@ -342,14 +341,14 @@ def _over_dask(
 def _client_of(scheduler: str, client: Callable[..., Any]) -> Any:
     try:
         return client(scheduler, timeout=10)
-    except Exception as error:  # whatever else may answer there
+    except Exception as error:  # another service at this address may answer anything
         words = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"no dask scheduler at {scheduler}: {words}") from None
 
 
 @contextmanager
 def _without_tracebacks() -> Iterator[None]:
-    """Within, dask does not log what ends in an error here, too."""
+    """Within, dask does not log errors that are handled here."""
     logger = logging.getLogger("distributed.client")
     before = logger.level
     logger.setLevel(logging.CRITICAL)
@@ -360,14 +359,14 @@ def _without_tracebacks() -> Iterator[None]:
 
 
 class _Workers:
-    """Says, each time once, that a scheduler has been without workers for some seconds."""
+    """Reports, once each time, that a scheduler has been without workers for some seconds."""
 
     def __init__(self, scheduler: str) -> None:
         self._scheduler = scheduler
         self._since, self._told = time.monotonic(), False
 
     def count(self, workers: Collection[Any]) -> None:
-        """These are its workers just now."""
+        """Update with its present workers."""
         if workers:
             self._since, self._told = time.monotonic(), False
         elif not self._told and time.monotonic() >= self._since + WORKERLESS:
@@ -380,10 +379,10 @@ class _Workers:
 
 
 def warm_up(needed: Any = None, packing: Packing | None = None) -> None:
-    """Compile (or load from numba's cache) kernels once, before workers do it each.
+    """Compile kernels (or load them from numba's cache) once, before each worker does it.
 
-    needed: the kinds that they are compiled for, by default all. packing: what they are run on, by
-    default one that is made, for which the kernels that make packings are compiled, too.
+    needed: the kinds for which to compile, by default all. packing: used to run them, by default a
+    new one, which also compiles the kernels that make packings.
     """
     S = ensemble(pack(12, 0.5, 0) if packing is None else packing)
     for its_kinds, run in _FIRST_RUNS:
@@ -392,13 +391,13 @@ def warm_up(needed: Any = None, packing: Packing | None = None) -> None:
 
 
 def _push(S: Ensemble) -> None:
-    # A single contact, and several side by side.
+    # A single contact, and several in lanes.
     for contacts in (S.index[:1], S.index[:3]):
         critical_forces(S, contacts)
 
 
 _BOUNDS = {kinds.INTERVALS, kinds.LIMIT_LOADS, kinds.OUTLINE, kinds.STRESS}
-# Two contacts: their bounds are few at first, then enough to go side by side.
+# Two contacts: first few bounds, then enough for lanes.
 _FIRST_RUNS = (
     ({kinds.WALK}, lambda S: walk(S, 2, 0)),
     (_BOUNDS, lambda S: intervals(S, S.index[:2])),

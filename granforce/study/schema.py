@@ -1,4 +1,4 @@
-"""The schema: every array that granforce keeps, declared once, and packings as datasets."""
+"""The schema: every array that granforce stores, declared once, and packings as datasets."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import xarray as xr
 
 from granforce.records import Contacts, Packing
 
-if TYPE_CHECKING:  # reading a store needs no kernels
+if TYPE_CHECKING:  # no kernels needed to read a store
     from granforce.forces.ensemble import Ensemble
 
 
 class Variable(NamedTuple):
-    """One row of the schema: what an array of this name is, in every dataset."""
+    """One row of the schema: the meaning of an array of this name, in every dataset."""
 
     dims: tuple[str, ...]
     dtype: str
@@ -25,12 +25,12 @@ class Variable(NamedTuple):
 
 
 def _real(dims: str, units: str, long_name: str) -> Variable:
-    """A row of real numbers; dims: names with blanks between them."""
+    """A row of real numbers; dims: names separated by blanks."""
     return Variable(tuple(dims.split()), "float64", units, long_name)
 
 
 def _whole(dims: str, long_name: str) -> Variable:
-    """A row of whole numbers: counts, places, and what is so or not."""
+    """A row of whole numbers: counts, positions and flags."""
     return Variable(tuple(dims.split()), "int64", "1", long_name)
 
 
@@ -64,7 +64,7 @@ VARIABLES: dict[str, Variable] = {
     "mean_sweeps": _real("", "1", "solver sweeps per state, failures included"),
     "distance_to_centre": _real("state", _SCALE, "distance from the centre of the ensemble"),
     "chain": _whole("state", "chain that the state belongs to"),
-    # whether chains mixed: NaN where a component cannot vary
+    # whether chains mixed: NaN for components that cannot vary
     "r_hat": _real("contact component", "1", f"split R̂, {_COMPONENT}"),
     "bulk_size": _real("contact component", "1", f"bulk effective sample size, {_COMPONENT}"),
     "tail_size": _real("contact component", "1", f"tail effective sample size, {_COMPONENT}"),
@@ -78,7 +78,7 @@ VARIABLES: dict[str, Variable] = {
     "held": _whole("", "cone coordinates that are zero in all of the ensemble"),
     "setup_seconds": _real("", "s", "wall time until the first step"),
     "sampling_seconds": _real("", "s", "wall time of the steps"),
-    # a measurement, and what S makes of it
+    # a measurement, and the inferred forces
     "grain_id": _real("grain", "1", "name in the files; below 0: a wall"),
     "regional_stress": _real(
         "region stress_component", "force/length", "stress xx, yy, xy by region"
@@ -99,7 +99,7 @@ VARIABLES: dict[str, Variable] = {
     "suspect": _whole("beyond", "contacts in the packing beyond 3 σ"),
     "chi_square": _real("", "1", "χ² of the likeliest network"),
     "freedom": _whole("", "degrees of freedom of χ²"),
-    # what a set of states says: bounds seen, measures, and what it took
+    # results from a set of states: bounds seen, measures, cost
     "original": _real("contact component", "force", f"the packing's own network, {_COMPONENT}"),
     "low": _real("contact component", "force", f"smallest value, {_COMPONENT}"),
     "high": _real("contact component", "force", f"largest value, {_COMPONENT}"),
@@ -112,7 +112,7 @@ VARIABLES: dict[str, Variable] = {
     "interval_gap": _real("contact component side", _SCALE, "duality gap of the bounds"),
     "cluster": _whole("contact", "cluster of undetermined contacts, −1 where determined"),
     "position": _real("contact", "1", "place of the original f_n in its interval, 0 to 1"),
-    # which measurement would tell most
+    # which measurement is most informative
     "part_expected": _real(
         "contact", "1", "part by which errors of f_n fall once this one is known"
     ),
@@ -120,7 +120,7 @@ VARIABLES: dict[str, Variable] = {
     "mean_after": _real("contact", _SCALE, "the same once f_n of this one is known"),
     "limit_load": _real("contact", "force", "limit load of a normal force pair"),
     "load_gap": _real("contact", _SCALE, "duality gap of the limit loads"),
-    # the answer to a force pair on one contact
+    # the response to a force pair on one contact
     "critical_low": _real("contact", "force", "F_crit: largest load at rest"),
     "critical_high": _real("contact", "force", "least load not at rest, or the limit load"),
     "load_residual": _real("contact", _SCALE, "unbalance under the largest load at rest"),
@@ -146,7 +146,7 @@ VARIABLES: dict[str, Variable] = {
     "fit_inner": _real("fit", "length", "smallest r of other fits"),
     "fit_outer": _real("fit", "length", "largest r of other fits"),
     "fit_exponent": _real("fit", "1", "α of other fits"),
-    # how many networks there are: forces of every contact in ⟨f_n⟩
+    # the number of networks: forces of every contact in ⟨f_n⟩
     "log_volume": _real("", "1", "ln V, the h-dimensional volume of S"),
     "log_volume_error": _real("", "1", "standard error of ln V"),
     "log_volume_ladders": _real("ladder", "1", "ln V on the ways down and up"),
@@ -244,7 +244,7 @@ VARIABLES |= {
 
 
 def extension(S: Ensemble) -> dict[str, Any]:
-    """In how many dimensions S extends, and in how many directions it is too narrow to count."""
+    """The dimension of S, and the number of directions too narrow to count."""
     return {
         "dimension": S.dimension,
         "flat_directions": S.flat_directions,
@@ -269,7 +269,7 @@ def labelled(arrays: Mapping[str, Any], attrs: Mapping[str, Any] | None = None) 
 
 
 def declared(name: str) -> Variable:
-    """The schema's row for this name; ValueError where there is none."""
+    """The schema's row for this name; ValueError if there is none."""
     if name not in VARIABLES:
         raise ValueError(f"{name!r} is not declared: add a row to granforce.study.schema.VARIABLES")
     return VARIABLES[name]
@@ -284,9 +284,9 @@ def packing_dataset(packing: Packing) -> xr.Dataset:
 
 
 def dataset_packing(dataset: xr.Dataset) -> Packing:
-    """The Packing that packing_dataset made this dataset from, to the last bit.
+    """The Packing from which packing_dataset made this dataset, bit by bit.
 
-    Tuples in info come back as lists.
+    Tuples in info are returned as lists.
     """
     arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
     return Packing(

@@ -1,7 +1,7 @@
-"""Many frames of one experiment: each imported and inferred by itself, all in one dataset.
+"""Many frames of one experiment: each imported and inferred separately, all in one dataset.
 
-A frame is a cell of a study: it is computed in any process, in any order, kept as it ends, and
-found again. Its name holds a digest of its files, so that a file that changed is read anew.
+A frame is a cell of a study: it is computed in any process, in any order, and stored as it ends.
+Its key contains a digest of its files, so that a changed file is read again.
 """
 
 import hashlib
@@ -33,9 +33,9 @@ from granforce.study.store import Store, is_store, open_store
 from granforce.system.files import beside, expanded
 from granforce.types import Floats, Integers, Progress
 
-# Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
+# Draws for the error bars of a frame, and the assumed error of unmeasured forces, ⟨f_n⟩.
 STATES, UNMEASURED = 200, 1.0
-# Numbers of a frame's account that are kept by frame.
+# Counts in a frame's report that are stored by frame.
 _COUNTS = (*KINDS, "grains", "contacts_listed", "candidates", "candidates_that_carry", "unbalanced")
 
 
@@ -48,7 +48,7 @@ def parameters(
     unmeasured: float = UNMEASURED,
     **options: Any,
 ) -> Parameters:
-    """The parameters that name the inference of a Frame; options as for `read_pegs`."""
+    """The parameters of the inference of a Frame; options as for `read_pegs`."""
     forces = options.pop("wall_forces", None) or {}
     return {
         "positions": frame.positions,
@@ -77,7 +77,7 @@ def _digest(*paths: str | Path | None) -> str:
 def _inferred(
     store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
 ) -> xr.Dataset:
-    """Dataset of one frame: its packing, measured and inferred forces with errors, its account."""
+    """Dataset of one frame: its packing, measured and inferred forces with errors, its report."""
     chosen = {name: parameters[name] for name in ("mu", "wall_forces")} | parameters["options"]
     columns = chosen.pop("columns", None)
     frames = open_frames(parameters["positions"], parameters["adjacency"], columns=columns)
@@ -102,10 +102,10 @@ def infer_frame(
     number: float | None = None,
     **options: Any,
 ) -> xr.Dataset:
-    """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, its account.
+    """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, and report.
 
-    Forces are those of `remeasured`, on all contacts (0 where nothing can carry); options as there.
-    Without states it has no errors.
+    Forces are those of `remeasured`, on all contacts (0 for contacts that cannot carry force), with
+    its options. Without states there are no errors.
     """
     S = ensemble(found.packing)
     drawn = (remeasured if states else infer)(
@@ -149,7 +149,7 @@ def infer_frame(
 
 
 def _on_all(found: Photoelastic, S: Ensemble, values: Floats, elsewhere: float) -> Floats:
-    """Values (N_c of S, 2) on all contacts of the frame, and what the others have."""
+    """Values (N_c of S, 2) on all contacts of the frame, with `elsewhere` on the others."""
     whole_packing = np.full(found.measured.shape, elsewhere)
     whole_packing[S.index] = values
     return whole_packing
@@ -169,22 +169,22 @@ def infer_series(
     progress: Progress | None = None,
     **options: Any,
 ) -> Any:
-    """All frames inferred into the store at path, found there where they are: (dataset, failed).
+    """All frames inferred into the store at path, or loaded from it: (dataset, failed).
 
-    frames: by `frames_of`. workers: processes; scheduler: address of a dask scheduler to use in
-    their place. progress(done, total) counts frames. options: mu, states (draws for each frame,
-    at least 2, or 0 for no error bars), seed and unmeasured as for `infer`, others as for
-    `read_pegs`. The dataset has a line for each frame; failed: (frame, message) of frames that were
-    refused, which the dataset does not have.
+    frames: from `frames_of`. workers: processes; scheduler: address of a dask scheduler to use
+    instead. progress(done, total) counts frames. options: mu, states (draws for each frame, at
+    least 2, or 0 for no error bars), seed and unmeasured as for `infer`, others as for `read_pegs`.
+    The dataset has a row for each frame; failed: (frame, message) of frames that failed, which are
+    not in the dataset.
 
-    Raises InputError where the store cannot be written.
+    Raises InputError if the store cannot be written.
     """
     cells = [StudyCell(FRAME, parameters(frame, **options)) for frame in frames]
     failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)
     lost = {id(cell): message for cell, message in failed}
     store = open_store(path)
     done = [
-        (frame.number, get(store, *cell, workers=workers)[0])  # which others may have removed
+        (frame.number, get(store, *cell, workers=workers)[0])  # others may have removed the cell
         for frame, cell in zip(frames, cells, strict=True)
         if id(cell) not in lost
     ]
@@ -199,9 +199,9 @@ def infer_series(
 def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     """One dataset (frame, contact, component) of [(number, dataset of a frame), …].
 
-    A contact is a pair of names, over all frames; NaN where a frame does not have it. change: its
-    inferred force less that in the frame before, and change_error, by both errors. Without draws
-    there are no errors. Its attribute notes has what is to be said of frames.
+    A contact is a pair of ids, over all frames; NaN in frames without it. change: its inferred
+    force minus that in the frame before, and change_error, from both errors. Without draws there
+    are no errors. The attribute notes contains notes on frames.
     """
     named = [
         pair_names(one["grain_id"].values, one["contact_i"].values, one["contact_j"].values)
@@ -253,16 +253,16 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     )
 
 
-# Names of the two grains of a contact; below 0: a wall.
+# Ids of the two grains of a contact; below 0: a wall.
 Pair: TypeAlias = tuple[float, float]
 
 
 def pair_names(ids: Floats, i: Integers, j: Integers) -> list[Pair | None]:
-    """Names of a frame's contacts: pairs of ids, None for a second contact of one pair."""
+    """Ids of a frame's contacts: pairs, or None for a second contact of one pair."""
     seen: set[Pair] = set()
     names: list[Pair | None] = []
     for a, b in zip(ids[i].tolist(), ids[j].tolist(), strict=True):
-        # Grains before walls, whose names are below 0.
+        # Grains before walls, whose ids are below 0.
         pair = (a, b) if b < 0 or (a >= 0 and a <= b) else (b, a)
         names.append(None if pair in seen else pair)
         seen.add(pair)
@@ -272,7 +272,7 @@ def pair_names(ids: Floats, i: Integers, j: Integers) -> list[Pair | None]:
 def over_frames(
     named: Sequence[Sequence[Pair | None]],
 ) -> tuple[list[Pair], list[tuple[list[int], list[int]]]]:
-    """All pairs of all frames in order, and for each frame its contacts and their places."""
+    """All pairs of all frames, sorted, and for each frame its contacts and their places."""
     pairs = sorted({pair for names in named for pair in names if pair is not None})
     row = {pair: k for k, pair in enumerate(pairs)}
     places = [
@@ -295,7 +295,7 @@ def ends_of(pairs: Sequence[Pair]) -> dict[str, Any]:
 
 
 def check_folder(path: str | Path) -> Path:
-    """The path, if a Zarr folder can be put there; InputError otherwise."""
+    """The path, if a Zarr folder can be created there; InputError otherwise."""
     path = expanded(path)
     if path.is_symlink() and not path.exists():
         raise InputError(f"{path}: is a link to nothing; choose another")
@@ -309,7 +309,7 @@ def check_folder(path: str | Path) -> Path:
 
 
 def save_series(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset as a Zarr folder, whole or not at all; one that is there is replaced."""
+    """Write a dataset as a Zarr folder, completely or not at all, replacing an existing one."""
     path = check_folder(path)
     aside = beside(path)
     try:

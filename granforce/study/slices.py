@@ -1,4 +1,4 @@
-"""The inner part of a packing, whose surroundings are frozen at their original forces."""
+"""The inner part of a packing, surrounded by contacts frozen at their original forces."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def edges(given: Sequence[float]) -> list[float]:
 
 
 def outside(packing: Packing, slice_: Sequence[float]) -> Mask:
-    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of a and b).
+    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (fractions of a and b).
 
     Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.
     """
@@ -31,7 +31,7 @@ def outside(packing: Packing, slice_: Sequence[float]) -> Mask:
     x = cell.wrapped(packing.x)
     place = cell.parts(x)
     inside = np.all((place >= (x0, y0)) & (place <= (x1, y1)), axis=1)
-    # A contact that reaches across the cell's edge leaves the slice even if both grains are in it.
+    # A contact across the cell's edge is outside the slice even if both grains are inside.
     step = x[contacts.j] - x[contacts.i] - contacts.normal * contacts.length[:, None]
     crossing = np.any(np.abs(cell.parts(step)) > 0.5, axis=1)
     return ~(inside[contacts.i] & inside[contacts.j]) | crossing

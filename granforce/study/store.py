@@ -1,8 +1,8 @@
 """The store: a content-addressed cache of datasets in Zarr.
 
 A store is a folder and a Zarr v3 group; each entry is a sub-group `<kind>-<key>` that zarr and
-xarray open too. The key is a hash of kind, parameters (seed among them), algorithm and schema
-version, so an entry is never changed: it is there and whole, or it is not there.
+xarray can also open. The key is a hash of kind, parameters (including the seed), algorithm and
+schema version, so an entry never changes: it is either complete or absent.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from granforce.study.keys import Parameters
 from granforce.system.files import ASIDE, expanded
 
 LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
-STALE_SECONDS = 3600.0  # a temporary untouched for this long has lost its writer
+STALE_SECONDS = 3600.0  # the writer of a temporary untouched for this long is dead
 
 
 class NotKeptError(InputError):
-    """A result could not be written to the store: its disk is full, say."""
+    """A result could not be written to the store, for example because the disk is full."""
 
 
 class Entry(NamedTuple):
-    """What the store knows of one entry without reading its arrays."""
+    """Metadata of one entry, without its arrays."""
 
     name: str  # folder in the store: <kind>-<key>
     kind: str
-    params: Parameters  # as they entered the key: floats to 15 significant digits
+    params: Parameters  # as in the key: floats to 15 significant digits
     version: int | str  # of the algorithm
     bytes: int  # on disk
     created: str  # UTC, ISO 8601
 
 
 class Verdict(NamedTuple):
-    """Whether one entry is whole; if not, the reason in words."""
+    """Whether one entry is intact; if not, the reason in words."""
 
     name: str
     ok: bool
@@ -64,13 +64,13 @@ def default_path() -> Path:
 
 
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
-    """The Store in a folder, which the first saved entry makes if it is missing.
+    """The Store in a folder, which is created with the first saved entry if it is missing.
 
-    path: by default $GRANFORCE_CACHE, else the user's cache folder. A folder that cannot be written
-    is opened all the same; saving to it raises InputError.
+    path: by default $GRANFORCE_CACHE, otherwise the user's cache folder. A folder without write
+    permission can be opened; saving to it raises InputError.
 
-    Raises InputError for a file, for a folder that holds something else, for one that cannot be
-    made, for a store of a newer schema, unless readonly, and, if readonly, for a missing store.
+    Raises InputError for a file, for a folder with other contents, for one that cannot be created,
+    for a store of a newer schema unless readonly, and, if readonly, for a missing store.
     """
     path = _located(path)
     if not path.is_dir() and readonly:
@@ -80,19 +80,19 @@ def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Sto
         _refuse_newer(path)
     if _schema(path) is None:
         _refuse_foreign(path)
-        # Entries without a root are readable, and the first saving makes the root.
+        # Entries without a root are readable; the first save creates the root.
         if readonly and not store._names():
             raise InputError(f"{path} is empty, not a store; check the path")
     if not readonly:
         if not path.exists():
             store.refuse_unwritable()
-        with suppress(InputError):  # a folder that cannot be written can still be read
+        with suppress(InputError):  # a folder without write permission can still be read
             store.clean()
     return store
 
 
 def _located(path: str | Path | None) -> Path:
-    """The absolute path of a store; InputError for a file and for what cannot be a path."""
+    """The absolute path of a store; InputError for a file or an invalid path."""
     path = expanded(default_path() if path is None else path).absolute()
     try:
         is_file = not stat.S_ISDIR(path.stat().st_mode)
@@ -106,7 +106,7 @@ def _located(path: str | Path | None) -> Path:
 
 
 def _schema(path: Path) -> int | None:
-    """The schema version of the store in a folder, or None where it holds no root of a store."""
+    """The schema version of the store in a folder, or None if the folder has no root of a store."""
     try:
         version = json.loads((path / "zarr.json").read_bytes())["attributes"]["granforce_store"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -120,7 +120,7 @@ def is_store(path: Path) -> bool:
 
 
 def _refuse_newer(path: Path) -> None:
-    """Raise InputError for a store of a newer schema: what it may hold is not known here."""
+    """Raise InputError for a store of a newer schema, whose contents are unknown here."""
     schema = _schema(path)
     if schema is not None and schema > keys.SCHEMA_VERSION:
         raise InputError(
@@ -130,9 +130,9 @@ def _refuse_newer(path: Path) -> None:
 
 
 def _refuse_foreign(path: Path) -> None:
-    """Raise InputError if the folder holds anything that is neither hidden nor an entry.
+    """Raise InputError if the folder contains anything that is neither hidden nor an entry.
 
-    A damaged zarr.json among nothing but entries is ours.
+    A damaged zarr.json among only entries belongs to the store.
     """
     if not path.is_dir():
         return
@@ -163,13 +163,13 @@ def _create_root(path: Path) -> None:
 class Store(Mapping[str, xr.Dataset]):
     """A folder of entries as a mapping from entry name to lazily opened xr.Dataset.
 
-    Made by `open_store`. Entries whose metadata cannot be read are left out.
+    Created by `open_store`. Entries with unreadable metadata are left out.
     """
 
     def __init__(self, path: Path, *, readonly: bool = False) -> None:
         self.path = path
         self.readonly = readonly
-        self._unkept: dict[str, xr.Dataset] = {}  # by name, what could not be written
+        self._unkept: dict[str, xr.Dataset] = {}  # by name, datasets that could not be written
 
     def __repr__(self) -> str:
         return f"Store({str(self.path)!r}, readonly={self.readonly})"
@@ -203,12 +203,13 @@ class Store(Mapping[str, xr.Dataset]):
     def load(
         self, kind: str, params: Mapping[str, Any], *, version: int | str
     ) -> xr.Dataset | None:
-        """The entry's dataset, read and checked in full, or None where there is none.
+        """The entry's dataset, read and verified in full, or None if there is none.
 
-        A damaged entry is reported as a warning and counts as missing; saving replaces it.
-        Arrays have the dtype they were stored with.
+        A damaged entry causes a warning and counts as missing; saving replaces it. Arrays have the
+        dtype with which they were stored.
 
-        Raises InputError where a file has the place of the entry: nothing could be saved there.
+        Raises InputError if a file is in the place of the entry, so that nothing could be saved
+        there.
         """
         name = self.name(kind, params, version=version)
         self.refuse_file(name)
@@ -228,11 +229,11 @@ class Store(Mapping[str, xr.Dataset]):
     ) -> str:
         """Store a dataset under its parameters and return the entry's name.
 
-        An intact entry of that name is kept as it is. dtypes: {variable: dtype} to store floats
-        with fewer bits, for stores that have to be small.
+        An intact entry of that name is not changed. dtypes: {variable: dtype} to store floats with
+        fewer bits, for small stores.
 
-        Raises ValueError where the dataset departs from VARIABLES, TypeError for parameters or
-        attributes that are not plain values, InputError if the store cannot be written.
+        Raises ValueError if the dataset violates VARIABLES, TypeError for parameters or attributes
+        that are not plain values, InputError if the store cannot be written.
         """
         name = self.name(kind, params, version=version)
         variables = entries.conforming(dataset, dtypes or {})
@@ -247,9 +248,9 @@ class Store(Mapping[str, xr.Dataset]):
     def keep(
         self, kind: str, params: Mapping[str, Any], dataset: xr.Dataset, **options: Any
     ) -> str:
-        """As `save`, but a dataset that cannot be written is held in memory, with a warning.
+        """As `save`, but a dataset that cannot be written is kept in memory, with a warning.
 
-        This object loads it as if it were stored; `incomplete` says that it is not.
+        This object loads it as if it were stored; `incomplete` is then True.
         """
         try:
             return self.save(kind, params, dataset, **options)
@@ -265,7 +266,7 @@ class Store(Mapping[str, xr.Dataset]):
         return bool(self._unkept)
 
     def refuse_unwritable(self) -> None:
-        """Raise InputError where nothing can be saved, before anything is computed for it."""
+        """Raise InputError if nothing can be saved, before a long computation."""
         with self._writing():
             own = os.access in os.supports_effective_ids
             there = next(path for path in (self.path, *self.path.parents) if path.exists())
@@ -275,13 +276,13 @@ class Store(Mapping[str, xr.Dataset]):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     def make(self) -> None:
-        """Make the folder if it is missing, for other processes to find; InputError as `save`."""
+        """Create the folder if it is missing, for other processes; InputError as for `save`."""
         with self._writing():
             if _schema(self.path) is None:
                 _create_root(self.path)
 
     def refuse_file(self, name: str) -> None:
-        """Raise InputError where a file has the place of an entry: it may be somebody's."""
+        """Raise InputError if a file is in the place of an entry: it may be the user's."""
         path = self.path / name
         with suppress(OSError):
             mode = path.lstat().st_mode
@@ -326,7 +327,7 @@ class Store(Mapping[str, xr.Dataset]):
         def fits(name: str) -> bool:
             attrs = self._attrs(name)
             if attrs is None:
-                return True  # to be warned of
+                return True  # to be warned about
             known = json.loads(attrs["parameters"])
             return all(
                 key in known and keys.canonical(known[key]) == value
@@ -337,11 +338,11 @@ class Store(Mapping[str, xr.Dataset]):
         return self._read([name for name in of_kind if fits(name)])
 
     def size(self) -> int:
-        """Bytes on disk, temporaries of running writers included."""
+        """Bytes on disk, including temporaries of running writers."""
         return _folder_bytes(self.path)
 
     def clear(self, kind: str | None = None) -> int:
-        """Remove all entries, or those of one kind; returns how many.
+        """Remove all entries, or those of one kind, and return their number.
 
         Raises InputError if the store cannot be written.
         """
@@ -350,7 +351,7 @@ class Store(Mapping[str, xr.Dataset]):
         return len(names)
 
     def remove(self, *names: str) -> None:
-        """Remove the entries of these names, if they are there.
+        """Remove the entries of these names, if they exist.
 
         Raises InputError if the store cannot be written.
         """
@@ -359,7 +360,7 @@ class Store(Mapping[str, xr.Dataset]):
                 self._retire(name)
 
     def clean(self) -> int:
-        """Remove temporaries that killed writers left behind; returns how many.
+        """Remove temporaries that killed writers left behind, and return their number.
 
         Raises InputError if the store cannot be written.
         """
@@ -375,12 +376,12 @@ class Store(Mapping[str, xr.Dataset]):
         verdicts = []
         for name in self._names():
             dataset, reason = entries.checked(self.path / name)
-            if dataset is not None or reason:  # else it was removed meanwhile
+            if dataset is not None or reason:  # otherwise it was removed meanwhile
                 verdicts.append(Verdict(name, not reason, reason))
         return verdicts
 
     def _names(self) -> list[str]:
-        """What is named like an entry, readable or not, sorted."""
+        """Names of all entries, readable or not, sorted."""
         if not self.path.is_dir():
             return []
         return sorted(name for name in os.listdir(self.path) if keys.ENTRY.fullmatch(name))
@@ -395,7 +396,7 @@ class Store(Mapping[str, xr.Dataset]):
     def _publish(
         self, name: str, variables: Mapping[str, xr.Variable], attrs: Mapping[str, Any]
     ) -> None:
-        """Write under a temporary name, then rename: at no moment is a part of it visible."""
+        """Write under a temporary name, then rename, so that no partial entry is ever visible."""
         temporary = self.path / _temporary_name()
         try:
             entries.write(temporary, variables, attrs)
@@ -406,7 +407,7 @@ class Store(Mapping[str, xr.Dataset]):
                 except OSError as error:
                     if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                         raise
-                # Someone was faster. An intact copy is as good as ours; a damaged one goes.
+                # Another process was faster. An intact copy is used; a damaged one is replaced.
                 dataset, reason = entries.checked(self.path / name)
                 if dataset is not None:
                     return
@@ -416,12 +417,12 @@ class Store(Mapping[str, xr.Dataset]):
             _remove(temporary)
 
     def _retire(self, name: str) -> None:
-        """Remove an entry: renamed first, so that it vanishes as a whole."""
+        """Remove an entry: renamed first, so that it disappears at once."""
         temporary = self.path / _temporary_name()
         try:
             os.rename(self.path / name, temporary)
         except FileNotFoundError:
-            return  # another process has done it
+            return  # removed by another process
         _remove(temporary)
 
     @contextmanager
@@ -448,7 +449,7 @@ def _temporary_name() -> str:
 
 
 def _is_stale(temporary: Path) -> bool:
-    """Whether its writer is dead: known on this host, judged by age elsewhere."""
+    """Whether the writer is dead: known on this host, judged by age elsewhere."""
     try:
         age = time.time() - temporary.stat().st_mtime
     except FileNotFoundError:
@@ -469,7 +470,7 @@ def _is_alive(pid: int) -> bool:
 
 
 def _is_zombie(pid: int) -> bool:
-    """Whether the process has ended but was not yet collected by its parent (Linux)."""
+    """Whether the process has ended but was not yet reaped by its parent (Linux)."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
@@ -485,7 +486,7 @@ def _remove(path: Path) -> None:
 
 
 def _folder_bytes(path: str | Path) -> int:
-    """Bytes of all files below a folder; those that vanish meanwhile count nothing."""
+    """Bytes of all files in a folder; files that disappear meanwhile count as 0."""
     total = 0
     for parent, _, files in os.walk(path):
         for name in files:

@@ -1,7 +1,7 @@
-"""The kinds of results that are kept, one record each: what names one, and how it is computed.
+"""The kinds of stored results, one record each, with parameters and computation.
 
-A kind is added by one more record in the file of its family, and by its name here; stores, scans,
-the command line and the page take it from `KINDS`.
+To add a kind, add a record to the file of its family, and its name here; stores, scans, the command
+line and the app take it from `KINDS`.
 """
 
 from granforce.study.kinds.bounds import INTERVALS, LIMIT_LOADS, OUTLINE, STRESS

@@ -1,4 +1,4 @@
-"""Bounds of S that are kept: intervals, limit loads, and outlines."""
+"""Kinds of stored bounds of S: intervals, limit loads, and outlines."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -35,11 +35,12 @@ def _exact_parameters(
     slice_: Sequence[float] | None = None,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name exact bounds or limit loads of one packing.
+    """The parameters of exact bounds or limit loads of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
-    packing's contact list, by default all that carry. slice_: (x0, x1, y0, y1) in parts of the
-    box: contacts with a grain outside are frozen at their original forces. asked: the conditions.
+    packing's contact list, by default all in the backbone. slice_: (x0, x1, y0, y1) in fractions of
+    the box: contacts with a grain outside are frozen at their original forces. asked: the
+    conditions.
     """
     if slice_ is not None and asked.get("prescribed") == "stress":
         raise InputError(
@@ -94,11 +95,11 @@ def _outline_parameters(
     tolerance: float = 1e-3,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name the outline of S in a plane.
+    """The parameters of the outline of S in a plane.
 
     mu: friction coefficient of the ensemble, by default the packing's. components: two pairs
     (contact as its number in the packing, 0 for f_n or 1 for f_t); or states: parameters of the
-    walk or sample whose principal axes span the plane. tolerance as for `outline`. asked: the
+    walk or sample whose principal axes span the plane. tolerance: as for `outline`. asked: the
     conditions.
     """
     if (components is None) == (states is None):
@@ -131,8 +132,7 @@ def _outline(
 ) -> xr.Dataset:
     """Dataset of the outline of S in a plane.
 
-    axes (2, N_c, 2): principal axes of the states that the parameters name; not used for
-    components.
+    axes (2, N_c, 2): principal axes of the states in the parameters; not used with components.
     """
     S = ensemble_of(store, parameters)
     plane = _component_axes(S, parameters["components"]) if axes is None else axes
@@ -155,10 +155,10 @@ def _component_axes(S: Ensemble, components: Sequence[Sequence[int]]) -> Floats:
 def _stress_parameters(
     packing: Parameters, *, mu: Any = None, angles: int = 64, known: Any = None
 ) -> Parameters:
-    """The parameters that name the outline of the stresses that a packing can carry.
+    """The parameters of the outline of the stresses that a packing can carry.
 
-    mu: friction coefficient of the ensemble, by default the packing's. angles: how many directions.
-    known: as for `conditions`.
+    mu: friction coefficient of the ensemble, by default the packing's. angles: their number. known:
+    as for `conditions`.
     """
     cones = cones_of(packing, mu, known=known)
     return cones | {"angles": whole(angles, "the number of angles", 1, 4096)}

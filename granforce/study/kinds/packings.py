@@ -1,4 +1,4 @@
-"""Packings that are kept, and the ensembles of their forces: what names them in a store."""
+"""Stored packings, and the ensembles of their forces."""
 
 import hashlib
 from collections.abc import Callable, Iterable
@@ -43,9 +43,9 @@ def _packing_parameters(
     accuracy: float = 0.01,
     box: str = "square",
 ) -> Parameters:
-    """The parameters that name a packing in the store; as for `pack`.
+    """The parameters of a packing in the store; arguments as for `pack`.
 
-    Raises InputError for what `pack` would refuse, and for more disks than fit into memory.
+    Raises InputError for arguments that `pack` would reject, or too many disks for the memory.
     """
     n = number_of_disks(n)
     drawn = draw_radii(radii, n, np.random.default_rng(0))
@@ -62,15 +62,15 @@ def _packing_parameters(
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy", most=COARSEST),
         "version": PACKING_VERSION,
-        # Only where it is not square: keys of packings in square boxes stay what they were.
+        # Only if not square, so that keys of packings in square boxes stay valid.
         **({} if check_box(box) == "square" else {"box": box}),
     }
 
 
 def imported_parameters(packing: Packing) -> Parameters:
-    """The parameters that name a packing made elsewhere: a hash of its arrays."""
+    """The parameters of an imported packing: a hash of its arrays."""
     arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
-    # The tilt only where there is one: keys of packings in straight cells stay what they were.
+    # Only if there is a tilt, so that keys of packings in straight cells stay valid.
     tilt = [packing.tilt] if packing.tilt else []
     digest = hash_of(*arrays, np.array([packing.mu, packing.pressure, *tilt]))
     return {"imported": digest, "mu": packing.mu}
@@ -101,7 +101,7 @@ def _packing(
 
 
 def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
-    """The Packing of these parameters, found or made, and whether it was found; as `cells.get`."""
+    """The Packing of these parameters, and whether it was loaded, not made; as `cells.get`."""
     dataset, cached = get(store, PACKING, parameters, **options)
     return dataset_packing(dataset), cached
 
@@ -112,7 +112,7 @@ def keep_packing(store: Store, parameters: Parameters, packing: Packing) -> str:
 
 
 def cones_of(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
-    """What names an ensemble: its packing, friction coefficient (that of it, if none), conditions.
+    """The parameters of an ensemble: its packing, friction coefficient (default: its), conditions.
 
     asked: prescribed, stress and known, as for `conditions`.
     """
@@ -121,7 +121,7 @@ def cones_of(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
 
 
 def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
-    """The ensemble of a named packing and friction, with the forces outside a slice frozen."""
+    """The ensemble of a stored packing and friction, with the forces outside a slice frozen."""
     packing, _ = get_packing(store, parameters["packing"])
     slice_ = parameters.get("slice")
     frozen = None if slice_ is None else slices.outside(packing, slice_)
@@ -129,7 +129,7 @@ def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
 
 
 def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
-    """Numbers of contacts, sorted, each once; None for all that carry."""
+    """Numbers of contacts, sorted and unique; None for all in the backbone."""
     if contacts is None:
         return None
     chosen = sorted({whole(c, "the number of a contact") for c in contacts})
@@ -139,7 +139,7 @@ def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
 
 
 def check_complete(result: Any, what: str) -> None:
-    """Only finished results are kept: Cancelled or InputError for others."""
+    """Raise Cancelled or InputError for unfinished results, which are not stored."""
     cancelling.check(what)
     if not result.converged:
         raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
@@ -147,7 +147,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=3,  # later ones are told apart by PACKING_VERSION in their parameters
+    version=3,  # later versions differ by PACKING_VERSION in the parameters
     title="compaction",
     unit="step",
     parameters=_packing_parameters,

@@ -1,4 +1,4 @@
-"""Contacts that were pushed: one by one, and many as one result."""
+"""Kinds of perturbations: of one contact, and of many as one result."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -25,7 +25,7 @@ from granforce.study.responses import contact_dataset, perturbation_dataset
 from granforce.study.store import Store
 from granforce.types import Integers, Progress
 
-# What names how loads on a contact are raised.
+# Parameters of how loads on a contact are raised.
 PROTOCOL = ("precision", "rise", "max_steps")
 
 
@@ -41,10 +41,10 @@ def _perturbation_parameters(
     max_steps: int = MOST_STEPS,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name the local perturbation of contacts of one packing.
+    """The parameters of the local perturbation of contacts of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
-    packing's contact list, by default all that carry; or random: so many of those that carry, the
+    packing's contact list, by default the whole backbone; or random: this many of the backbone, the
     first in an order drawn from seed. precision, rise, max_steps: as for `critical_force`. asked:
     prescribed and stress.
     """
@@ -65,7 +65,7 @@ def _perturbation_parameters(
 
 
 def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
-    """What names how loads are raised; `rise` and `max_steps` only where they are not the usual."""
+    """Parameters of how loads are raised; `rise` and `max_steps` only if not the default."""
     named = {
         "precision": positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
     }
@@ -81,7 +81,7 @@ def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
 def _perturbation(
     store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
 ) -> xr.Dataset:
-    """Dataset of critical forces, first motions and α; each contact is kept as it ends."""
+    """Dataset of critical forces, first motions and α; each contact is stored as it ends."""
     S = ensemble_of(store, parameters)
     chosen = S.index if parameters["contacts"] is None else np.array(parameters["contacts"])
     if parameters["random"] is not None:
@@ -102,7 +102,7 @@ def _perturbed(
     workers: int,
     progress: Progress | None,
 ) -> list[xr.Dataset]:
-    """Datasets of the single contacts, in order; those of the store are found."""
+    """Datasets of the single contacts, in order, loaded from the store if possible."""
     shared = ("packing", "mu", *PROTOCOL, "prescribed", "stress")
     common = {name: parameters[name] for name in shared if name in parameters}
     named = {c: PERTURBED_CONTACT.parameters(contact=int(c), **common) for c in chosen}
@@ -146,7 +146,7 @@ def _perturbed_contact_parameters(
     max_steps: int = MOST_STEPS,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name one perturbed contact (its number in the packing)."""
+    """The parameters of one perturbed contact (its number in the packing)."""
     return {
         **cones_of(packing, mu, **asked),
         "contact": whole(contact, "the number of a contact"),

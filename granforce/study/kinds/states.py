@@ -1,4 +1,4 @@
-"""States of S that are kept: walks, uniform samples, its volume, and what was inferred."""
+"""Kinds of states of S: walks, uniform samples, the volume, and inferred forces."""
 
 import time
 from collections.abc import Callable
@@ -32,8 +32,8 @@ from granforce.system.memory import check_memory
 from granforce.tolerances import EQUILIBRIUM
 from granforce.types import Progress
 
-# Memory that a walk needs at the least for each state and disk: f_n and f_t of one and a half
-# contacts, as they are made and as they are handed over.
+# Least memory of a walk per state and disk: f_n and f_t of 1.5 contacts, twice (during the walk and
+# in the result).
 STATE_BYTES = 48
 RELAXATIONS: dict[str, dict[str, Any]] = {
     "gauss_seidel": {"relax": gauss_seidel},
@@ -57,13 +57,13 @@ def _walk_parameters(
     skip: bool = True,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name a walk: those of its packing, and how it goes.
+    """The parameters of a walk: those of its packing, and its own options.
 
     mu: friction coefficient of the ensemble, by default the packing's. keep: number of evenly
-    spaced states that are stored (measures always come from all). residual: in ⟨f_n⟩, at which
-    sweeps alone (relax="gauss_seidel_only") end, by default EQUILIBRIUM. attempts: after so many
-    per state the walk is kept with the states it has; by default too few states are an error.
-    skip: whether nothing is relaxed where S is one point. asked: the conditions.
+    spaced states to store (measures always come from all). residual: in ⟨f_n⟩, at which sweeps
+    alone (relax="gauss_seidel_only") end, by default EQUILIBRIUM. attempts: after this many per
+    state the walk is stored with the states it has; by default too few states are an error. skip:
+    whether to skip relaxation if S is one point. asked: the conditions.
     """
     if relax not in RELAXATIONS:
         raise InputError(f"unknown relaxation {brief(relax)}: take one of {', '.join(RELAXATIONS)}")
@@ -93,7 +93,7 @@ def _walk_parameters(
 def _size(
     packing: Parameters, states: Any, seed: Any, chains: Any, keep: int | None, least: float = 1
 ) -> Parameters:
-    """What walks and samples have in common; InputError where `least` states are too many."""
+    """Parameters shared by walks and samples; InputError if `least` states are too many."""
     states = whole(states, "the number of states", 1, most=None)
     chains = whole(chains, "the number of chains", 1)
     most = max(states, chains, least)
@@ -118,7 +118,7 @@ def _walk(
 ) -> xr.Dataset:
     """Dataset of a walk with all its measures; begun(S) is called before its first step.
 
-    A shorter one that the store has, otherwise the same, goes on. enough: as for `walk`.
+    A shorter, otherwise identical walk in the store is resumed. enough: as for `walk`.
     """
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = dict(RELAXATIONS[parameters["relax"]])
@@ -147,9 +147,9 @@ def _walk(
 
 
 def _longest_begun(store: Store, parameters: Parameters) -> Walk | None:
-    """Of the stored walks that this one begins with, with all their states, the longest; or None.
+    """The longest stored walk with all its states that this walk would begin with, or None.
 
-    The states that a single chain finds do not depend on how many are wanted.
+    The states of a single chain do not depend on the number requested.
     """
     if parameters["chains"] > 1 or "attempts" in parameters:
         return None
@@ -162,14 +162,14 @@ def _longest_begun(store: Store, parameters: Parameters) -> Walk | None:
     shorter.sort(key=lambda entry: entry.params["states"], reverse=True)
     for entry in shorter:
         found = load(store, WALK, entry.params)
-        # Those that were rounded to save room are not where the chain stood.
+        # Walks with rounded states cannot be resumed exactly.
         if found is not None and found["states"].dtype == np.float64 and found["accepted"].item():
             return walk_of(found)
     return None
 
 
 def _walk_reached(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
-    """The parameters of a walk that ended when it was enough: those of one of so many states."""
+    """The parameters of a walk that ended early: those of a walk of the reached length."""
     if "attempts" in parameters:
         return parameters
     states = int(dataset["accepted"].item() + dataset["skipped"].item())
@@ -188,9 +188,9 @@ def _uniform_parameters(
     keep: int | None = None,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name a uniform sample: those of its packing, and how it is drawn.
+    """The parameters of a uniform sample: those of its packing, and its own options.
 
-    mu, keep, asked: as of a walk; states, chains, effective: as for `sample_uniform`.
+    mu, keep, asked: as for a walk; states, chains, effective: as for `sample_uniform`.
     """
     if effective is not None:
         effective = positive(effective, "effective sample size")
@@ -203,7 +203,7 @@ def _uniform(
 ) -> xr.Dataset:
     """Dataset of a uniform sample with all its measures.
 
-    A sample that did not reach the wanted effective size is kept too, and says so in `reached`.
+    A sample that did not reach the requested effective size is stored too, marked in `reached`.
     """
     S = ensemble_of(store, parameters)
     seconds, drawn = timed(
@@ -223,7 +223,7 @@ def _uniform(
 def _volume_parameters(
     packing: Parameters, accuracy: float = 0.05, seed: int = 0, *, mu: Any = None, **asked: Any
 ) -> Parameters:
-    """The parameters that name a volume of S.
+    """The parameters of a volume of S.
 
     accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
     packing's. asked: the conditions.
@@ -236,7 +236,7 @@ def _volume_parameters(
 def _volume(
     store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
 ) -> xr.Dataset:
-    """Dataset of the volume of S; one whose error is larger than wanted says so in `reached`."""
+    """Dataset of the volume of S; an error above the requested one is marked in `reached`."""
     S = ensemble_of(store, parameters)
     options = {name: parameters[name] for name in ("accuracy", "seed")}
     found = volume(S, **options, workers=workers, progress=progress)
@@ -257,12 +257,12 @@ def _inference_parameters(
     keep: int | None = None,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name an inference: its packing, its measurement, and its draws.
+    """The parameters of an inference: its packing, its measurement, and its draws.
 
-    measured: a Measurement, which is named by a hash of its arrays; mu, keep: as of a walk; states,
-    chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks made by
-    dynamics. certain: whether contacts that were not measured are tried
-    for carrying in every network. asked: the conditions.
+    measured: a Measurement, identified by a hash of its arrays; mu, keep: as for a walk; states,
+    chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks created
+    by dynamics. certain: whether to test which unmeasured contacts carry force in every network.
+    asked: the conditions.
     """
     size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
     if unmeasured is None:
@@ -282,7 +282,7 @@ def _inference(
 ) -> xr.Dataset:
     """Dataset of the likeliest network of a measurement, and of draws around it.
 
-    measured: the Measurement that the parameters name.
+    measured: the Measurement of the parameters.
     """
     if measured is None:
         raise InputError("the measurement is not in this store: infer again")
@@ -318,7 +318,7 @@ def _informative_parameters(
     mu: Any = None,
     **asked: Any,
 ) -> Parameters:
-    """The parameters that name a ranking of contacts by what measuring them would tell.
+    """The parameters of a ranking of contacts by the information from measuring them.
 
     mu: friction coefficient of the ensemble, by default the packing's. k, check, states, seed: as
     for `informative`. asked: the conditions.
