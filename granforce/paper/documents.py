@@ -1,10 +1,10 @@
-"""The study's tables in documents, renewed between two marks: no number is copied by hand.
+"""The study's tables in documents, written between two marks, so that no number is copied by hand.
 
-A document has <!-- study: NAME -->, what was put there last, and <!-- end -->. Names: "measures"
-(η against μ), "beside" (other measures at each μ), "highlights" (ten findings, a sentence each),
+A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
+against μ), "beside" (other measures at each μ), "highlights" (ten findings, one sentence each),
 "headlines" (the first four of them), "claims" (all claims), "findings" (numbers beyond the claims),
-"sweeps" (where the paper's sweeps end, and how far outside of S), "preparation" (what packings
-depend on), "counts" (how many packings each part has).
+"sweeps" (the residual of the paper's sweeps, and their excess over S), "preparation" (how results
+depend on the packing), "counts" (number of packings in each part).
 """
 
 import re
@@ -29,10 +29,10 @@ from granforce.types import Rows
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
 _SWEPT_EXTENT = "sweeps 0.15 η3"
-_NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on the main table says how far outside
-FIGURES = "../../../data/figures"  # from the page of results
-HEADLINES = 4  # highlights in the first document that people read
-# Findings that are too many for a table: `claims.json` has them.
+_NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
+FIGURES = "../../../data/figures"  # relative to the results page
+HEADLINES = 4  # highlights in the README
+# Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
 _HEADS = {
     "gauss_seidel": "paper's sweeps, to 10⁻³",
@@ -46,7 +46,7 @@ _HEADS = {
 
 
 def named(files: str | None) -> list[Path]:
-    """The paths of files separated by commas, or none; InputError for those without a mark."""
+    """The paths of files separated by commas, or none; InputError for files without a mark."""
     paths = [Path(name) for name in (files or "").split(",") if name]
     for path in paths:
         if not path.is_file() or not MARK.search(path.read_text()):
@@ -55,7 +55,7 @@ def named(files: str | None) -> list[Path]:
 
 
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
-    """Write the tables of the study, its judged claims and its findings into marked files.
+    """Write the study's tables, judged claims and findings into files with marks.
 
     claims, findings: dicts of `claims.Claim`.
     """
@@ -80,10 +80,10 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
 
 
 def measures(table: StudyTable) -> str:
-    """φ, z, h and η against μ as a table, of the same packings in every column.
+    """φ, z, h and η against μ as a table, from the same packings in every column.
 
-    Those of the exact intervals; where another column has fewer of them, it says of how many. The
-    last column is the paper's sweeps over nearest networks, packing by packing.
+    The packings are those with exact intervals; a column with fewer of them states their number.
+    The last column is the ratio of the paper's sweeps to nearest networks, packing by packing.
     """
     exact = table.part(SAMPLERS["exact"])
     every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
@@ -120,7 +120,7 @@ def measures(table: StudyTable) -> str:
 
 
 def beside(table: StudyTable) -> str:
-    """What walks see, how contacts give way, and how wide S is, against μ as a table.
+    """Intervals seen by walks, states of contacts, and the width of S against μ, as a table.
 
     Means ± standard errors over packings; ratios are of the same packing.
     """
@@ -165,10 +165,10 @@ def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
 
 
 def sweeps(table: StudyTable) -> str:
-    """Walks by sweeps, by where these end: what they reach, and how far outside of S, as a table.
+    """Walks by sweeps, by their final residual: results and excess over S, as a table.
 
-    Excess: how far the intervals that states span reach beyond the exact ones, over the length of
-    those, means over packings.
+    Excess: how far the intervals of states exceed the exact ones, over the length of those, as
+    means over packings.
     """
     lines = []
     for part, residual in plans.SWEEPS.items():
@@ -198,7 +198,7 @@ def sweeps(table: StudyTable) -> str:
 
 
 def _excess(excess: float, length: float) -> str:
-    """How far states reach beyond S, over its extent; all of it where S is one point."""
+    """The excess of states over S relative to its extent; all of it if S is one point."""
     if length < NOTHING:
         return "all" if excess > NOTHING else "0"
     part = excess / length
@@ -206,9 +206,9 @@ def _excess(excess: float, length: float) -> str:
 
 
 def preparation(table: StudyTable) -> str:
-    """What packings depend on: their class by how they are made, as a table, and what it says.
+    """Dependence on the preparation: packings by how they are made, as a table, and a summary.
 
-    In brackets the difference from the default in the same seeds, in its own standard errors.
+    In brackets: the difference from the default for the same seeds, in its own standard errors.
     """
     columns = (
         ("h", "exact", "dimension"),
@@ -270,7 +270,7 @@ def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
 
 
 def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
-    """All highlights as a numbered list, each with its figure and how it was measured."""
+    """All highlights as a numbered list, each with its figure and a link to its method."""
     return "".join(
         f"{k}. {one.sentence} ([figure]({FIGURES}/{one.figure}.png), "
         f"[method](method.md#{one.method}))\n"
@@ -279,7 +279,7 @@ def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
 
 
 def finding_table(findings: Rows) -> str:
-    """Findings as a table: those of three ranges of μ in one line, all others below."""
+    """Findings as a table: those at three ranges of μ in one row, all others below."""
     ranged: dict[str, dict[str, str]] = {}
     others = []
     for finding in findings:
@@ -308,13 +308,13 @@ def _number(finding: dict[str, Any]) -> str:
 
 
 def counts(table: StudyTable) -> str:
-    """How many packings each part has at each μ, and of which versions, as a table."""
+    """Number of packings in each part at each μ, and their versions, as a table."""
     lines = []
     for part in table.parts():
         rows = table.part(part)
         for n in sorted({row["n"] for row in rows}):
             some = [row for row in rows if row["n"] == n]
-            # Several packings may share the friction of their cones.
+            # Several packings may have the same friction of cones.
             made: dict[Any, set[int]] = {}
             for row in some:
                 made.setdefault(row.get("packing_mu", row["mu"]), set()).add(row["seed"])
@@ -338,12 +338,12 @@ def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
 
 
 def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
-    """Rows of a sampler whose states were drawn, and not known to be one point."""
+    """Rows of a sampler with drawn states, without those where S is known to be one point."""
     return [row for row in drawn(table, sampler) if not skipped(row)]
 
 
 def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -> str:
-    """Mean ± standard error over rows, and of how many they are if not of all that are wanted."""
+    """Mean ± standard error over rows, and their number if it is not the wanted one."""
     found = np.array([row[name] for row in rows if name in row], dtype=float)
     values = factor * found[np.isfinite(found)]
     if not len(values):
@@ -354,7 +354,7 @@ def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -
 
 
 def claim_table(claims: Rows) -> str:
-    """Claims with number, interval and verdict, a line for each and a column for each sampler."""
+    """Claims with number, interval and verdict: one row per claim, one column per sampler."""
     lines: dict[Any, Any] = {}
     for claim in claims:
         key = claim["statement"], claim["source"], claim["criterion"]

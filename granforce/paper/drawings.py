@@ -1,4 +1,4 @@
-"""The study's figures, each as a page and as pictures."""
+"""The study's figures, each as a web page and as pictures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder
 from granforce.types import Floats, Progress, Rows
 
-SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
+SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions shown in Figure 4, if the study has them
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
 BIN = 0.25  # of P(ΔF_n), ⟨f_n⟩
 
@@ -25,8 +25,8 @@ _TAILS = (
     "errors over packings; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the upper "
     "quartile"
 )
-# What each figure shows, kept in its file; {walk}: how the states of the walk were relaxed.
-# Figures 1 to 6 are the paper's, by its own relaxation where the study has it at every μ.
+# Caption of each figure, stored in its file; {walk}: how states of the walk were relaxed. Figures 1
+# to 6 are the paper's, by its own relaxation if the study has it at every μ.
 CAPTIONS = {
     "figure1": "Indeterminacy η1, η2 and 0.15 η3 of the random walk's states ({walk}), "
     f"{_POINTS}; and the coordination z of the backbone, against the friction coefficient μ.",
@@ -90,7 +90,7 @@ _RELAXED = {
 
 
 def paper_sampler(table: StudyTable) -> str:
-    """Sampler of Figures 1 to 6: the paper's, if the table has it at every μ of its plan."""
+    """Sampler of Figures 1 to 6: the paper's if the table has it at every μ of its plan."""
     known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
     wanted = set(table.plan.get("frictions", ()))
     return "gauss_seidel" if wanted and wanted <= known else "nearest"
@@ -114,7 +114,7 @@ def draw(
     formats: Sequence[str] = FORMATS,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Draw every figure that a table has the data of into a folder; returns the paths.
+    """Draw every figure for which a table has data into a folder; return the paths.
 
     progress(figures drawn, figures in all).
     """
@@ -132,7 +132,7 @@ def draw(
 
 
 def all_figures(table: StudyTable) -> dict[str, Callable[..., Any]]:
-    """{file name: figure(backend=…)} of all figures that a table has the data of."""
+    """{file name: figure(backend=…)} of all figures for which a table has data."""
     return _of_the_paper(table) | _beyond(table)
 
 
@@ -161,19 +161,19 @@ def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
 
 
 def _in_S(table: StudyTable, part: str) -> dict[float, list[Floats]]:
-    """{μ: extents} of a part where its states lie in S, or near it."""
+    """{μ: extents} of a part, at μ where its states are in S or close to it."""
     beyond = outside(table, part)
     return {mu: group for mu, group in table.extents(part).items() if mu not in beyond}
 
 
 def _beyond_S(table: StudyTable, part: str) -> list[dict[str, Any]]:
-    """Rows of a part whose states lie outside of S by more than its extent."""
+    """Rows of a part whose states exceed S by more than its extent."""
     beyond = outside(table, part)
     return [row for row in table.part(part) if row["mu"] in beyond]
 
 
 def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
-    """What the paper does not show."""
+    """Figures that the paper does not have."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, made = SAMPLERS[paper_sampler(table)], {}
     sources = {_SWEPT.get(p, name): drawn(table, name) for name, p in SAMPLERS.items()}
@@ -221,7 +221,7 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
 
 
 def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, float]]]]:
-    """{word: {μ: [(f, P), …]}} of uniform states of large packings."""
+    """{word: {μ: [(f, P), …]}} for uniform states of large packings."""
     return {
         word: {mu: tails.densities(packings) for mu, packings in known.items()}
         for word, known in tails.counts(table).items()
@@ -229,17 +229,17 @@ def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, flo
 
 
 def _chance(rows: Rows) -> dict[float, float]:
-    """{μ: two standard deviations of the mean correlation of packings with shuffled forces}."""
+    """{μ: two standard deviations of the mean correlation for shuffled forces}."""
     free: dict[Any, Any] = {}
     for row in rows:
         if row["mu"] > 0 and row.get("contacts"):
             free.setdefault(row["mu"], []).append(row["contacts"] - 1)
-    # Each of k packings has a variance of 1/(N_c − 1), their mean 1/k of that.
+    # Each of k packings has a variance of 1/(N_c − 1), and their mean 1/k of that.
     return {mu: 2 * np.sqrt(np.mean(1 / np.array(n)) / len(n)) for mu, n in free.items()}
 
 
 def _loose(groups: dict[float, list[Floats]]) -> dict[float, list[Floats]]:
-    """Groups of ΔF_n in which anything is undetermined."""
+    """Groups of ΔF_n with any undetermined force."""
     return {mu: group for mu, group in groups.items() if any(v.any() for v in group)}
 
 
@@ -258,7 +258,7 @@ def _with_sizes(table: StudyTable) -> list[dict[str, Any]]:
 
 
 def _shown_contacts(table: StudyTable, part: str) -> Iterator[tuple[Any, ...]]:
-    """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks that are shown."""
+    """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks to show."""
     contacts = {id(row): arrays for row, *arrays in table.contacts(part)}
     for k in sorted({k for k, _ in table.shown}):
         row = table.rows[k]

@@ -1,7 +1,7 @@
-"""Beyond the paper: how its results depend on sampler, solver and definition.
+"""Beyond the paper: dependence of its results on sampler, solver and definition.
 
-Numbers with 95 % confidence intervals over packings, without a verdict; ratios are of the same
-packing. They tell why a claim holds or does not.
+Numbers with 95 % confidence intervals over packings, without a verdict; ratios are from the same
+packing. They explain why a claim holds or fails.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,12 +30,12 @@ Values = Mapping[float, Any]  # {μ: a number of each packing}
 
 
 def found(table: StudyTable) -> list[Claim]:
-    """All findings about a `tables.StudyTable`; those without data are left out."""
+    """All findings about a `tables.StudyTable`, without those that lack data."""
     return [finding for family in FAMILIES for finding in family(table)]
 
 
 def sampled_part(table: StudyTable) -> Iterator[Claim]:
-    """How much of the exact extent 1000 states see."""
+    """The fraction of the exact extent that 1000 states see."""
     for source, word in (("walk", "the walk's"), ("uniform", "uniform")):
         yield from _by_range(
             _ratios(table, "eta3", source, "exact"), f"η3 of {word} states over exact η3"
@@ -43,7 +43,7 @@ def sampled_part(table: StudyTable) -> Iterator[Claim]:
 
 
 def measure(table: StudyTable) -> Iterator[Claim]:
-    """How the walk's measure differs from the uniform one."""
+    """The difference between the walk's measure and the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         yield from _by_range(
             _ratios(table, name, "walk", "uniform"), f"{label} of the walk over {label} of S"
@@ -65,7 +65,7 @@ def exact_shape(table: StudyTable) -> Iterator[Claim]:
 
 
 def distribution(table: StudyTable) -> Iterator[Claim]:
-    """How far P(ΔF_n) is from falling at each μ, in units of each packing's mean, and its width."""
+    """Departure of P(ΔF_n) from a falling density at each μ, and its width."""
     for sampler in SAMPLERS:
         groups = sampled(table, sampler)
         for mu, values in each(groups, lambda values: values / values.mean()).items():
@@ -84,7 +84,7 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
 
 
 def opened(table: StudyTable) -> Iterator[Claim]:
-    """How η grows with the friction of the cones alone, in packings made without friction."""
+    """Growth of η with the friction of the cones alone, in frictionless packings."""
     groups = _values(table.part("opened_exact"), "eta3")
     yield from _growth(groups, "exact η3, packings made at μ = 0,")
 
@@ -108,7 +108,7 @@ def size(table: StudyTable) -> Iterator[Claim]:
 
 
 def strength(table: StudyTable) -> Iterator[Claim]:
-    """How far the critical force stays below the limit load, and what the protocol does to it."""
+    """The critical force relative to the limit load, and its dependence on the protocol."""
     rows = [
         row | {"part_of_load": row["critical_force"] / row["limit_load"]}
         for row in table.responses()
@@ -121,7 +121,7 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
             yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
-    # Counted in the pressure or not, loads differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
+    # Loads inside and outside the pressure differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
     factors = [
         {
             "mu": row["mu"],
@@ -136,7 +136,7 @@ def strength(table: StudyTable) -> Iterator[Claim]:
 
 
 def shear(table: StudyTable) -> Iterator[Claim]:
-    """Which shear stress the contacts can carry, and how much of it networks have."""
+    """The shear stress that the contacts can carry, and the fraction that networks have."""
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = _values(rows, "friction")
     if len(groups) > 2:
@@ -154,7 +154,7 @@ def shear(table: StudyTable) -> Iterator[Claim]:
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
-    """How many networks there are: the width of S and the entropy of forces per grain."""
+    """The number of networks: the width of S and the entropy of forces per grain."""
     rows = table.part("volume")
     for name, told in (
         ("extent", "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩"),
@@ -162,7 +162,7 @@ def volume(table: StudyTable) -> Iterator[Claim]:
     ):
         groups = _values(rows, name)
         if len(groups) > 2:
-            # Logarithms are of either sign: the largest of the grid.
+            # Logarithms may have either sign: the largest value on the grid.
             top = peak if name == "extent" else _largest
             yield _trend(f"μ where {told} is largest", top, groups)
         yield from _by_range(groups, told)
@@ -194,7 +194,7 @@ def volume(table: StudyTable) -> Iterator[Claim]:
 
 
 def forces(table: StudyTable) -> Iterator[Claim]:
-    """How the normal forces of uniform states fall off, against an exponential and a Gaussian."""
+    """The decay of P(f_n) of uniform states, compared with an exponential and a Gaussian."""
     for word, known in tails.counts(table).items():
         for mu, packings in known.items():
             tail = tails.fitted(packings)
@@ -211,7 +211,7 @@ def forces(table: StudyTable) -> Iterator[Claim]:
 
 
 def _part(packings: Any, name: str) -> float:
-    """One number of the tail of some packings, NaN without one."""
+    """One number of the tail of some packings, or NaN."""
     return getattr(tails.fitted(packings), name, np.nan)
 
 
@@ -226,13 +226,13 @@ def _values(rows: Rows, name: str) -> Values:
 
 
 def _ratios(table: StudyTable, name: str, above: str, below: str) -> Values:
-    """{μ: ratios of one number in the same packings}, where both parts have it."""
+    """{μ: ratios of one number in the same packings}, for packings in both parts."""
     rows = [r for r in table.part(above) if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
     return _quotients(statistics.paired(rows, table.part(below)), name, name)
 
 
 def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Values:
-    """{μ: one number of a row over one of the row beside it}, where they have both."""
+    """{μ: one number of a row over one of its paired row}, if both exist."""
     ratios: dict[Any, Any] = {}
     for row, other in pairs:
         if above in row and other.get(below):
@@ -241,7 +241,7 @@ def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Valu
 
 
 def _largest(frictions: Floats, means: Floats) -> float:
-    """μ of the grid where the means over packings are largest."""
+    """μ on the grid at which the means over packings are largest."""
     return float(frictions[int(np.argmax(means))])
 
 

@@ -12,7 +12,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def short(value: float) -> str:
-    """Three decimals, or two digits of what is smaller."""
+    """Three decimals, or two digits of smaller values."""
     if abs(value) < NOTHING:
         return "< 10⁻⁹"
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
@@ -36,7 +36,7 @@ def with_error(values: Floats) -> str:
 
 
 def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown, its cells escaped."""
+    """A table in Markdown with escaped cells."""
     rows = [[cell.replace("|", "\\|") for cell in row] for row in rows]
     lines = [heads, ["---"] * len(heads), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

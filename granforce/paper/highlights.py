@@ -1,4 +1,4 @@
-"""Ten findings, one sentence each, filled in from the study; left out if a number is missing."""
+"""Ten findings, one sentence each, with numbers from the study; left out if a number is missing."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Highlight(NamedTuple):
 
 
 class _Numbers:
-    """The numbers that sentences quote; KeyError for those that the study lacks."""
+    """The numbers quoted in sentences; KeyError for those missing from the study."""
 
     def __init__(self, table: StudyTable, claims: Rows, findings: Rows) -> None:
         self.table = table

@@ -31,9 +31,9 @@ def main(arguments: argparse.Namespace) -> int:
     """Run the study into a folder. Returns 1 if a cell failed.
 
     The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
-    as claims.json. With --reduce the cells of another store are taken as they are, and rows that
-    they lack from --table; with --table alone nothing is computed or reduced. With --status what is
-    done is told, and nothing else.
+    as claims.json. With --reduce the cells of another store are used unchanged, and rows missing
+    there come from --table; with --table alone nothing is computed or reduced. With --status only
+    the progress is reported.
     """
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
@@ -78,7 +78,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _check_apart(arguments: argparse.Namespace) -> None:
-    """InputError where a store that is written inside the folder is one that is read."""
+    """InputError if a store to be written in the folder is also read."""
     if arguments.reduce is not None:
         own = "the reduced study", Path(arguments.out) / "study.zarr"
         read = [("--reduce", arguments.reduce), ("--table", arguments.table)]
@@ -88,7 +88,7 @@ def _check_apart(arguments: argparse.Namespace) -> None:
 
 
 def status(arguments: argparse.Namespace) -> int:
-    """What of the parts of the plan the folder has, on stdout; returns 0."""
+    """Print the progress of the parts of the plan on stdout; returns 0."""
     path = Path(arguments.out) / "cells.zarr"
     wanted = plans.chosen(plan_of(arguments), _parts(arguments))
     rows = plans.remaining(open_store(path, readonly=True).path, wanted)
@@ -97,7 +97,7 @@ def status(arguments: argparse.Namespace) -> int:
 
 
 def _parts(arguments: argparse.Namespace) -> Collection[str] | None:
-    """Families of parts that are computed; None for all."""
+    """Families of parts to compute; None for all."""
     if arguments.paper:
         if arguments.parts is not None:
             raise InputError("--paper names the parts of the paper: leave --parts out")
@@ -123,13 +123,13 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
         plan = plan._replace(sizes=sizes)
     if not plan.frictions:
         raise InputError("--mu: give at least one friction coefficient")
-    cells = plan.packings * (len(plan.frictions) + len(plan.sizes))  # at the least
+    cells = plan.packings * (len(plan.frictions) + len(plan.sizes))  # at least
     check_memory(scan.CELL_BYTES * cells, f"a study of {cells} cells or more")
     return plan
 
 
 def _at(plan: Plan, frictions: tuple[float, ...]) -> Plan:
-    """The plan at other friction coefficients; what is added at some is added at those of them."""
+    """The plan for other friction coefficients; additions at some μ are kept for those of them."""
     some: dict[str, Any] = {
         name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
         for name in (
@@ -153,7 +153,7 @@ def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, .
 def compute(
     path: str | Path, wanted: list[Task], arguments: argparse.Namespace
 ) -> list[tuple[StudyCell, str]]:
-    """Compute the tasks, with a bar on stderr; returns what failed."""
+    """Compute the tasks, with a bar on stderr; return the failures."""
     begin = time.monotonic()
 
     def enough() -> bool:
@@ -176,7 +176,7 @@ def compute(
 
 
 def print_claims(told: dict[str, Any], as_json: bool) -> None:
-    """Claims with their verdicts, and findings, on stdout."""
+    """Print claims with their verdicts, and findings, on stdout."""
     if as_json:
         print(json_text(told))
         return

@@ -1,19 +1,19 @@
-"""Plan of the study: which cells it is made of, and in which order they are computed.
+"""Plan of the study: its cells, and the order in which they are computed.
 
 Parts, the most valuable first: "exact" (intervals, with z, h and φ), "walk" (by nearest networks)
 and "uniform" (uniform states of S), all three in the same packings; "response" (critical forces and
 first motions of random contacts, loads raised in tenths of the way), "response_long" (some of them
 with four times the implicit steps) and "perturb" (loads raised by 0.4 of the way); "sweeps_1e-3"
 (walks by Gauss–Seidel sweeps alone, as in the paper, which end at that residual in ⟨f_n⟩);
-"prepared_…" (walks and, with "…_exact", intervals of packings made otherwise); "opened" and
-"opened_exact" (packings made without friction, cones opened to μ) and "widest_exact" (packings made
-with μ, cones opened to the largest μ); "stress" (outlines of the stresses that the contacts can
-carry) and "stress_uniform" (uniform states, for their stresses); "frozen" and "frozen_large" (exact
-intervals of the inner part with all forces outside held); "volume" (ln V of S) and "volume_size"
-(that of other numbers of disks); "sweeps_1e-4" and "sweeps_1e-6" (sweeps that end later);
-"repeat_…" (walks once more, and longer ones); "size", "size_sweeps" and "size_exact" (other numbers
-of disks); "tails" and "tails_stress" (uniform states of large packings, with the pressure and with
-the whole stress prescribed, for the distribution of f_n).
+"prepared_…" (walks and, with "…_exact", intervals of packings made with other options); "opened"
+and "opened_exact" (frictionless packings, cones opened to μ) and "widest_exact" (packings made at
+μ, cones opened to the largest μ); "stress" (outlines of the stresses that the contacts can carry)
+and "stress_uniform" (uniform states, for their stresses); "frozen" and "frozen_large" (exact
+intervals of the inner part with all forces outside fixed); "volume" (ln V of S) and "volume_size"
+(the same for other numbers of disks); "sweeps_1e-4" and "sweeps_1e-6" (sweeps that end later);
+"repeat_…" (repeated and longer walks); "size", "size_sweeps" and "size_exact" (other numbers of
+disks); "tails" and "tails_stress" (uniform states of large packings, with the pressure and with the
+whole stress prescribed, for the distribution of f_n).
 """
 
 import itertools
@@ -32,37 +32,37 @@ from granforce.study.cells import Kind, StudyCell, load
 from granforce.study.keys import canonical
 from granforce.study.store import open_store
 
-# The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
+# At the smallest two, soft modes do not yet amplify friction beyond its linear effect.
 FRICTIONS = (
     *(0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5),
     *(1, 2, 3, 5, 10),
 )
-# Below this it takes minutes to follow a first motion, and bounds within frozen surroundings end
+# Below this a first motion takes minutes to follow, and bounds with frozen surroundings end
 # uncertified (in small packings also above): contacts are perturbed and forces frozen from here on.
 LEAST_FOLLOWED = 0.001
-SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part whose surroundings are frozen, in parts of the box
-KEPT_STATES = 100  # of each walk, evenly spaced: measures come from all
-# The paper's walk. It does not say where its sweeps end: the residual is the option of these. Most
-# attempts end in no equilibrium at large μ: a walk is kept with the states that it has after so
-# many attempts for each.
+SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part with frozen surroundings, in fractions of the box
+KEPT_STATES = 100  # of each walk, evenly spaced; measures use all states
+# The paper's walk. The paper does not state the final residual of its sweeps, so it is an option
+# here. At large μ most attempts end without equilibrium: a walk stops after this many attempts per
+# state and is stored with the states it has.
 SWEEPS = {"sweeps_1e-3": 1e-3, "sweeps_1e-4": 1e-4, "sweeps_1e-6": 1e-6}
-PAPERS = "sweeps_1e-3"  # what is taken for the paper's, as these reach their end at every μ
+PAPERS = "sweeps_1e-3"  # taken as the paper's, as these converge at every μ
 ATTEMPTS = 3
-# All states are kept of these, of the first packing: Figures 3 and 5 show them.
+# All states of the first packing are stored at these, for Figures 3 and 5.
 SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)
 SHOWN_PARTS = (PAPERS, "walk")
-# Walks that go side by side take a fifth of the time of one as long as all of them; a state has
-# forgotten where it came from after some ten others.
+# Walks in lanes take a fifth of the time of one walk with as many states; a state is independent of
+# its start after about ten others.
 CHAINS = LANES
-# The residual that most attempts do not reach at large μ: tried with fewer states.
+# The residual that most attempts do not reach at large μ: requested for fewer states.
 HARDEST, HARDEST_STATES = "sweeps_1e-6", 200
-LONGER_WALK = 4  # than the others, to see whether η hangs on the length
-# Part of the way to the limit load by which the next load lies above the last at rest.
+LONGER_WALK = 4  # factor, to test whether η depends on the length
+# Fraction of the way from the last load at rest to the limit load.
 RISE, LONGER = 0.1, 4
 
 
 def variations(mu: float) -> dict[str, dict[str, Any]]:
-    """What else packings of this friction are made with, by name: options of `pack`."""
+    """Variations of the preparation at this friction, by name: options of `pack`."""
     dt, sweeps = default_steps(mu, None, None)
     return {
         "half_steps": {"dt": dt / 2},
@@ -75,10 +75,10 @@ def variations(mu: float) -> dict[str, dict[str, Any]]:
 
 
 class Plan(NamedTuple):
-    """Size of the study; packings are those of seeds 1, 2, …, so smaller numbers are subsets.
+    """Size of the study; packings have seeds 1, 2, …, so smaller numbers are subsets.
 
-    Exact intervals, walks by nearest networks and uniform states are of all `packings`; all else of
-    the first of them.
+    Exact intervals, walks by nearest networks and uniform states use all `packings`; everything
+    else uses the first of them.
     """
 
     n: int = 400
@@ -86,7 +86,7 @@ class Plan(NamedTuple):
     packings: int = 30
     states: int = 1000
     gauss_seidel_packings: int = 10
-    residual_packings: int = 5  # of those, with sweeps that go on to smaller residuals
+    residual_packings: int = 5  # of those, with sweeps to smaller residuals
     response_packings: int = 10
     response_contacts: int = 20
     perturb_packings: int = 3
@@ -95,26 +95,26 @@ class Plan(NamedTuple):
     prepared_frictions: tuple[float, ...] = (0.1, 0.5, 1, 3, 10)
     opened_packings: int = 10
     repeat_packings: int = 5
-    repeats: int = 2  # beside the first walk
+    repeats: int = 2  # in addition to the first walk
     repeat_frictions: tuple[float, ...] = (0.01, 0.1, 1, 10)
     frozen_packings: int = 10
-    frozen_from: float = LEAST_FOLLOWED  # smallest μ: bounds of thinner S end uncertified
+    frozen_from: float = LEAST_FOLLOWED  # smallest μ: bounds of a thinner S end uncertified
     frozen_large: int = 1600  # disks
     frozen_large_packings: int = 3
     frozen_large_frictions: tuple[float, ...] = (0.01, 0.1, 0.5, 1, 10)
     stress_packings: int = 10
     stress_states: int = 300
     volume_packings: int = 10
-    # Of ln V, which differs by far more from packing to packing; in proportion to N beyond n.
+    # For ln V, which varies far more between packings; in proportion to N beyond n.
     volume_accuracy: float = 0.1
     sizes: tuple[int, ...] = (100, 200, 800, 1600)
     size_packings: int = 10
     size_frictions: tuple[float, ...] = (0.1, 1.0)
-    largest_exact: int = 800  # exact intervals of other sizes up to here
+    largest_exact: int = 800  # largest size for exact intervals
     tails_n: int = 1600
     tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
-    # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. Where S is
-    # narrow the largest forces are those of few contacts: many packings count, not many states.
+    # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. In a narrow S
+    # the largest forces are those of few contacts, so many packings are needed, not many states.
     tails_packings: int = 16
     tails_states: int = 200
 
@@ -148,7 +148,7 @@ QUICK = Plan(
 
 
 class Task(NamedTuple):
-    """One cell of the study and what it is for."""
+    """One cell of the study and its purpose."""
 
     part: str
     cell: StudyCell
@@ -163,7 +163,7 @@ class Task(NamedTuple):
 
 
 def tasks(plan: Plan) -> list[Task]:
-    """All cells but the packings: part after part, in each those of the first packings first."""
+    """All cells except the packings, part by part, each with the first packings first."""
     found: dict[str, list[Task]] = {}
     for applies in _PARTS.values():
         for seed in range(1, plan.packings + 1):
@@ -186,8 +186,9 @@ def compute(
 ) -> list[tuple[StudyCell, str]]:
     """Compute tasks into the store at path, in their order; options as for `scan.run`.
 
-    A packing is made when the first task needs it: whenever it ends, what is most wanted is there.
-    Returns what failed as (cell, error message); cells of failed packings are not tried.
+    A packing is made when the first task needs it, so that the most important results exist
+    whenever the computation ends. Returns failures as (cell, error message); cells of failed
+    packings are not tried.
     """
     cells: dict[str, StudyCell] = {}
     for task in wanted:
@@ -207,7 +208,7 @@ def _task(
     made: dict[str, Any] | None = None,
     **how: Any,
 ) -> Task:
-    """The Task of a kind; its arguments beside the packing, and what that was made with."""
+    """The Task of a kind with the kind's arguments after the packing, and the packing's options."""
     packed = kinds.PACKING.parameters(
         n, mu if packing_mu is None else packing_mu, seed, **made or {}
     )
@@ -250,8 +251,8 @@ def _nearest(part: str, seed: int, mu: float, plan: Plan, **how: Any) -> Task:
 
 
 def _uniform(plan: Plan, seed: int) -> list[Task]:
-    # The mean of those kept is the centre that distances are measured from: off by a tenth of what
-    # states scatter, half a per cent of a distance as long.
+    # The mean of the kept states is the centre of distances: an error of a tenth of the scatter of
+    # states changes a distance by half a per cent.
     return [
         _task("uniform", kinds.UNIFORM, plan.n, seed, mu, plan.states, keep=KEPT_STATES)
         for mu in plan.frictions
@@ -280,18 +281,18 @@ def _swept(
     n: int | None = None,
     **how: Any,
 ) -> Task:
-    """A walk by sweeps, which end where those of the part `ends` do."""
+    """A walk by sweeps that end at the residual of the part `ends`."""
     states = how.pop("states", plan.states)
     states = min(HARDEST_STATES, states) if ends == HARDEST else states
     options: dict[str, Any] = {"relax": "gauss_seidel_only", "residual": SWEEPS[ends]}
     options |= {"attempts": ATTEMPTS, "chains": min(CHAINS, states)}
-    # Where S is one point, sweeps end beside it: how far is measured, but not to where none ends.
+    # If S is one point, sweeps end near it: the distance is measured, unless no sweeps would end.
     options["skip"] = mu > 0 or ends == HARDEST
     return _walk(part, n or plan.n, seed, mu, plan, states=states, **options, **how)
 
 
 def _repeated(plan: Plan, seed: int) -> list[Task]:
-    """Walks with other seeds, numbered in their part's name, and longer ones."""
+    """Walks with other seeds, numbered in the name of their part, and longer ones."""
     found = []
     for mu in plan.repeat_frictions if seed <= plan.repeat_packings else ():
         for part, walk in (("repeat_sweeps", _swept), ("repeat_walk", _nearest)):
@@ -347,7 +348,7 @@ def _opened(plan: Plan, seed: int) -> list[Task]:
     frictions = [mu for mu in plan.frictions if mu > 0]
     found = [_walk("opened", n, seed, mu, plan, packing_mu=0) for mu in frictions]
     found += [_exact("opened_exact", n, seed, mu, packing_mu=0) for mu in frictions]
-    # Those made without friction, and with the most, are there already.
+    # Frictionless packings, and those with the largest friction, exist already.
     between = [mu for mu in frictions if mu < widest]
     return found + [_exact("widest_exact", n, seed, widest, packing_mu=mu) for mu in between]
 
@@ -355,7 +356,7 @@ def _opened(plan: Plan, seed: int) -> list[Task]:
 def _sizes(plan: Plan, seed: int) -> list[Task]:
     found = []
     for n in plan.sizes:
-        # Large packings average over more contacts: fewer of them are needed.
+        # Large packings average over more contacts, so fewer are needed.
         if seed > _of_size(plan.size_packings, n, plan):
             continue
         for mu in plan.size_frictions:
@@ -367,7 +368,7 @@ def _sizes(plan: Plan, seed: int) -> list[Task]:
 
 
 def _of_size(packings: int, n: int, plan: Plan) -> int:
-    """How many packings of n disks are made where there are so many of the usual size."""
+    """Number of packings of n disks that corresponds to this number at the usual size."""
     return max(1, min(packings, packings * plan.n // n))
 
 
@@ -406,7 +407,7 @@ def _tails(plan: Plan, seed: int) -> list[Task]:
     ]
 
 
-# The parts by families, which are computed by name, in this order.
+# The families of parts, which are computed by name, in this order.
 _PARTS = {
     "exact": _exacts,
     "walk": _walks,
@@ -425,12 +426,12 @@ _PARTS = {
 }
 
 PARTS = tuple(_PARTS)
-# What the paper did: its walks, and its response to local forces.
+# Parts that the paper has: its walks, and its response to local forces.
 PAPER = ("response", "sweeps", "residuals")
 
 
 def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
-    """The tasks of some families of parts (names out of PARTS), or all."""
+    """The tasks of some families of parts (names from PARTS), or all."""
     unknown = set(parts or ()) - set(PARTS)
     if unknown:
         raise InputError(f"unknown part {min(unknown)!r}: take some of {', '.join(PARTS)}")
@@ -446,15 +447,15 @@ def _family(part: str) -> str:
 
 
 def _like(task: Task) -> tuple[str, int, str, str]:
-    """What tasks have in common that take about as long."""
+    """The properties of a task that determine its duration."""
     return task.cell.kind.name, task.n, str(task.cell.parameters.get("relax")), "alike"
 
 
 def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
     """A row for each part of some tasks: cells, how many are done, and the minutes they took.
 
-    To these, minutes that the others will take: as the mean of those done of the same part and
-    size, at the same μ where there are any, else of the same kind; NaN where nothing is known.
+    Includes an estimate of the remaining minutes: the mean of finished cells of the same part and
+    size, at the same μ if there are any, otherwise of the same kind; NaN if unknown.
     """
     store = open_store(path)
     took: dict[Any, list[float]] = {}
@@ -482,7 +483,7 @@ def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
 
 
 def finished(path: str | Path, plan: Plan) -> Iterator[tuple[Task, xr.Dataset]]:
-    """Yield (task, dataset) for the tasks of a plan that the store at path has."""
+    """Yield (task, dataset) for the tasks of a plan that are in the store at path."""
     store = open_store(path)
     for task in tasks(plan):
         dataset = load(store, *task.cell)

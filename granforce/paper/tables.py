@@ -26,7 +26,7 @@ from granforce.types import Floats, Integers
 
 VERSION = 1
 
-# Parts whose contacts are kept one by one, and walks that are held against exact intervals.
+# Parts with samples of single contacts, and walks that are compared with exact intervals.
 SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6", "walk", "exact", "uniform")
 WALKED = (*plans.SWEEPS, "walk")
 # Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
@@ -39,17 +39,17 @@ class StudyTable(NamedTuple):
     """The reduced study."""
 
     plan: dict[str, Any]  # fields of `plans.Plan`
-    # part, n, mu, seed, and the columns of the schema's row_… that apply
+    # part, n, mu, seed, and the applicable columns of the schema's row_…
     rows: list[dict[str, Any]]
     # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
     samples: dict[str, Any]
     # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
     shown: list[tuple[int, Integers]]
     packings: dict[int, Packing]  # {row: Packing} of those walks
-    skipped: dict[str, int]  # counts: cells of the plan that the store lacked
+    skipped: dict[str, int]  # counts of the plan's cells missing from the store
     # {row: counts of f_n of its states, in bins up to FORCES}
     tails: Mapping[int, Floats] = MappingProxyType({})
-    # {row: (shells, 2) their middle in mean diameters, mean |u|, where α is fitted}
+    # {row: (shells, 2) radii in mean diameters and mean |u| in the range of the fit of α}
     decays: Mapping[int, Floats] = MappingProxyType({})
 
     def part(self, *names: str, n: int | None = None) -> list[dict[str, Any]]:
@@ -57,13 +57,13 @@ class StudyTable(NamedTuple):
         return [r for r in self.rows if r["part"] in names and n in (None, r["n"])]
 
     def parts(self) -> list[str]:
-        """Names of the parts that it has, in order of their first rows."""
+        """Names of its parts, in order of their first rows."""
         return list(dict.fromkeys(row["part"] for row in self.rows))
 
     def contacts(self, part: str) -> list[tuple[Any, ...]]:
         """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
         found = []
-        # Samples lie row by row.
+        # Samples are sorted by row.
         edges = np.searchsorted(self.samples["row"], np.arange(len(self.rows) + 1))
         for k, row in enumerate(self.rows):
             chosen = slice(edges[k], edges[k + 1])
@@ -90,9 +90,9 @@ class StudyTable(NamedTuple):
 
 
 def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> StudyTable:
-    """The StudyTable of what the store at path has of a plan. InputError where it has nothing.
+    """The StudyTable of a plan's cells in the store at path; InputError if there are none.
 
-    wanted: the tasks whose lack is counted and told, by default all of the plan.
+    wanted: the tasks to report if missing, by default all of the plan.
     """
     store = open_store(path, readonly=True)
     rows: list[dict[str, Any]] = []
@@ -151,9 +151,9 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
 
 
 def _excess(walked: xr.Dataset, exact: xr.Dataset) -> float:
-    """How far the intervals that states span reach beyond the exact ones, mean, ⟨f_n⟩.
+    """Mean excess of the states' intervals over the exact ones, ⟨f_n⟩.
 
-    States in S reach beyond none. NaN where the two know other contacts.
+    States in S have none. NaN if the two have different contacts.
     """
     if not np.array_equal(walked["backbone"], exact["backbone"]):
         return np.nan
@@ -162,9 +162,9 @@ def _excess(walked: xr.Dataset, exact: xr.Dataset) -> float:
 
 
 def _decay(store: Store, task: Task, dataset: xr.Dataset) -> Floats:
-    """Middles of shells in mean diameters and mean |u| in them over contacts, (shells, 2).
+    """Radii of shells in mean diameters and mean |u| in them over contacts, (shells, 2).
 
-    Of the shells in which α is fitted and that hold grains of every contact.
+    The shells are those in the fit of α that contain grains for every contact.
     """
     packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
     inner, outer = json.loads(dataset.attrs["fit_range"])
@@ -175,7 +175,7 @@ def _decay(store: Store, task: Task, dataset: xr.Dataset) -> Floats:
 
 
 def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
-    """Distances of original and walk states from the mean of uniform states, beside those' own."""
+    """Add the distances of original and walk states from the mean of uniform states."""
     for task in wanted:
         key = task.mu, task.seed
         if task.part != "walk" or key not in centres:
@@ -192,13 +192,13 @@ def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
 
 
 def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
-    """The numbers of one cell: scalars of its dataset and what its contacts sum up to."""
+    """The numbers of one cell: scalars of its dataset, and sums over its contacts."""
     row = _named(task)
     for name in ROW_SCALARS:
         if name in dataset and dataset[name].size:
             row[name] = float(dataset[name].max())
     if "attempts" in task.cell.parameters:
-        # A walk may have ended with fewer states than wanted, or none.
+        # A walk may have ended with fewer states than requested, or none.
         done = int(dataset["accepted"] + dataset["skipped"])
         row["reached_part"] = done / task.cell.parameters["states"]
     if "accepted" in dataset:
@@ -230,7 +230,7 @@ def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _shears(packing: Packing, dataset: xr.Dataset) -> dict[str, float]:
-    """Shear stress over pressure of the states: its mean, and its largest."""
+    """Mean and largest shear stress over pressure of the states."""
     states = dataset["states"].values
     forces = np.zeros((len(states), len(packing.contacts.i), 2))
     forces[:, dataset["backbone"].values] = states
@@ -239,7 +239,7 @@ def _shears(packing: Packing, dataset: xr.Dataset) -> dict[str, float]:
 
 
 def _has_states(dataset: xr.Dataset) -> bool:
-    """Whether there are any; a walk of which no attempt succeeded has none. True of bounds."""
+    """Whether there are states; a walk without a successful attempt has none. True for bounds."""
     return dataset.sizes.get("state", 1) > 0
 
 
@@ -262,17 +262,17 @@ def _samples(k: int, dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _counted(dataset: xr.Dataset) -> Floats:
-    """Counts of f_n of the states in the bins that end at FORCES."""
+    """Counts of f_n of the states, in the bins with edges FORCES."""
     normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
     return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
 
 
 def merged(new: StudyTable, old: StudyTable) -> StudyTable:
-    """The StudyTable `new` with the rows of its plan that it lacks and `old` has, after its own.
+    """The StudyTable `new`, followed by rows of its plan that only `old` has.
 
-    Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
-    where those cells are gone. Raises InputError where rows are of other versions than those that
-    the plan has now.
+    Numbers of a row that depend on other cells (distances from the uniform centre) keep their old
+    values if those cells no longer exist. Raises InputError if rows have other versions than those
+    that the plan has now.
     """
     tasks = {_name(_named(task)): task for task in plans.tasks(plans.Plan(**new.plan))}
     planned = tasks.keys()
@@ -305,7 +305,7 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
 
 
 def _named(task: Task) -> dict[str, Any]:
-    """What names the row of a task, and the versions of what it tells."""
+    """The identity of a task's row, and the versions of its contents."""
     row: dict[str, Any] = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
     if task.packing_mu != task.mu:
         row["packing_mu"] = task.packing_mu
@@ -327,9 +327,9 @@ def _version_words(row: Mapping[str, Any]) -> str:
 
 
 def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
-    """InputError where rows of one part, or their packings, differ in version.
+    """InputError if rows of one part, or their packings, differ in version.
 
-    What an older table did not tell is one version by itself.
+    Rows of an older table without a version count as one version.
     """
     first: dict[Any, Any] = {}
     for row in rows:
@@ -343,7 +343,7 @@ def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def save(table: StudyTable, path: str | Path) -> None:
-    """Keep a table, and the packings it shows, in a small store of its own at path."""
+    """Save a table, and the packings it shows, in a separate small store at path."""
     store = open_store(path)
     dataset = _dataset(table)
     store.clear("study")
@@ -364,7 +364,7 @@ def save(table: StudyTable, path: str | Path) -> None:
 
 
 def load(path: str | Path) -> StudyTable:
-    """The StudyTable kept at path. InputError where there is none."""
+    """Load the StudyTable at path. InputError if there is none."""
     store = open_store(path, readonly=True)
     for entry in store.find("study"):
         if entry.version == VERSION:
@@ -419,7 +419,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
             chosen = dataset["shown_row"].values == k
             if "shown_count" in dataset:
                 shown.append((k, dataset["shown_count"].values[chosen]))
-            else:  # as tables had it once: some states
+            else:  # as in former tables: some states
                 original = samples["normal"][samples["row"] == k]
                 shown.append((k, ratio_counts(original, dataset["shown_normal"].values[:, chosen])))
             packings[k] = _packing(store, rows[k])
@@ -438,6 +438,6 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
 
 
 def _packing(store: Store, row: dict[str, Any]) -> Packing:
-    """The Packing of a row, of whatever version of the algorithm the table's store has."""
+    """The Packing of a row, of the algorithm's version in the table's store."""
     named = {"n": row["n"], "mu": friction(row["mu"]), "seed": row["seed"]}
     return dataset_packing(store[store.find("packing", **named)[0].name])

@@ -1,9 +1,9 @@
-"""How P(f_n) of uniform states falls: exponentially, as a normal distribution, or between.
+"""The decay of P(f_n) of uniform states: exponential, Gaussian, or in between.
 
-The part of the forces beyond f is compared with exp(−(λ f)^b): b = 1 is the exponential tail that
-measured contact forces were said to have, b = 2 the Gaussian one that the force network ensemble
-has in two dimensions where the whole stress is prescribed (Tighe, Snoeijer, Vlugt, van Hecke, Soft
-Matter 6, 2908 (2010)).
+The fraction of the forces beyond f is compared with exp(−(λ f)^b): b = 1 is the exponential tail
+reported for measured contact forces, b = 2 the Gaussian one of the force network ensemble in two
+dimensions with the whole stress prescribed (Tighe, Snoeijer, Vlugt, van Hecke, Soft Matter 6, 2908
+(2010)).
 """
 
 from collections.abc import Sequence
@@ -14,28 +14,28 @@ import numpy as np
 from granforce.paper.tables import FORCES, StudyTable
 from granforce.types import Floats
 
-# What uniform states of large packings are drawn for, in words.
+# The prescribed quantities of the uniform states of large packings, in words.
 PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
-# Tails are fitted from here on, in ⟨f_n⟩, to the last bin with so many forces.
+# Fits start here, in ⟨f_n⟩, and end at the last bin with this many forces.
 _FROM, _ENOUGH = 2.0, 10
-# Fewer bins tell no power: a range of 1 ⟨f_n⟩.
+# Fewer bins do not determine an exponent: a range of 1 ⟨f_n⟩.
 _FEWEST = 8
 _POWERS = np.linspace(0.3, 9.0, 871)
 
 
 class Tail(NamedTuple):
-    """The best exp(−(λ f)^b) for the part of forces beyond f."""
+    """The best exp(−(λ f)^b) for the fraction of forces beyond f."""
 
     power: float  # b
-    low: float  # range of f that was fitted, ⟨f_n⟩
+    low: float  # range of the fit in f, ⟨f_n⟩
     high: float
-    off: float  # root mean square of ln P about it
-    off_exponential: float  # and about the best one of b = 1
-    off_gaussian: float  # and of b = 2
+    off: float  # root mean square residual of ln P
+    off_exponential: float  # the same for the best fit with b = 1
+    off_gaussian: float  # and with b = 2
 
 
 def counts(table: StudyTable) -> dict[str, dict[float, list[Floats]]]:
-    """{words: {μ: [counts of f_n in the bins that end at FORCES, of each packing]}}."""
+    """{words: {μ: [counts of f_n in the bins with edges FORCES, of each packing]}}."""
     found: dict[Any, Any] = {}
     for k, counted in table.tails.items():
         row = table.rows[k]
@@ -45,21 +45,21 @@ def counts(table: StudyTable) -> dict[str, dict[float, list[Floats]]]:
 
 
 def densities(packings: Sequence[Floats]) -> list[tuple[float, float]]:
-    """[(f, P)] of the counts of some packings, where there are forces."""
+    """[(f, P)] from the counts of some packings, for nonempty bins."""
     counted, width = np.sum(packings, axis=0), FORCES[0]
     parts = counted / (counted.sum() * width)
     return [(f - width / 2, p) for f, p in zip(FORCES, parts, strict=True) if p]
 
 
 def fitted(packings: Sequence[Floats]) -> Tail | None:
-    """The Tail of the counts of some packings, None where too few forces are large."""
+    """The Tail of the counts of some packings, or None if too few forces are large."""
     counted = np.sum(packings, axis=0)
     begins = FORCES - FORCES[0]
     chosen = (begins >= _FROM) & (counted >= _ENOUGH)
     if chosen.sum() < _FEWEST:
         return None
     f, beyond = begins[chosen], counted[::-1].cumsum()[::-1][chosen]
-    # ln P = −(λ f)^b + ln P₀, a line in f^b: what is left about the best line of each b.
+    # ln P = −(λ f)^b + ln P₀ is a line in f^b: the residual of the best line for each b.
     x, y = f ** _POWERS[:, None], np.log(beyond / counted.sum())
     x, y = x - x.mean(axis=1, keepdims=True), y - y.mean()
     left = y @ y - (x @ y) ** 2 / (x * x).sum(axis=1)

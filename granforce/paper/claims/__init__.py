@@ -1,21 +1,21 @@
-"""The paper's claims, judged by the reduced study: for each way to draw states of S on its own.
+"""The paper's claims, judged by the reduced study, separately for each way to draw states of S.
 
-Every claim has a number, its 95 % confidence interval over packings, and two ranges: what the
-claim's words are taken to mean, and a wider one. It is "reproduced" where the whole interval lies
-in the first, "differs" where all of it lies outside of that, "not reproduced" where all of it lies
-outside of the wider one, too, and "undecided" where it lies across an end of the first range, or
-where another draw of the bootstrap or one μ less would tell otherwise (`verdicts`). What is claimed
-of a range of μ is judged at each μ of it, so that no mean hides a change of sign. Claims about the
-shape of P(ΔF_n) use no bins.
+Every claim has a number, its 95 % confidence interval over packings, and two ranges: an
+interpretation of the claim's words, and a wider one. A claim is "reproduced" if the whole interval
+is in the first range, "differs" if it is entirely outside the first, "not reproduced" if it is also
+entirely outside the wider one, and "undecided" if it crosses an end of the first range, or if
+another draw of the bootstrap or the omission of one μ would change the verdict (`verdicts`). Claims
+about a range of μ are judged at each μ in it, so that no mean hides a change of sign. Claims about
+the shape of P(ΔF_n) use no bins.
 
 Samplers: "gauss_seidel", the paper's relaxation, whose sweeps end at 10⁻³ of ⟨f_n⟩ here, which they
 reach at every μ; "gauss_seidel_1e-4" and "gauss_seidel_1e-6", the same to 10⁻⁴ and 10⁻⁶; "nearest"
-networks; "uniform" states; and "exact" bounds. Where sweeps leave networks that reach beyond the
-exact intervals by more than those are long, they are not judged, and the claim says at which μ.
-Claims about packings alone have none. Sources: "PRE", the paper; "PRL", the letter
-before it; "ours".
+networks; "uniform" states; and "exact" bounds. If the networks from sweeps exceed the exact
+intervals by more than the length of those, they are not judged, and the claim says at which μ.
+Claims about packings alone have no sampler. Sources: "PRE", the paper; "PRL", the letter before it;
+"ours".
 
-The modules are named for the paper's figures that the claims belong to.
+The modules are named after the paper's figures to which the claims belong.
 """
 
 from collections.abc import Sequence
@@ -42,9 +42,9 @@ from granforce.paper.tables import StudyTable
 
 BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
 BY_WALKS = (*BY_SWEEPS, "nearest")
-BY_STATES = (*BY_WALKS, "uniform")  # have η1 and η2
+BY_STATES = (*BY_WALKS, "uniform")  # these have η1 and η2
 
-# The families, and the samplers that each takes: none for claims about packings alone.
+# The families, and the samplers of each: none for claims about packings alone.
 FAMILIES = {
     agreement: BY_STATES,
     maximum: tuple(SAMPLERS),
@@ -77,9 +77,9 @@ FAMILIES = {
 
 
 def judged(table: StudyTable) -> list[Claim]:
-    """All claims about a `tables.StudyTable`, the paper's sampler first; those without data say so.
+    """All claims about a `tables.StudyTable`, the paper's sampler first, even without data.
 
-    Samplers of which the table has no row are left out, except the paper's.
+    Samplers without rows in the table are left out, except the paper's.
     """
     known = [name for name, part in SAMPLERS.items() if table.part(part)]
     samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
@@ -98,7 +98,7 @@ def judged(table: StudyTable) -> list[Claim]:
 
 
 def without(claim: Claim, beyond: Sequence[float]) -> Claim:
-    """The claim with the μ that it is not judged at, where states lie outside of S."""
+    """The claim, with the μ at which it is not judged because states are outside S."""
     if not beyond:
         return claim
     where = f"outside S, and not judged, at {', '.join(f'{mu:g}' for mu in beyond)}"

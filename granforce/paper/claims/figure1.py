@@ -33,7 +33,7 @@ from granforce.paper.claims.verdicts import (
 from granforce.paper.tables import StudyTable
 
 PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
-# How near its limits z has to come: its whole fall is 1.
+# How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 
@@ -72,7 +72,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
 def peaked(
     claim: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2), fair: Ends = (0.02, 0.5)
 ) -> Claim:
-    """A claim of the paper that what is grouped by μ is largest near 0.1."""
+    """A claim of the paper that a quantity grouped by μ is largest near 0.1."""
     return over_all(claim, what, peak, groups, good=good, fair=fair, least=3)
 
 
@@ -113,7 +113,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
-    """η vanishes at μ = 0, where S is one point: as measured, not as it must be."""
+    """η vanishes at μ = 0, where S is one point: as measured, not assumed."""
     name, label = _measure_of(sampler)
     at_rest = [row for row in table.part(SAMPLERS[sampler]) if row["mu"] == 0 and enough(row)]
     measured = [row for row in at_rest if sampler == "exact" or not skipped(row)]
@@ -134,12 +134,12 @@ def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
 
 
 def skipped(row: dict[str, Any]) -> bool:
-    """Whether a row's states are the one point that S is, without any relaxation."""
+    """Whether a row's states are the only point of S, without any relaxation."""
     return row.get("skipped_part", float(row["dimension"] == 0)) > 0
 
 
 def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """η3, from largest and smallest forces, does not depend on how states are drawn."""
+    """η3, from largest and smallest forces, does not depend on the sampler."""
     rows = [
         row | {"part_seen": row["eta3"] / exact["eta3"]}
         for row, exact in statistics.paired(dynamic(drawn(table, sampler)), table.part("exact"))
@@ -154,12 +154,12 @@ def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
     )
 
 
-# Parts with the same walks again, and with longer ones.
+# Parts with repeated walks, and with longer ones.
 _AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
 
 
 def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """η of another walk, and of a longer one, in the same packing is the same."""
+    """η is the same for another walk, and for a longer one, in the same packing."""
     part, first = _AGAIN[sampler], drawn(table, sampler)
     known = {(row["mu"], row["seed"]): row for row in first}
     again: dict[Any, list[dict[str, Any]]] = {}
@@ -192,7 +192,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """Cones that open make η rise, contacts that vanish make it fall: each by itself."""
+    """Opening cones increase η, vanishing contacts decrease it: each separately."""
     opened = [row for row in table.part("opened_exact")]
     widest = max((row["mu"] for row in opened), default=np.nan)
     ends = [row for row in [*opened, *table.part("exact")] if row["mu"] == widest]

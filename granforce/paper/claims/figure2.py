@@ -12,7 +12,7 @@ from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
-FEWEST_SHELLS = 4  # fewer tell no law from another
+FEWEST_SHELLS = 4  # fewer do not distinguish the two laws
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 
 
@@ -24,7 +24,7 @@ def perturbation(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """F_crit and α rise with η, and are similar where η is."""
+    """F_crit and α rise with η, and are similar at similar η."""
     eta, word = ("eta3", "exact η3") if sampler == "exact" else ("eta2", "η2")
     rows = table.answers(SAMPLERS[sampler], eta)
     for name, label in _ANSWERS:
@@ -52,7 +52,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """The first motion falls with distance as a power law, and not exponentially."""
+    """The first motion falls with distance as a power law, not exponentially."""
     found: dict[float, list[tuple[int, Any]]] = {}
     part = {row["part"] for row in table.responses()}
     for k, decay in table.decays.items():
@@ -69,13 +69,13 @@ def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def _misfits(decays: Sequence[Floats], level: float) -> tuple[float, float, float]:
-    """`misfit_ratio` with its jackknife interval, that of its logarithm."""
+    """`misfit_ratio` with its jackknife interval, computed for its logarithm."""
     log = statistics.jackknife(lambda some: np.log(misfit_ratio(some)), decays, level)
     return tuple(np.exp(log).tolist())
 
 
 def misfit_ratio(decays: Sequence[Floats]) -> float:
-    """How far mean ln |u| lies from the best power law in r, over how far from an exponential.
+    """Misfit of mean ln |u| to the best power law in r, over that to the best exponential.
 
     decays: (shells, 2) of each packing, r in mean diameters and |u|; over shells that all have.
     """
@@ -89,9 +89,9 @@ def misfit_ratio(decays: Sequence[Floats]) -> float:
 
 
 def branches(means: Any) -> float:
-    """Ratio of answers at equal η beyond and below the maximum of η(μ): means (k, 2) of both.
+    """Ratio of responses at equal η beyond and below the maximum of η(μ); means (k, 2) of both.
 
-    NaN where no η beyond the maximum is reached below it.
+    NaN if no η beyond the maximum is reached below it.
     """
     eta, answer = means.T
     top = int(np.argmax(eta))

@@ -1,4 +1,4 @@
-"""Claims about where states lie (Figure 3): how far from each other, how far from the centre."""
+"""Claims about the positions of states (Figure 3): distances between them, and from the centre."""
 
 from collections.abc import Iterator
 
@@ -32,7 +32,7 @@ def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """Weak contacts can change most for what they carry, and most at intermediate μ."""
+    """Weak contacts can change most relative to their force, and most at intermediate μ."""
     judged = may_be_judged(table, sampler)
     ratios: dict[float, list[tuple[int, float]]] = {}
     ranks: dict[float, list[tuple[int, float]]] = {}

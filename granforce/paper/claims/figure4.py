@@ -22,13 +22,13 @@ from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
-# Of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
+# Values of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
 FLAT, RAISED = 0.05, 0.1
 TAILS = ((0.5, "median"), (0.75, "upper quartile"), (0.9, "upper decile"))
 
 
 def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """P(ΔF_n) falls monotonically at small and large μ and has a peak between."""
+    """P(ΔF_n) falls monotonically at small and large μ and has a peak in between."""
     everywhere = sampled(table, sampler)
     scaled = each(everywhere, lambda values: values / values.mean())
     for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "each packing's own ⟨ΔF_n⟩")):
@@ -50,9 +50,9 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def departure(values: Sequence[Floats], level: float) -> tuple[float, float, float]:
-    """Departure of the values of all packings from a falling density, with its interval.
+    """Departure of all packings' values from a falling density, with its interval.
 
-    The interval reaches down to 0 where chance makes as much of as many values.
+    The interval extends down to 0 if chance could produce the departure from as many values.
     """
     value, low, high = statistics.jackknife(
         lambda groups: statistics.departure(np.concatenate(groups)), values, level
@@ -63,7 +63,7 @@ def departure(values: Sequence[Floats], level: float) -> tuple[float, float, flo
 
 
 def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """How the tail of P(ΔF_n) falls at each μ, beyond several quantiles."""
+    """The tail of P(ΔF_n) at each μ, beyond several quantiles."""
     everywhere = sampled(table, sampler)
     for quantile, beyond in TAILS:
         for word, span, how, good, fair in (
@@ -82,7 +82,7 @@ def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def _exponents(quantile: float) -> Callable[[Any, float], Any]:
-    """The exponent b beyond a quantile with its interval, that of log b."""
+    """The exponent b beyond a quantile with its interval, computed for log b."""
 
     def log_exponent(groups: Sequence[Floats]) -> float:
         return np.log(statistics.tail_exponent(np.concatenate(groups), quantile))
@@ -117,6 +117,6 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def _over_middle(keys: Floats, means: Floats, span: Ends) -> float:
-    """The mean of a range of μ over that of the intermediate ones; NaN where one is empty."""
+    """The mean over a range of μ divided by that over intermediate μ; NaN if one is empty."""
     outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
     return means[outer].mean() / means[inner].mean() if outer.any() and inner.any() else np.nan

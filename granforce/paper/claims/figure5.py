@@ -1,4 +1,4 @@
-"""Claims about where the strong and the undetermined contacts are (Figure 5)."""
+"""Claims about the positions of strong and of undetermined contacts (Figure 5)."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -33,7 +33,7 @@ def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Gro
 
 
 def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """As many strong forces as large extents at μ = 0.1."""
+    """Strong forces and large extents are equally frequent at μ = 0.1."""
     groups = _marked(
         table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
     )
@@ -71,7 +71,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def _enriched(strong: Mask, loose: Mask) -> float:
-    """Part of the strong contacts that are loose over that of all; NaN where there are none."""
+    """Fraction of the strong contacts that are loose over that of all; NaN if there are none."""
     return loose[strong].mean() / loose.mean() if strong.any() and loose.any() else np.nan
 
 
@@ -95,7 +95,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """Inside a frozen boundary indeterminacy is everywhere at small μ, in clusters at large μ."""
+    """In a frozen boundary indeterminacy is everywhere at small μ, and in clusters at large μ."""
     for part in ("frozen", "frozen_large"):
         rows = [row for row in table.part(part) if row.get("contacts")]
         word = f"N = {rows[0]['n']}" if rows else "N = 400" if part == "frozen" else "N = 1600"

@@ -64,7 +64,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """The correlation comes from intervals alone: it is the same wherever f_n lies in them."""
+    """The correlation comes from intervals alone: the position of f_n in them does not matter."""
     judged = may_be_judged(table, sampler)
     found: dict[float, list[tuple[int, float]]] = {}
     for row, _, normal, least, extent in table.contacts(SAMPLERS[sampler]):
@@ -83,10 +83,10 @@ def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def beyond_place(normal: Floats, least: Floats, extent: Floats) -> float:
-    """corr(f_n, ΔF_n) less its mean over permutations of the places of f_n in their intervals.
+    """corr(f_n, ΔF_n) minus its mean over permutations of the positions of f_n in their intervals.
 
     normal, least, extent (N_c,): f_n, its least value, ΔF_n. A contact without an interval keeps
-    its force. The permutations are a function of nothing.
+    its force. The permutations are always the same.
     """
     free = extent > DETERMINED
     place = (normal[free] - least[free]) / extent[free]
@@ -99,13 +99,13 @@ def beyond_place(normal: Floats, least: Floats, extent: Floats) -> float:
 
 
 def _mean_difference(keys: Floats, means: Floats, span: Ends) -> float:
-    """Mean of a range of μ less that of the intermediate ones; NaN where one is empty."""
+    """Mean over a range of μ minus that over intermediate μ; NaN if one is empty."""
     outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
     return means[outer].mean() - means[inner].mean() if outer.any() and inner.any() else np.nan
 
 
 def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """The paper's error bars, the range over all other networks of the walk."""
+    """The paper's error bars: the range over all other networks of the walk."""
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (
         ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),

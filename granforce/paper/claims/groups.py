@@ -1,4 +1,4 @@
-"""What claims are judged on: {μ: [(disks, value) of each packing]}, and the ranges of μ."""
+"""Data for claims: {μ: [(disks, value) of each packing]}, and the ranges of μ."""
 
 from collections.abc import Callable, Collection
 from typing import Any
@@ -20,33 +20,32 @@ SAMPLERS = {  # parts of the table
     "uniform": "uniform",
     "exact": "exact",
 }
-# Packings at smaller μ are finished by linear programs; those of the paper all come from dynamics.
+# Packings at smaller μ are finished by linear programs; those of the paper are all from dynamics.
 LEAST_DYNAMIC = 0.001
 SMALL, MIDDLE, LARGE = (LEAST_DYNAMIC, 0.01), (0.05, 0.3), (5, np.inf)  # ranges of μ, ends included
 RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
-BARELY_RIGID = 0.5  # μ from which on S has few dimensions
-# Part of the states wanted that a walk must have reached to be judged.
+BARELY_RIGID = 0.5  # μ above which S has few dimensions
+# Fraction of the requested states that a walk needs to be judged.
 WHOLE_WALK = 0.3
 DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
 def drawn(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
-    """Rows of a sampler that may be judged: see `may_be_judged`."""
+    """Rows of a sampler that may be judged; see `may_be_judged`."""
     judged = may_be_judged(table, sampler)
     return [row for row in table.part(SAMPLERS[sampler]) if judged(row)]
 
 
 def may_be_judged(table: StudyTable, sampler: str) -> Callable[[dict[str, Any]], bool]:
-    """Whether a row's states are enough, and lie in S or near it."""
+    """Whether a row has enough states, in S or close to it."""
     beyond = outside(table, SAMPLERS[sampler])
     return lambda row: enough(row) and row["mu"] not in beyond
 
 
 def outside(table: StudyTable, part: str) -> list[float]:
-    """The μ at which states reach beyond the exact intervals by more than those are long.
+    """The μ at which states exceed the exact intervals by more than the length of those.
 
-    Sweeps that end early leave networks that are not balanced: what they differ by is then no
-    property of S.
+    Sweeps that end early leave unbalanced networks; their differences are then not a property of S.
     """
     return [
         mu for mu, (excess, length) in excesses(table, part).items() if excess > length + DETERMINED
@@ -54,7 +53,7 @@ def outside(table: StudyTable, part: str) -> list[float]:
 
 
 def excesses(table: StudyTable, part: str) -> dict[float, tuple[float, float]]:
-    """{μ: how far the intervals of states reach beyond the exact ones, how long those are}.
+    """{μ: (excess of the states' intervals over the exact ones, length of the exact ones)}.
 
     Means over components and over the packings that have both, in ⟨f_n⟩.
     """
@@ -68,12 +67,12 @@ def excesses(table: StudyTable, part: str) -> dict[float, tuple[float, float]]:
 
 
 def enough(row: dict[str, Any]) -> bool:
-    """Whether a row's walk, if it has one, reached the states that it takes to be judged."""
+    """Whether a row's walk, if it has one, has enough states to be judged."""
     return row.get("reached_part", 1.0) >= WHOLE_WALK
 
 
 def dynamic(rows: Rows) -> list[dict[str, Any]]:
-    """Rows of packings that contact dynamics made."""
+    """Rows of packings made by contact dynamics."""
     return [row for row in rows if row["mu"] >= LEAST_DYNAMIC]
 
 
@@ -82,7 +81,7 @@ def items(
 ) -> Groups:
     """{μ: [(disks, value)]} in order of μ; what: a name, or a function of the row.
 
-    Rows whose value is unknown, or that lack a positive value of some names, are left out.
+    Rows with an unknown value, or without a positive value of given names, are left out.
     """
     found: dict[Any, Any] = {}
     for row in rows:
@@ -105,7 +104,7 @@ def sampled(table: StudyTable, sampler: str) -> Groups:
 
 
 def each(groups: Groups, measure: Callable[..., Any]) -> Groups:
-    """The groups with a number in place of each packing's value."""
+    """The groups with each packing's value replaced by a number."""
     return {key: [(n, measure(value)) for n, value in group] for key, group in groups.items()}
 
 
@@ -115,7 +114,7 @@ def within(groups: Groups, span: Ends) -> Groups:
 
 
 def positive_friction(groups: Groups) -> Groups:
-    """The groups but that of μ = 0."""
+    """The groups except that of μ = 0."""
     return {mu: group for mu, group in groups.items() if mu > 0}
 
 

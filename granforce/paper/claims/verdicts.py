@@ -1,11 +1,11 @@
-"""How a claim is judged: a number with its interval, two ranges, and what could turn the verdict.
+"""How a claim is judged: a number with its interval, two ranges, and tests of the verdict.
 
-Two kinds of claims. `over_all` judges one number of all μ, such as a slope or the place of a
-maximum: its interval comes from packings drawn anew at each μ (percentile bootstrap). The verdict
-has to be the same for the whole interval, wherever chance may leave its ends with other draws, and
-the number has to stay in the same range when any one μ is left out; what stays outside of the first
-range, but not always beyond the wider one, differs. `at_each` judges a number at every μ by
-Student's interval over its packings, which no draw moves; together they hold with 95 % confidence
+There are two kinds of claims. `over_all` judges one number for all μ, such as a slope or the
+position of a maximum: its interval comes from resampled packings at each μ (percentile bootstrap).
+The verdict must be the same for the whole interval, wherever other draws could put its ends, and
+the number must stay in the same range if any one μ is left out; a number outside the first range,
+but not always outside the wider one, differs. `at_each` judges a number at every μ by Student's
+interval over its packings, without resampling; together the intervals hold with 95 % confidence
 (Bonferroni).
 """
 
@@ -23,39 +23,39 @@ FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"
 UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
-NEAR_PEAK = 2.0  # in μ: what lies within this factor of the largest says where the maximum is
-MOST_NAMED = 3  # μ that are named one by one where leaving out any of them changes a verdict
+NEAR_PEAK = 2.0  # in μ: means within this factor of the largest determine the maximum
+MOST_NAMED = 3  # μ that are listed singly if omitting any of them changes a verdict
 
 
 class Claim(NamedTuple):
-    """One claim, what was measured, and the verdict."""
+    """A claim, the measured number, and the verdict."""
 
     statement: str
-    sampler: str  # of SAMPLERS; "" where no states are needed
-    source: str  # who claims it: PRE, PRL or OURS
-    measured: str  # what the number is
+    sampler: str  # of SAMPLERS; "" if no states are needed
+    source: str  # origin of the claim: PRE, PRL or OURS
+    measured: str  # description of the number
     value: float
     low: float
     high: float
-    criterion: str  # range for "reproduced", in brackets the wider one
+    criterion: str  # range for "reproduced", with the wider one in brackets
     verdict: str
-    why: str = ""  # where it does not hold, or what leaves it open
+    why: str = ""  # reason for a negative or open verdict
 
 
 PRE, PRL, OURS = "PRE", "PRL", "ours"
 
 
 class Ranges(NamedTuple):
-    """What a claim's words are taken to mean, and a wider range around it."""
+    """The interpretation of a claim as a range, and a wider range around it."""
 
     good: Ends
     fair: Ends
 
     def verdict(self, low: float, high: float) -> str:
-        """The verdict of an interval: UNDECIDED across an end of the good range.
+        """The verdict of an interval: UNDECIDED if it crosses an end of the good range.
 
-        What lies outside of that for certain differs, and failed where it lies outside of the wider
-        range for certain, too.
+        An interval entirely outside that range differs, and has failed if it is also entirely
+        outside the wider range.
         """
         if self.good[0] <= low and high <= self.good[1]:
             return REPRODUCED
@@ -93,8 +93,8 @@ def over_all(
 ) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
 
-    groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes. seed: of the
-    bootstrap.
+    groups: {μ: [(disks, value)]}, with values of any shape; least: minimum number of groups. seed:
+    of the bootstrap.
     """
     ranges = Ranges(good, good if fair is None else fair)
     claim = _missing(statement, source, measured, ranges)
@@ -122,21 +122,21 @@ def over_all(
     claim = claim._replace(low=low, high=high, verdict=verdict)
     if verdict == UNDECIDED:
         return claim
-    turned = {None: ranges.verdict(*farthest)}  # by the μ left out; None: another draw
+    turned = {None: ranges.verdict(*farthest)}  # by the omitted μ; None: another draw
     for k, key in enumerate(keys) if len(keys) > least else ():
         without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
         if np.isfinite(without):
             turned[key] = ranges.verdict(without, without)
     why = _turns(turned, verdict)
     if why:
-        # What is outside of the good range for certain does not become open.
+        # A number that is certainly outside the good range does not become undecided.
         outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
         verdict = DIFFERS if outside else UNDECIDED
     return claim._replace(verdict=verdict, why=why)
 
 
 def _missing(statement: str, source: str, measured: str, ranges: Ranges) -> Claim:
-    """The Claim before anything is known of it; `judged` says which sampler it is about."""
+    """The Claim before any result; `judged` adds its sampler."""
     return Claim(
         statement=statement,
         sampler="",
@@ -151,7 +151,7 @@ def _missing(statement: str, source: str, measured: str, ranges: Ranges) -> Clai
 
 
 def _turns(turned: Any, verdict: str) -> str:
-    """What other verdicts there are, in words, and by which cause."""
+    """Other possible verdicts and their causes, in words."""
     why = []
     for other in sorted(set(turned.values()) - {verdict}):
         if turned[None] == other:
@@ -174,7 +174,7 @@ def at_each(
     source: str = PRE,
     interval: Callable[[Any, float], tuple[float, float, float]] | None = None,
 ) -> Claim:
-    """The Claim about a number at each μ: what is told is the one farthest from the good range.
+    """The Claim about a number at each μ, reporting the one farthest from the good range.
 
     groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default the
     mean and Student's interval.
@@ -199,12 +199,12 @@ def at_each(
 
 
 def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
-    """The Claim that a number rises and falls again: significantly both, from end to end.
+    """The Claim that a number first rises and then falls, both significantly, from end to end.
 
-    groups: {μ: [(disks, value)]}. Of every μ between the ends, the smaller of the rise from the
-    first and of the fall to the last, in parts of the mean there; told is the largest. Its interval
-    is that of Welch's t, so wide that it holds for all of them together (Bonferroni): no maximum
-    is picked for free.
+    groups: {μ: [(disks, value)]}. For every μ between the ends, take the smaller of the rise from
+    the first and of the fall to the last, relative to the mean there; the largest is reported. Its
+    interval is from Welch's t, widened to hold for all of them together (Bonferroni), so that the
+    choice of the maximum is accounted for.
     """
     ranges = Ranges((0, np.inf), (0, np.inf))
     span = f"{min(groups):g} to {max(groups):g}" if groups else "the first to the last"
@@ -223,18 +223,18 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
         told.append(np.min(ends, axis=0) / middle.mean())
     value, low, high = max(told, key=lambda one: one[0])
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
-    # From one end to the other only it does not turn: of exactly nothing nothing is certain.
+    # With only two ends nothing turns, and an exact zero is undecided.
     verdict = FEW if few else UNDECIDED if low <= 0 <= high else ranges.verdict(low, high)
     return claim._replace(value=value, low=low, high=high, verdict=verdict)
 
 
 def _beyond(value: float, ends: Ends) -> float:
-    """How far a number lies outside of a range, or how near its ends it is inside: negative."""
+    """Distance of a number outside a range; negative inside, the distance to the nearest end."""
     return max(ends[0] - value, value - ends[1])
 
 
 def _together(verdicts: Any) -> tuple[str, str]:
-    """The verdict of a claim from those at each μ, and where it is another one."""
+    """The verdict of a claim from those at each μ, and where they differ."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), ""
