@@ -1,4 +1,4 @@
-"""The benchmark: run time against error of every solver, on the machine at hand.
+"""The benchmark: run time against error of every solver, on the present machine.
 
 `main` is the command `granforce bench`; each part can be called on its own and returns rows
 (dicts of plain numbers and strings).
@@ -89,9 +89,8 @@ def run(
 ) -> dict[str, Any]:
     """Measure parts, by default all, and return {"environment": …, part: rows}.
 
-    folder: where bench.json is written, after every part so that nothing is lost, and the figures
-    (bench.html, bench.png); None: nowhere.
-    show: what is called with each finished table.
+    folder: where to write bench.json, after every part so that nothing is lost, and the figures
+    (bench.html, bench.png); None: write no files. show: called with each finished table.
     """
     folder = None if folder is None else make_folder(folder)
     results: dict[str, Any] = {"environment": environment(), "quick": bool(quick), "seconds": {}}

@@ -1,6 +1,6 @@
-"""What is prescribed and known: bounds beside HiGHS, pulls and inferences beside PIQP, in one run.
+"""Prescribed and known quantities: bounds compared with HiGHS, pulls and inference with PIQP.
 
-Both sides of each comparison get the same programs, and rows tell how far their answers are off.
+Both sides of each comparison get the same programs; rows include the error of their results.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,8 @@ from granforce.packing.compaction import pack
 from granforce.system.clock import timed
 from granforce.types import Floats, Integers
 
-# Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
+# Fraction of contacts with known forces, and the width of their bounds; values of a pull, as
+# fractions of its interval.
 KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1
 VALUES = np.linspace(0.05, 0.95, 8)
 
@@ -41,11 +42,11 @@ def knowledge(
 ) -> list[dict[str, Any]]:
     """Rows: seconds of the same programs by granforce and by the baseline, and their errors.
 
-    Bounds are those of every so-many-th contact. ratio: seconds of the baseline, HiGHS or PIQP,
+    Bounds are those of every n-th contact (`every`). ratio: seconds of the baseline, HiGHS or PIQP,
     over those of the row. gap: largest certified duality gap; off: how far a bound of the baseline
-    lies outside of the certified ones, or the largest difference between forces; residual: largest
-    unbalance, all in ⟨f_n⟩; above: part by which the sum of squares that is the least wanted lies
-    above that of the other, at most.
+    is outside the certified ones, or the largest difference between forces; residual: largest
+    unbalance, all in ⟨f_n⟩; above: largest relative excess of the minimised sum of squares over
+    that of the other method.
     """
     n, every = n or (100 if quick else 400), every or (1 if quick else 6)
     packing = pack(n, mu, seed)
@@ -78,10 +79,10 @@ def _known(S: Ensemble, rng: np.random.Generator) -> Known:
 def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     note(f"knowledge: {task}")
     intervals(S, contacts[:1])  # compiles
-    S = replace(S)  # nothing is prepared
+    S = replace(S)  # without prepared data
     ours, found = timed(intervals, S, contacts)
     theirs, bounds = timed(plain_loop, S, contacts)
-    # Between the value that is attained and the one that bounds it lies the optimum.
+    # The optimum is between the value attained and its bound.
     beyond = np.abs([bounds[0] - found.low, bounds[1] - found.high]) / S.force_scale
     outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
     common = {"task": task, "programs": found.low.size + found.high.size}
@@ -153,7 +154,7 @@ def _beside(
     squares: Callable[[Floats], Floats],
     repeats: int,
 ) -> list[dict[str, Any]]:
-    """Rows of two ways to find the same networks, after one run that compiles."""
+    """Rows for two ways to compute the same networks, after one run that compiles."""
     ours()
     taken, found = zip(*(timed(ours) for _ in range(repeats)), strict=True)
     taken_by, beside = zip(*(timed(theirs) for _ in range(repeats)), strict=True)

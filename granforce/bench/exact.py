@@ -46,7 +46,7 @@ def plain_loop(ensemble: Ensemble, contacts: Any = None) -> tuple[Floats, ...]:
 
 
 def linprog_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
-    """All bounds by scipy's linprog, one call a bound; shapes as in `plain_loop`."""
+    """All bounds by scipy's linprog, one call per bound; shapes as in `plain_loop`."""
     A, T = ensemble.cone_form
     b = ensemble.b / ensemble.force_scale
     value = [

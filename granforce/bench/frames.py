@@ -1,4 +1,4 @@
-"""Photoelastic frames of known forces: how far measured and inferred forces are from the truth."""
+"""Photoelastic frames with known forces: the error of measured and inferred forces."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,16 +15,16 @@ from granforce.packing.compaction import pack
 from granforce.records import Packing
 from granforce.types import Floats, Mask
 
-# σ in ⟨f_n⟩, part of contacts missed, and the friction taken over the true one.
+# σ in ⟨f_n⟩, fraction of contacts missed, and assumed over true friction.
 CASES = (
     *((sigma, 0.0, 1.0) for sigma in (0.05, 0.1, 0.2, 0.5)),
     *((0.1, missed, 1.0) for missed in (0.1, 0.2, 0.5)),
     *((0.2, 0.1, wrong) for wrong in (0.5, 0.8, 1.5, 3.0)),
 )
 MU, REACH, STATES = 0.3, 0.05, 100
-# Parts of a side of the frame in which the stress is told.
+# Parts per side of the frame in which the stress is computed.
 _REGIONS = 3
-# Contacts whose measured f_n is made wrong by so many ⟨f_n⟩, to see whether they are suspected.
+# Number of contacts whose measured f_n is changed by this many ⟨f_n⟩, to test their detection.
 _SPOILT, _BY = 5, 3.0
 
 
@@ -36,13 +36,14 @@ def frames(
     cases: Sequence[tuple[float, ...]] = CASES,
     mu: float = MU,
 ) -> list[dict[str, Any]]:
-    """Rows: mean distance from the truth in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage.
+    """Rows: mean error in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage of error bars.
 
     raw: as measured; likeliest: of `remeasured`, and of all contacts; mean: of its draws; stress:
-    of the pressure in each of nine regions, relative. cover: part of all forces within one standard
-    error of the likeliest network. carry: part of the candidates said to carry (by two standard
-    errors) that do. chi: χ² over its degrees of freedom at the true σ; suspected: part of contacts
-    made wrong by 3 ⟨f_n⟩ that are told, and told: how many of those told were made wrong.
+    of the pressure in each of nine regions, relative. cover: fraction of all forces within one
+    standard error of the likeliest network. carry: fraction of the candidates reported to carry
+    force (by two standard errors) that do. chi: χ² over its degrees of freedom at the true σ;
+    suspected: fraction of contacts changed by 3 ⟨f_n⟩ that are reported; told: fraction of the
+    reported contacts that were changed.
     """
     n, packings = n or (100 if quick else 400), packings or (2 if quick else 6)
     rows = []
@@ -69,8 +70,8 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
     found = read_pegs(frame, **options)
     S, unit = ensemble(found.packing), frame.unit
     m, s = found.measured[S.index], found.sigma[S.index]
-    # The spread of two sides is part of the noise: the true σ counts, and that alone, and contacts
-    # with walls have one side.
+    # The spread of two sides is part of the noise: only the true σ counts; contacts with walls have
+    # one side.
     sides = np.where(S.contacts.j < len(found.ids) - len(found.walls), 2.0, 1.0)[:, None]
     s = np.where(np.isfinite(m), sigma * unit / np.sqrt(sides), np.nan)
     drawn = remeasured(S, m, s, states=STATES, seed=seed, unmeasured=2.0)
@@ -112,7 +113,7 @@ def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
 def _spoilt(
     S: Ensemble, m: Floats, s: Floats, here: Mask, unit: float, seed: int
 ) -> dict[str, Any]:
-    """How well contacts that are made wrong are told."""
+    """How well changed contacts are detected."""
     rng = np.random.default_rng(seed)
     chosen = rng.choice(np.flatnonzero(here), _SPOILT, replace=False)
     m = m.copy()

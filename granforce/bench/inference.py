@@ -17,7 +17,7 @@ from granforce.packing.compaction import pack
 from granforce.system.clock import timed
 from granforce.types import Floats
 
-# Errors of f_n and f_t in ⟨f_n⟩, and seconds after which HiGHS is not waited for.
+# Errors of f_n and f_t in ⟨f_n⟩, and the time limit of HiGHS in seconds.
 ERRORS, PATIENCE = (0.2, 0.1), 120.0
 
 
@@ -29,10 +29,10 @@ def inference(
     seed: int = 1,
     repeats: int = 3,
 ) -> list[dict[str, Any]]:
-    """Rows: seconds of one inference (the least of some), and how far it is from the first's.
+    """Rows: seconds of one inference (the least of some), and its difference from the first method.
 
-    A uniform state of S measured with ERRORS, everything measured; ratio: over the contact program;
-    chi_square: of the forces reached, off: largest difference of a force, in ⟨f_n⟩.
+    A uniform state of S is measured completely with ERRORS. ratio: time over that of the contact
+    program; chi_square: of the forces reached; off: largest difference of a force, in ⟨f_n⟩.
     """
     n = n or (100 if quick else 400)
     rows = []
@@ -60,7 +60,7 @@ def inference(
 def _timed(
     solve: Callable[..., Floats | None], S: Ensemble, m: Floats, sigma: Floats, repeats: int
 ) -> tuple[float, Floats | None]:
-    """The least seconds of some runs, after one that compiles, and the forces; None in time."""
+    """The least seconds of some runs, after one that compiles, and the forces; None on time-out."""
     taken: list[float] = []
     forces: Floats | None = None
     for _ in range(repeats + 1):
@@ -73,12 +73,12 @@ def _timed(
 
 
 def contact_program(S: Ensemble, m: Floats, sigma: Floats) -> Floats:
-    """As `granforce.infer` finds it."""
+    """The forces by `granforce.infer`."""
     return fitted(S, *checked(S, m, sigma))
 
 
 def _program(S: Ensemble, m: Floats, sigma: Floats) -> tuple[Any, ...]:
-    """½ y·Q y + c·y over A y = b, y ≥ 0: (Q, c, A, b, T), the largest weight 1."""
+    """½ y·Q y + c·y over A y = b, y ≥ 0: (Q, c, A, b, T), scaled to a largest weight of 1."""
     A, b, T = S.scaled_form
     weight = np.tile(sigma.min() / sigma, len(m))[: T.shape[0]] ** 2
     weighted = sparse.diags(weight) @ T
@@ -87,7 +87,7 @@ def _program(S: Ensemble, m: Floats, sigma: Floats) -> tuple[Any, ...]:
 
 
 def piqp(S: Ensemble, m: Floats, sigma: Floats) -> Floats:
-    """By PIQP's sparse interior-point method."""
+    """The forces by PIQP's sparse interior-point method."""
     Q, c, A, b, T = _program(S, m, sigma)
     solver = programs.quadratic_solver(400)
     solver.setup(Q, c, A, b, x_l=np.zeros(len(c)))
@@ -96,7 +96,7 @@ def piqp(S: Ensemble, m: Floats, sigma: Floats) -> Floats:
 
 
 def highs(S: Ensemble, m: Floats, sigma: Floats) -> Floats | None:
-    """By the active-set method of HiGHS; None where it does not end in time."""
+    """The forces by the active-set method of HiGHS; None on time-out."""
     Q, c, A, b, T = _program(S, m, sigma)
     model = programs.standard_form(A, b)
     programs.set_cost(model, c)

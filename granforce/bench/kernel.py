@@ -1,4 +1,4 @@
-"""The solver on S beside the machine's own limits, beside PIQP, and against the number of disks."""
+"""The solver on S compared with the machine's limits and PIQP, and against the number of disks."""
 
 import os
 import resource
@@ -24,9 +24,9 @@ from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_force, critical_forces
 from granforce.system.clock import timed
 
-# Operations of one product of two 3×3 blocks that is taken from a third.
+# Operations to subtract one product of two 3×3 blocks from a third.
 _PRODUCT = 54
-# Dense matrices multiplied on one core: the most that double precision gets here.
+# Dense matrix product on one core: the peak in double precision on this machine.
 _DENSE = """
 import time
 import numpy as np
@@ -43,7 +43,7 @@ print(2 * 1200**3 / best / 1e9)
 def kernel(
     quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
 ) -> list[dict[str, Any]]:
-    """Rows: Gflop/s of one factorisation alone and in lanes, and its part of a dense product's."""
+    """Rows: Gflop/s of one factorisation, single and in lanes, as a fraction of a dense product."""
     dense = _dense_product()
     base = ensemble(pack(n, mu, 1))
     rows = []
@@ -79,7 +79,7 @@ def _factorisation(problem: Problem, lanes: Any) -> float:
     work = contact_program.make_workspace(problem, len(lanes))
     best = np.inf
     for _ in range(30):
-        # Any positive definite matrix: its numbers do not change the work.
+        # Any positive definite matrix: the operations do not depend on its numbers.
         work.factors.lower[:] = 0.0
         work.factors.lower[cholesky.diagonals(problem.network).ravel()] = 1.0
         arguments = problem.network, work.least, work.factors, work.stop, lanes
@@ -94,9 +94,9 @@ def starts(
     frictions: Sequence[float] = FRICTIONS,
     repeats: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Rows: milliseconds per nearest network by PIQP, one at a time, and 16 chains in lanes.
+    """Rows: milliseconds per nearest network by PIQP, one at a time, and by 16 chains in lanes.
 
-    The same starts for all, interleaved, so that a machine that slows down slows down all of them.
+    All use the same starts, interleaved, so that a slow phase of the machine affects all of them.
     """
     n, repeats = n or (100 if quick else 400), repeats or (2 if quick else 5)
     rows = []
@@ -133,9 +133,9 @@ def pushes(
     frictions: Sequence[float] = (0.1, 1),
     contacts: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Rows: processor seconds of critical forces, one contact after the other and side by side.
+    """Rows: processor seconds of critical forces, one contact at a time and in lanes.
 
-    The same loads on the same contacts, whose limit loads are known; F_crit may not differ.
+    The same loads on the same contacts, with known limit loads; F_crit must agree.
     """
     n, count = n or (60 if quick else 400), contacts or (10 if quick else 30)
     rows = []

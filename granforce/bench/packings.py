@@ -23,12 +23,12 @@ def compaction(
     accuracies: Sequence[float] | None = None,
     seeds: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Rows: run time and mean overlap of the dynamics, and φ, z, h of the packing it gave.
+    """Rows: run time and mean overlap of the dynamics, and φ, z, h of the resulting packing.
 
     One row per longest time step Δt and accuracy of a step; means over seeds. Mean overlap against
-    run time is the figure of merit of arXiv:0803.3566 (its Fig. 7). Every packing is then
-    finished exactly, so that of this error only the place where it jams is left; runs that did
-    not jam are left out of the means and counted in `failed`.
+    run time is the figure of merit of arXiv:0803.3566 (its Fig. 7). Every packing is then finished
+    exactly, so that this error affects only where it jams; runs that did not jam are left out of
+    the means and counted in `failed`.
     """
     n = n or (100 if quick else 400)
     steps = steps or ((0.05, 0.1) if quick else (0.02, 0.05, 0.1, 0.2))
@@ -61,10 +61,10 @@ def compaction_growth(
     sizes: Sequence[int] | None = None,
     seeds: int | None = None,
 ) -> list[dict[str, Any]]:
-    """Rows: time to a certified packing at growing N, and the exponent of time with N."""
+    """Rows: time to a certified packing for growing N, and the exponent of time with N."""
     sizes = sizes or ((50, 100, 200) if quick else (100, 400, 1600, 6400))
     seeds = seeds or (2 if quick else 3)
-    # Large packings vary less, and take long.
+    # Large packings vary less, and take longer.
     rows = [_row(n, mu, seeds if n <= 400 else 1) for n in sizes]
     jammed = [(row["n"], row["seconds"]) for row in rows if "seconds" in row]
     return [*rows, {"n": "fit", "mu": mu, "exponent": exponent(jammed)}]

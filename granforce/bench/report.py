@@ -1,4 +1,4 @@
-"""How the benchmark tells its results: progress on stderr, aligned tables on stdout."""
+"""Output of the benchmark: progress on stderr, aligned tables on stdout."""
 
 import os
 import platform
@@ -21,7 +21,7 @@ def note(message: str) -> None:
 
 
 def environment() -> dict[str, Any]:
-    """What the times were measured on: processor, cores, Python and library versions."""
+    """The environment of the measurement: processor, cores, Python and library versions."""
     return {
         "cpu": _cpu(),
         "cores": os.cpu_count(),
@@ -56,7 +56,7 @@ def exponent(points: Sequence[tuple[float, float]]) -> float | None:
 
 
 def table(title: str, rows: Rows) -> str:
-    """Rows (dicts) as an aligned text table; columns are those that hold anything."""
+    """Rows (dicts) as an aligned text table, without empty columns."""
     names = [name for name in dict.fromkeys(k for row in rows for k in row)]
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
     cells = [names, *([_cell(row.get(name)) for name in names] for row in rows)]

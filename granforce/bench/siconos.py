@@ -1,4 +1,4 @@
-"""Our Gauss–Seidel sweep against Siconos's, sweep by sweep on one problem."""
+"""granforce's Gauss–Seidel sweep against that of Siconos, sweep by sweep on one problem."""
 
 import functools
 import os
@@ -19,7 +19,7 @@ from granforce.motion.gauss_seidel import from_rest
 from granforce.numerics.lanes import ONE
 from granforce.types import Floats
 
-# Environment variable naming a Python that can import Siconos, which has no package on PyPI.
+# Environment variable naming a Python that can import Siconos, which is not on PyPI.
 INTERPRETER = "GRANFORCE_SICONOS_PYTHON"
 PROGRAM = Path(__file__).with_name("siconos_nsgs.py")
 ABSENT = f"absent (Debian: python3-siconos, python3-scipy; or name a Python in ${INTERPRETER})"
@@ -46,10 +46,10 @@ def _imports(python: str) -> bool:
 
 
 def against_siconos(S: Ensemble, start: Floats, tolerance: float) -> dict[str, Any] | None:
-    """Time per contact update of both on a box of fixed size, and how far their forces differ.
+    """Time per contact update of both on a box of fixed size, and the difference of their forces.
 
-    Siconos sweeps from the given forces until its error is below the tolerance; ours then does as
-    many sweeps. Medians over REPEATS. None where Siconos is absent.
+    Siconos sweeps from the given forces until its error is below the tolerance; granforce then does
+    as many sweeps. Medians over REPEATS. None without Siconos.
     """
     python = interpreter()
     if python is None:
@@ -74,7 +74,7 @@ def against_siconos(S: Ensemble, start: Floats, tolerance: float) -> dict[str, A
 def _siconos(python: str, S: Ensemble, start: Floats, tolerance: float) -> dict[str, Any]:
     r = S.packing.r[S.grains]
     mass = np.pi * r**2
-    # Rows of A are forces and torque/r of a grain: what they change velocities by in unit time.
+    # Rows of A are forces and torque/r of a grain: the change of velocity per unit time.
     inverse = np.column_stack([1 / mass, 1 / mass, 2 / mass]).ravel()
     H = S.A[: len(inverse)]
     W = sparse.csc_matrix(H.T @ sparse.diags(inverse) @ H)

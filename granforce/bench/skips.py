@@ -1,4 +1,4 @@
-"""What leaving out the unnecessary is worth: each skip switched off, on the same packing."""
+"""The gain from each shortcut: switched on and off on the same packing."""
 
 import tempfile
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from granforce.system.clock import timed
 
 
 def skips(quick: bool = True, *, n: int | None = None, mu: float = 0.1) -> list[dict[str, Any]]:
-    """Rows: what is skipped, how often, seconds with the skip and without, and their ratio."""
+    """Rows: what is skipped, how often, seconds with and without the shortcut, and their ratio."""
     n = n or (100 if quick else 400)
     note(f"skips: N = {n}, μ = {mu:g}")
     packing = pack(n, mu, 1)
@@ -45,13 +45,13 @@ def _row(what: str, count: int, seconds: float, without: float) -> dict[str, Any
 
 
 def _seconds(action: Callable[[], object], repeats: int = 5) -> float:
-    """Median run time of an action, done once before."""
+    """Median run time of an action, after a first call."""
     action()
     return float(np.median([timed(action)[0] for _ in range(repeats)]))
 
 
 def _rattlers(packing: Packing, S: Ensemble) -> dict[str, Any]:
-    """A relaxation of all contacts of all grains, as in an import that has not been looked at."""
+    """A relaxation of all contacts of all grains, as in an unpruned import."""
     whole = ensemble(packing, prune=False)
     start = kicked(whole, 1, 0)[0]
     few = _seconds(lambda: nearest(S, start[S.index]))
@@ -71,7 +71,7 @@ def _tangential(packing: Packing) -> dict[str, Any]:
 
 
 def _finish(S: Ensemble) -> dict[str, Any]:
-    """Sweeps that the exact finish of Gauss–Seidel saves, to the same tolerance 1e-6."""
+    """Sweeps saved by the exact finish of Gauss–Seidel, at the same tolerance 1e-6."""
     start = kicked(S, 1, 0)[0]
     short = gauss_seidel(S, start, tolerance=1e-6)
     long = gauss_seidel(S, start, tolerance=1e-6, rest=None)
@@ -82,8 +82,8 @@ def _finish(S: Ensemble) -> dict[str, Any]:
 
 
 def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
-    """Compaction with its neighbour list, and with one made anew in every step."""
-    pack(n, mu, 1)  # compiled, in memory
+    """Compaction with its neighbour list, and with a list rebuilt in every step."""
+    pack(n, mu, 1)  # compile and load kernels
     seconds, rebuilds, usual = [], [], pair_list.MOVED
     try:
         for moved in (usual, 0.0):

@@ -1,4 +1,4 @@
-"""Relaxation solvers side by side: same starts, time and what was reached, and how it scales."""
+"""Relaxation solvers compared: time and result from the same starts, and scaling with N."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,15 +19,15 @@ from granforce.system.clock import timed
 from granforce.types import Floats, Rows
 
 BASELINE = "Gauss–Seidel alone"
-# Residual (in ⟨f_n⟩) all solvers are asked for.
+# Residual (in ⟨f_n⟩) requested from all solvers.
 GOAL = 1e-9
-# Sweeps after which Gauss–Seidel alone is cut short: 3 to 5 s at N = 400.
+# Sweeps after which Gauss–Seidel alone is stopped: 3 to 5 s at N = 400.
 LONGEST = 300_000
 FRICTIONS = (0.01, 0.1, 0.3, 1.0, 10.0)
 
 
 def solvers(sweeps: int = LONGEST) -> dict[str, tuple[Callable[..., Relaxation], dict[str, Any]]]:
-    """Name → (solver, options) of all that are compared."""
+    """Name → (solver, options) of all solvers to compare."""
     return {
         BASELINE: (gauss_seidel, {"rest": None, "tolerance": GOAL, "max_iterations": sweeps}),
         "Gauss–Seidel, exact finish": (gauss_seidel, {"tolerance": GOAL, "max_iterations": sweeps}),
@@ -46,8 +46,8 @@ def relaxation(
 ) -> list[dict[str, Any]]:
     """Rows (dicts) per μ and solver: median time of one relaxation, residual, ratio to BASELINE.
 
-    All solvers get the same starts, the packing's own network kicked as in the random walk. Where
-    the baseline did not reach GOAL within its sweeps the ratio is a lower bound, and says so.
+    All solvers get the same starts, the packing's own network kicked as in the random walk. If the
+    baseline did not reach GOAL within its sweeps the ratio is a lower bound, which is marked.
     """
     n = n or (100 if quick else 400)
     repeats = repeats or (3 if quick else 9)
@@ -83,13 +83,13 @@ def runs_of(
     solver: Callable[..., Relaxation],
     options: dict[str, Any],
 ) -> list[Relaxation]:
-    """What a solver reached from each start (N_c, 2), without what only its first call takes."""
-    solver(S, starts[0], **{**options, "max_iterations": 2})  # compiles, makes plans
+    """The result of a solver from each start (N_c, 2), without the overhead of its first call."""
+    solver(S, starts[0], **{**options, "max_iterations": 2})  # compile and prepare
     return [solver(S, start, **options) for start in starts]
 
 
 def summary(run: list[Relaxation]) -> dict[str, Any]:
-    """Times, and how many of them reached the GOAL, in a row."""
+    """Times, and how many runs reached the GOAL, as a row."""
     reached = [r.residual <= GOAL for r in run]
     return {
         "seconds": float(np.median([r.seconds for r in run])),
@@ -125,7 +125,7 @@ def _ratio(baseline: list[Relaxation], run: list[Relaxation]) -> dict[str, Any]:
 def contact_updates(
     quick: bool = True, *, n: int | None = None, mu: float = 0.1, sweeps: int = 2000
 ) -> list[dict[str, Any]]:
-    """Rows: nanoseconds per contact update of our sweep, alone and against Siconos.
+    """Rows: nanoseconds per contact update of granforce's sweep, alone and against Siconos.
 
     Both start from the same forces in a box of fixed size and do the same number of sweeps.
     """
@@ -138,7 +138,7 @@ def contact_updates(
     told = f"{runs[0].iterations} sweeps, box free to dilate"
     alone = {**row, "solver": "granforce sweep", "ns_per_update": each, "note": told}
     beside = SideBySide(S, LANES, **options)
-    for _ in range(2):  # kernels are compiled in the first
+    for _ in range(2):  # the first call compiles
         for lane, start in enumerate(kicked(S, LANES, 0)):
             beside.begin(lane, start)
         seconds = timed(beside.ended)[0]
@@ -165,7 +165,7 @@ def tile(S: Ensemble, k: int) -> Packing:
     """
     packing, contacts = S.packing, S.contacts
     i, j, count = contacts.i, contacts.j, len(packing.r)
-    # How many cells away from i the image of j lies that is touched.
+    # Number of cells between i and the touching image of j.
     reach = packing.x[i] + contacts.length[:, None] * contacts.normal - packing.x[j]
     image = np.rint(packing.cell.parts(reach)).astype(np.int64)
     column, row = (part.ravel() for part in np.meshgrid(np.arange(k), np.arange(k)))
@@ -232,7 +232,7 @@ def scaling(
 
 
 def exponents(rows: Rows, mu: float) -> list[dict[str, Any]]:
-    """A row for each solver: b of seconds ~ N^b over the sizes at which it reached the GOAL."""
+    """A row for each solver: b of seconds ~ N^b over the sizes at which it reached GOAL."""
     fits = []
     for name in solvers():
         points = [

@@ -1,4 +1,4 @@
-"""What the choice of solver does to the random walk, and walks against exact intervals."""
+"""The effect of the solver on the random walk, and walks against exact intervals."""
 
 import contextlib
 import multiprocessing
@@ -38,10 +38,10 @@ WALKS: Ways = {
     "nearest": {"relax": nearest},
 }
 FRICTIONS = (0.01, 0.1, 1.0)
-# Attempts per state after which a walk has failed: Gauss–Seidel alone, few of whose relaxations
-# end in equilibrium at large μ, would take hours.
+# Attempts per state after which a walk has failed: Gauss–Seidel alone, which seldom ends in
+# equilibrium at large μ, would take hours.
 ATTEMPTS = 4
-# Packings of the exact intervals for `granforce.bench.exact`, where the sources are at hand.
+# Packings with exact intervals for `granforce.bench.exact`, in a clone of the repository.
 REFERENCES = Path("tests/reference")
 
 
@@ -56,11 +56,11 @@ def walks(
 ) -> list[dict[str, Any]]:
     """Rows: η1, η2, η3 and distance from the centre, mean ± standard error over packings.
 
-    Every solver walks on the same packings with the same seeds. The distance is
-    ⟨|F − C|⟩/|C|, C the mean over the solvers of their mean networks; `original` is that of the
-    packing's own network. A walk that needed more than ATTEMPTS per state is left out and counted
-    in `failed`: such a row is a mean over fewer packings, and not to be compared with the others.
-    ways: {name of a solver: options of `walk`}.
+    Every solver walks on the same packings with the same seeds. The distance is ⟨|F − C|⟩/|C|, C
+    the mean over the solvers of their mean networks; `original` is that of the packing's own
+    network. A walk that needed more than ATTEMPTS per state is left out and counted in `failed`:
+    such a row is a mean over fewer packings and cannot be compared with the others. ways: {name of
+    a solver: options of `walk`}.
     """
     n = n or (100 if quick else 400)
     packings = packings or (3 if quick else 10)
@@ -123,11 +123,11 @@ def batches(
     states: int | None = None,
     frictions: Sequence[float] = FRICTIONS,
 ) -> list[dict[str, Any]]:
-    """Rows: states per second of two chains on one thread and on two, by default relaxation.
+    """Rows: states per second of two chains on one thread and on two, with the default relaxation.
 
-    Chains share what depends on the geometry alone (matrices, the plan of the factorisation);
-    `setup` is the time it takes once. Medians of three runs, in turn. `ceiling` is the ratio that
-    two processes reach which share nothing but the machine.
+    Chains share everything that depends only on the geometry (matrices, the plan of the
+    factorisation); `setup` is the time it takes once. Medians of three interleaved runs. `ceiling`
+    is the ratio reached by two processes that share only the machine.
     """
     n = n or (100 if quick else 400)
     states = states or (100 if quick else 400)
@@ -168,9 +168,9 @@ def intervals(
     frictions: Sequence[float] | None = None,
     states: Sequence[int] | None = None,
 ) -> list[dict[str, Any]]:
-    """Rows: η3 and mean ΔF_n seen by walks of growing length against the exact intervals.
+    """Rows: η3 and mean ΔF_n seen by walks of growing length, against the exact intervals.
 
-    Exact bounds come with their own run time, so that the cost of either can be compared.
+    Exact bounds come with their run time, so that the costs can be compared.
     """
     n = n or (100 if quick else 400)
     frictions = frictions or ((0.1,) if quick else (0.1, 1.0))
@@ -226,8 +226,8 @@ def interval_methods(quick: bool = True, *, folder: Path = REFERENCES) -> list[d
     """Exact intervals against other tools, by `granforce.bench.exact` (needs its packings).
 
     Rows with time, ratio to a plain loop over programs, and error against the reference bounds in
-    ⟨f_n⟩, of our own with the largest duality gap and counts. One row that says so where the
-    reference files are not at hand.
+    ⟨f_n⟩; those of granforce also with the largest duality gap and counts. A single row with a note
+    if the reference files are missing.
     """
     if not any(Path(folder).glob("*.npz")):
         return [{"packing": None, "note": f"reference packings not found in {folder}"}]

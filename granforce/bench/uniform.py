@@ -1,6 +1,6 @@
-"""Uniform sampling of S: processor time per effective state, against hopsy where it is installed.
+"""Uniform sampling of S: processor time per effective state, against hopsy if installed.
 
-hopsy (pip install hopsy) is optional: it brings GLPK, and is used for nothing else.
+hopsy (pip install hopsy) is optional: it depends on GLPK, and is used only here.
 """
 
 import resource
@@ -26,16 +26,16 @@ from granforce.packing.compaction import pack
 from granforce.system.clock import timed
 from granforce.types import Floats
 
-# Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
-# for. Beyond it hopsy gets our rounding only.
+# Largest dimension for hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79. Beyond it
+# hopsy gets only granforce's rounding.
 MOST_ROUNDED = 60
 STATES = 1000
 HOPSY_STATES = 600
-# Walls up to which a dense null space is waited for: 1600 disks at μ = 0.1.
+# Most walls for a dense null space: 1600 disks at μ = 0.1.
 MOST_DENSE_WALLS = 6000
-# States of each chain by which a way to keep rows is timed, after as many that fill them.
+# States per chain to time a way of storing rows, after as many that fill the store.
 _TIMED = 2
-# Where rows of K lie, as parts of `billiard.MEMORY`.
+# Where rows of K are stored, as fractions of `billiard.MEMORY`.
 ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e3}
 
 
@@ -49,12 +49,12 @@ def uniform(
 ) -> list[dict[str, Any]]:
     """Rows: seconds of processor time per effective state (bulk, minimum over components).
 
-    Four chains in one thread, warm-up included; set-up (centre, factor, rows of K) apart.
-    ratio: that cost over the billiard's. z_mean and z_square: root mean square, over components, of
-    the differences of means and of second moments from the billiard's in standard errors: near 1
-    where both sample the same measure. null_space_ratio: a dense null space of the balance (QR with
-    pivoting), which sampling did without, over the whole set-up. two_cores: wall time
-    of one thread over that of two.
+    Four chains in one thread, including warm-up, without set-up (centre, factor, rows of K). ratio:
+    that cost over the billiard's. z_mean and z_square: root mean square, over components, of the
+    differences of means and of second moments from the billiard's in standard errors: near 1 if
+    both sample the same measure. null_space_ratio: time of a dense null space of the balance (QR
+    with pivoting), which the billiard avoids, over the whole set-up. two_cores: wall time of one
+    thread over that of two.
     """
     n = n or (100 if quick else 400)
     frictions = frictions or ((0.1, 1.0) if quick else (0.5, 0.3, 0.1, 0.01))
@@ -62,7 +62,7 @@ def uniform(
     rows = []
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
-        walls(S)  # the first time it is compiled
+        walls(S)  # compile
         setup, (made, kept) = timed(_set_up, S, clock=time.process_time)
         runs = [_ours(S, made, kept, method, seed) for method in METHODS]
         runs += _hopsy(S, made, kept, rounded)
@@ -75,10 +75,10 @@ def uniform(
 
 class _Run(NamedTuple):
     method: str
-    states: Floats | None  # (chains, k, N_c, 2), None where it could not be run
+    states: Floats | None  # (chains, k, N_c, 2), None if it could not run
     mixing: Mixing | None
     seconds: float  # processor time of the steps
-    setup: float  # processor time of what had to be done before, the walls left out
+    setup: float  # processor time of the preparation, without the walls
     note: str = ""
 
 
@@ -99,7 +99,7 @@ def _row(
 
 def _ours(S: Ensemble, made: Any, kept: Any, method: str, seed: int) -> _Run:
     note(f"uniform: h = {made.dimension}, {method}")
-    for count in (1, STATES // 4):  # the first time it is compiled
+    for count in (1, STATES // 4):  # the first call compiles
         begin = time.process_time()
         own = seed + METHODS.index(method)
         ends, reach, _ = warm_up(made, 4, own, [kept], method=method)
@@ -118,13 +118,13 @@ def uniform_growth(
     effective: int = 100,
     seed: int = 1,
 ) -> list[dict[str, Any]]:
-    """Rows: what an effective state takes against the number of disks, one packing repeated.
+    """Rows: cost of an effective state against the number of disks, with one packing repeated.
 
-    reached: `effective` states (bulk and tail, of every component) were drawn, in `seconds` of
-    processor time in all, set-up, warm-up and diagnosis included; peak_MB: largest memory of the
-    process until then. seconds_per_state: processor time per effective state of going on, by where
-    rows of K lie, which changes no bit of the states. setup_seconds: centre, factor and, where
-    there is room, rows of K; null_space_ratio: a dense null space of the balance over that.
+    reached: whether `effective` states (bulk and tail, of every component) were drawn, in `seconds`
+    of processor time, including set-up, warm-up and diagnosis; peak_MB: largest memory of the
+    process until then. seconds_per_state: processor time per further effective state, by where rows
+    of K are stored, which does not change the states. setup_seconds: centre, factor and, if there
+    is room, rows of K; null_space_ratio: a dense null space of the balance over that.
     """
     n, tiles = n or (100 if quick else 400), tiles or ((1, 2) if quick else (1, 2, 4))
     base = ensemble(pack(n, mu, seed))
@@ -164,7 +164,7 @@ def _set_up(S: Ensemble) -> tuple[Any, Any]:
 
 
 def _all_rows(made: Any, part: float) -> Any:
-    """All rows of K where they fit into a part of the memory, none of them yet where not."""
+    """All rows of K if they fit into a fraction of the memory, otherwise none."""
     rows = room_for_rows(made.count, part)
     if rows.whole:
         for first in range(0, len(made.moving), LANES):
@@ -177,7 +177,7 @@ def _peak() -> float:
 
 
 def _going_on(sample: Any, part: float) -> Any:
-    """Seconds of processor time per state, rows of K in a part of the memory meant for them."""
+    """Seconds of processor time per state, with a fraction of the memory meant for rows of K."""
     made, ends, rows = sample.walls, sample.ends, _all_rows(sample.walls, part)
     for _ in range(2):
         begin = time.process_time()
@@ -187,7 +187,7 @@ def _going_on(sample: Any, part: float) -> Any:
 
 
 def _null_space(S: Ensemble, made: Any) -> float:
-    """Seconds of processor time of the QR that gives the same K by a dense null space."""
+    """Seconds of processor time for a dense null space by QR, which gives the same K."""
     weighted = S.scaled_form[0].tocsc()[:, made.moving].toarray() * made.centre[made.moving]
     return timed(linalg.qr, weighted.T, pivoting=True, clock=time.process_time)[0]
 
@@ -205,9 +205,10 @@ def _two_cores(made: Any, kept: Any, seed: int) -> float:
 
 
 def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
-    """Coordinate hit-and-run by hopsy, its best walk, on our rounding and, up to `rounded`, its.
+    """Coordinate hit-and-run by hopsy, its best walk, on two roundings.
 
-    It wants coordinates: those of an orthonormal basis of what K projects on.
+    One is granforce's; the other, up to dimension `rounded`, is hopsy's own. hopsy needs
+    coordinates: those of an orthonormal basis of the range of K.
     """
     try:
         import hopsy

@@ -23,7 +23,7 @@ Number = TypeVar("Number", int, float)
 
 
 def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
-    """Import and infer the frames that were asked for; print a line of each. 1 if one failed."""
+    """Import and infer the requested frames; print a row for each. Returns 1 if one failed."""
     if arguments.mu is None:
         raise InputError("give the friction coefficient: --mu 0.5")
     if not arguments.files:
@@ -62,7 +62,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
 
 
 def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
-    """Compute what was asked for of snapshots; print a line of each. 1 if one failed."""
+    """Analyse the requested snapshots; print a row for each. Returns 1 if one failed."""
     states = whole(arguments.states, "--states", 0)
     worker_count(arguments.workers, "--workers")
     numbers = _chosen(snapshots.numbers, arguments.frames)
@@ -102,7 +102,7 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
 
 
 def _chosen(there: Sequence[Number], text: str) -> list[Number]:
-    """The numbers of the frames that were asked for."""
+    """The numbers of the requested frames."""
     if text == "all":
         return list(there)
     try:
@@ -115,7 +115,7 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
 
 
 def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:
-    """A line for each frame; ⟨f_n⟩ is its mean measured normal force."""
+    """A row for each frame; ⟨f_n⟩ is its mean measured normal force."""
     rows = []
     for k, number in enumerate(dataset["frame"].values.tolist()):
         one = dataset.isel(frame=k)

@@ -1,4 +1,4 @@
-"""Options that several commands have in common."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import TypeAlias
 from granforce.cli.parsing import Input, Output, Parser, StorePath
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
-# Commands whose names are taken in Python, or by a room: their functions end in an underscore.
+# Commands whose names are reserved in Python or used by a package: their functions end in "_".
 _TAKEN = ("import", "study")
-# What subcommands are added to.
+# The object to which subcommands are added.
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 def subcommand(
     commands: Commands, name: str, summary: str, example: str, *, reports: bool = True
 ) -> Parser:
-    """A command, which the function of its name in `granforce.cli.commands` runs."""
+    """Add a command, which runs the function of its name in `granforce.cli.commands`."""
     command = commands.add_parser(
         name,
         help=summary,
@@ -43,9 +43,9 @@ def import_format(
     *,
     contacts_needed: bool = True,
 ) -> Parser:
-    """A format of `granforce import`, with what all formats take; options are added to it.
+    """Add a format of `granforce import`, with the options common to all formats.
 
-    Options are named as the arguments of the format's reader in `granforce.packing.importers`.
+    Options are named after the arguments of the format's reader in `granforce.packing.importers`.
     """
     command = subcommand(
         formats, name, summary, f"granforce import {name} {example} --mu 0.3 --out packing.npz"
@@ -76,7 +76,7 @@ def add_frame(command: Parser, number: str) -> None:
 
 
 def add_series(command: Parser) -> None:
-    """What makes one dataset of many snapshots, once `add_frame` is there."""
+    """Add the options for one dataset of many snapshots; call `add_frame` first."""
     others = command.options.keys()
     group = command.add_argument_group(
         "many snapshots",
@@ -93,7 +93,7 @@ def add_series(command: Parser) -> None:
     add_scheduler(group)
     add_store(group)
     for action in command._actions:
-        if action.dest == "out":  # a folder for all of them
+        if action.dest == "out":  # a folder for all snapshots
             action.metavar = "FILE.{npz,zarr}"
     series = command.options.keys() - others - {"frames"}
     command.leaves_out("without --frames", lambda asked: asked.frames is None, series)
@@ -134,7 +134,7 @@ def add_store(command: argparse._ActionsContainer) -> None:
 
 
 def spec_or_file(word: str) -> str:
-    """Radii as they are typed: a distribution with its numbers, or a file."""
+    """Radii as typed: a distribution with its numbers, or a file."""
     return word if ":" in word else Input(word)
 
 
@@ -217,7 +217,7 @@ def add_known(group: argparse._ArgumentGroup) -> None:
     )
 
 
-# Relaxations as they are typed, which is as functions are called, and in the keys of results.
+# Relaxations as typed, with the names of functions and in keys of results.
 RELAXATIONS = {
     "nearest": "accelerated",
     "nearest_piqp": "nearest",
@@ -265,7 +265,7 @@ def add_unit(command: argparse._ActionsContainer) -> None:
 
 
 def walls(word: str) -> str | list[list[float]]:
-    """Walls as they are typed: a name, or segments X,Y,X,Y separated by blanks."""
+    """Walls as typed: a name, or segments X,Y,X,Y separated by blanks."""
     if "," not in word:
         return word
     try:
@@ -344,7 +344,7 @@ def add_reading(group: argparse._ActionsContainer) -> None:
 
 
 def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> None:
-    """The options of how a frame is mended and of its walls, in a group of a command."""
+    """Add the options on the repair and the walls of a frame to a group of a command."""
     group.add_argument(
         "--flag",
         choices=["ignore"],

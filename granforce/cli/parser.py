@@ -1,4 +1,4 @@
-"""The command line: `granforce COMMAND --help` tells each command with an example."""
+"""The command line; `granforce COMMAND --help` explains each command with an example."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from granforce.cli.parsing import Input, Output, Parser, StorePath, Workplace, r
 from granforce.cli.words import make_parser
 from granforce.system import interrupts, streams
 
-# Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
+# Standard library only: --help must not wait for numba, xarray and HiGHS.
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; its exit code.
+    """Run one command and return its exit code.
 
-    0; 1 where some cells failed, or a result could not be printed or kept; 2 for bad input; 130
+    0; 1 if some cells failed, or a result could not be printed or stored; 2 for invalid input; 130
     after Ctrl-C.
     """
     with streams.guarded():
@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return _main(argv)
             finally:
                 sys.stdout.flush()
-        except (streams.ReaderGone, BrokenPipeError):  # the latter of a file that is a pipe
+        except (streams.ReaderGone, BrokenPipeError):  # BrokenPipeError: a file that is a pipe
             return 0
         except streams.OutputError as error:
             print(f"granforce: cannot write to standard output: {error}", file=sys.stderr)
@@ -47,7 +47,7 @@ def _main(argv: Sequence[str] | None) -> int:
         except streams.OutputError:
             raise
         except Exception:
-            if interrupts.interrupted():  # what a library made of it
+            if interrupts.interrupted():  # raised by a library because of Ctrl-C
                 return _told_interrupted()
             raise
         finally:
@@ -55,12 +55,12 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 def command() -> NoReturn:
-    """The process `granforce`: main, and at its end nobody waits for what was left behind."""
+    """The process `granforce`: runs main and exits without waiting for remaining threads."""
     streams.prepare()
     code = main()
     cancelling = sys.modules.get("granforce.system.cancelling")
     if cancelling is not None and cancelling.left_behind():
-        os._exit(code)  # main has flushed what was printed
+        os._exit(code)  # main has flushed all output
     sys.exit(code)
 
 
@@ -78,7 +78,7 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         from granforce.cli import commands
         from granforce.system.compiled import tell_when_compiling
 
-        interrupts.check()  # an import may have swallowed it
+        interrupts.check()  # an import may have swallowed Ctrl-C
         tell_when_compiling(_say_compiling)
         _check_paths(arguments, command)
         code: int = getattr(commands, arguments.run)(arguments) or 0
@@ -93,7 +93,7 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
 
 
 def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
-    """InputError where a file that is read would be replaced, or two results have one name."""
+    """InputError if an input file would be overwritten, or two results have one name."""
     from granforce.records import InputError
     from granforce.study.store import default_path
     from granforce.system.files import check_apart
@@ -117,5 +117,5 @@ def _told_interrupted() -> int:
 
 
 def _say_compiling() -> None:
-    # As a line of progress, which later ones may follow on the same row.
+    # Like a progress line, which later ones may overwrite.
     print("\rgranforce: compiling, once per machine …", file=sys.stderr)

@@ -1,6 +1,6 @@
-"""How a command line is read: every option is used or refused, every path has a role.
+"""Parsing of command lines: every option is used or rejected, every path has a role.
 
-Only the standard library, as for all that `--help` needs.
+Standard library only, like everything that `--help` needs.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Input(str):
 
 
 class Output(str):
-    """A file or folder that a command writes, in place of one that is there."""
+    """A file or folder that a command writes, replacing an existing one."""
 
 
 class Workplace(str):
-    """A folder in which a command writes files of its own, beside others."""
+    """A folder to which a command adds files."""
 
 
 class StorePath(str):
@@ -44,7 +44,7 @@ ROLES = (Input, Output, Workplace, StorePath, Edited)
 
 
 def _no_file(path: str) -> bool:
-    """Whether a path is a device, a pipe or an open file, which have no suffix."""
+    """Whether a path is a device, a pipe or an open file, none of which has a suffix."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
@@ -53,24 +53,24 @@ def _no_file(path: str) -> bool:
 
 
 class Unused(NamedTuple):
-    """Options that one way of calling a command makes no use of."""
+    """Options that have no effect in one form of a command."""
 
-    said: str  # that way in words: "with --packing"
-    holds: Callable[[argparse.Namespace], bool]  # whether a command line takes it
-    names: frozenset[str]  # of the options, as attributes
+    said: str  # that form in words: "with --packing"
+    holds: Callable[[argparse.Namespace], bool]  # whether a command line has that form
+    names: frozenset[str]  # options, as attributes
 
 
 def refused(reason: str) -> int:
-    """Print why a command does nothing, as one line on stderr; returns the exit code 2."""
+    """Print why a command is rejected, as one line on stderr; returns the exit code 2."""
     line = " ".join(str(reason).split())
-    if len(line) > LONGEST:  # a name of thousands of characters, say
+    if len(line) > LONGEST:  # for example a name of thousands of characters
         line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
     print(f"granforce: {line}", file=sys.stderr)
     return 2
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says in one line what is wrong, and refuses options that have no effect."""
+    """A parser that reports errors in one line and rejects options without effect."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -81,7 +81,7 @@ class Parser(argparse.ArgumentParser):
 
     @property
     def options(self) -> dict[str, str]:
-        """{attribute: as it is typed} of all options and positional arguments but --help."""
+        """{attribute: as typed} of all options and positional arguments except --help."""
         return {
             action.dest: action.option_strings[-1] if action.option_strings else action.dest
             for action in self._actions
@@ -91,7 +91,7 @@ class Parser(argparse.ArgumentParser):
     def leaves_out(
         self, said: str, holds: Callable[[argparse.Namespace], bool], names: Iterable[str]
     ) -> None:
-        """Refuse these options (attributes) in command lines for which holds(arguments) is true."""
+        """Reject these options (attributes) in command lines for which holds(arguments) is true."""
         names = frozenset(names)
         if strange := names - self.options.keys():
             raise KeyError(f"{self.prog} has no option {min(strange)!r}")
@@ -101,7 +101,7 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
         found, unknown = super().parse_known_args(args, namespace)
-        if unknown:  # said here: argparse would pass those of a subcommand to its parent
+        if unknown:  # reported here: argparse would pass those of a subcommand to its parent
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         ways = [way for way in self.unused if way.holds(found)]
         if ways:
@@ -115,7 +115,7 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
     def _given(self, args: Sequence[str] | None) -> dict[str, str]:
-        """Of the options, those that a command line gives, whatever their values."""
+        """The options given in a command line, whatever their values."""
         defaults = [(action, action.default) for action in self._actions]
         try:
             for action, _ in defaults:
@@ -124,7 +124,7 @@ class Parser(argparse.ArgumentParser):
         finally:
             for action, default in defaults:
                 action.default = default
-        # A positional argument that is left out may get its default all the same.
+        # A missing positional argument may get its default anyway.
         given = {name for name, value in values.items() if value != argparse.SUPPRESS}
         return {name: typed for name, typed in self.options.items() if name in given}
 
@@ -137,7 +137,7 @@ class Parser(argparse.ArgumentParser):
                     yield from parser.every_action()
 
     def chosen(self, arguments: argparse.Namespace) -> Parser:
-        """The parser of the command that was typed."""
+        """The parser of the command in a command line."""
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
                 chosen: Parser = action.choices[getattr(arguments, action.dest)]
@@ -145,9 +145,9 @@ class Parser(argparse.ArgumentParser):
         return self
 
     def strange_suffix(self, arguments: argparse.Namespace) -> str | None:
-        """What is wrong with the suffix of a file to be written, which decides on its format.
+        """The error in the suffix of an output file, which selects its format, or None.
 
-        A metavar names those that there are: FILE.npz, FILE.{csv,npz,zarr}.
+        A metavar lists the valid ones: FILE.npz, FILE.{csv,npz,zarr}.
         """
         for action in self._actions:
             path = getattr(arguments, action.dest, None)
@@ -161,7 +161,7 @@ class Parser(argparse.ArgumentParser):
         return None
 
     def paths(self, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
-        """(as it is typed, path in its role) of every path that a command line names."""
+        """(as typed, path with its role) of every path in a command line."""
         for name, typed in self.options.items():
             value = getattr(arguments, name, None)
             for word in value if isinstance(value, list) else [value]:

@@ -1,4 +1,4 @@
-"""The words of each command: its options, its summary and an example."""
+"""The text of each command: its options, its summary and an example."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def add_infer(commands: Commands) -> None:
     add_conditions(command)
     add_store(command)
     single = command.options.keys() - {"files"}
-    # Those of a single packing, which many frames have in common, and those of many frames.
+    # Those of a single packing, shared by many frames, and those of many frames.
     shared = {"json", "mu", "cache", "workers", "unmeasured", "states", "sample_seed", "unit"}
     series = command.add_argument_group("many photoelastic frames")
     series.add_argument(
@@ -504,7 +504,7 @@ def add_import(commands: Commands) -> None:
         "--measured frame.csv",
         reports=False,
     )
-    # A parser for each format: it takes the options that its reader uses, and refuses all others.
+    # One parser per format: it takes the options that its reader uses, and rejects all others.
     formats = command.add_subparsers(dest="format", metavar="FORMAT", required=True)
     lammps = import_format(
         *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
@@ -628,7 +628,7 @@ def add_cache(commands: Commands) -> None:
     command.leaves_out("with path", lambda asked: asked.action == "path", {"kind"})
 
 
-# In the order of the help.
+# In the order of the help text.
 COMMANDS = (
     add_pack,
     add_walk,

@@ -1,8 +1,8 @@
 """Figures as HoloViews objects: one function each, for the backend "bokeh" or "matplotlib".
 
-Inputs are plain: rows are dicts of numbers, one for each packing or walk (as `study.row` gives
-them), other arrays are named by the function that takes them. Where one μ has several rows, points
-are means and bars their standard errors.
+Rows are dicts of numbers, one for each packing or walk (as returned by `study.row`); other arrays
+are described by the function that takes them. If one μ has several rows, points are means and bars
+their standard errors.
 """
 
 from granforce.figures.bench import benchmark

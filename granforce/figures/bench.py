@@ -10,12 +10,12 @@ from granforce.types import Rows
 
 
 def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout | None:
-    """One frame for each part of the results that has a figure, as from `granforce.bench.run`.
+    """One frame for each part of the results of `granforce.bench.run` that has a figure.
 
     relaxation: time against μ by solver; scaling: against N; compaction: mean overlap against time;
-    intervals: part of the exact mean ΔF_n that walks see against time, per μ; uniform: processor
-    time per effective state against h; uniform_growth: against N. None where the results have none
-    of them.
+    intervals: fraction of the exact mean ΔF_n seen by walks against time, per μ; uniform: processor
+    time per effective state against h; uniform_growth: against N. None if the results have none of
+    these parts.
     """
     style.ready(backend)
     frames: list[hv.Overlay] = []
@@ -94,7 +94,7 @@ def _frame(
     room: float = 1.0,
     **axes: Any,
 ) -> hv.Overlay:
-    """room: factor by which a logarithmic axis reaches above the data, for the legend."""
+    """A frame of series; room: factor by which a logarithmic axis exceeds the data."""
     drawn = []
     y = [point[1] for points in series.values() for point in points]
     if room > 1:

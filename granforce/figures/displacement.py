@@ -8,7 +8,7 @@ from granforce.figures.networks import outline
 from granforce.records import Packing
 from granforce.types import Floats
 
-# The length of the arrow of the fastest grain, in mean diameters.
+# Length of the arrow of the fastest grain, in mean diameters.
 LONGEST_ARROW = 2.0
 
 
@@ -17,8 +17,8 @@ def displacement(
 ) -> hv.Overlay:
     """Displacements of the grains as arrows on the packing.
 
-    field (N, 2): displacements in any unit, NaN for grains without; the longest arrow is
-    LONGEST_ARROW mean diameters long. contact: position of the perturbed contact, marked.
+    field (N, 2): displacements in any unit, NaN for grains without an arrow; the longest arrow is
+    LONGEST_ARROW mean diameters long. contact: position of the perturbed contact, which is marked.
     """
     style.ready(backend)
     field = np.asarray(field, float)

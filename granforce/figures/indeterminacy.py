@@ -1,4 +1,4 @@
-"""Figures 1, 4 and 6: indeterminacy, its distribution and its correlation with the force."""
+"""Figures 1, 4 and 6: indeterminacy, its distribution, and its correlation with the force."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -27,10 +27,10 @@ def indeterminacy(
 ) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
-    rows: dicts with mu, eta1, eta2, eta3, extent (the width of S per free dimension, in ⟨f_n⟩), of
-    which what is there is drawn, and coordination (z); or the store of a scan. beside: {name: rows}
-    of other sources of the same measures, such as exact η3; what a row lacks is not drawn. outside:
-    rows whose states lie outside of S, so that what they span is no value of η: grey crosses.
+    rows: dicts with mu, coordination (z), and any of eta1, eta2, eta3, extent (the width of S per
+    free dimension, in ⟨f_n⟩); or the store of a scan. beside: {name: rows} from other sources of
+    the same measures, such as exact η3; missing values are not drawn. outside: rows whose states
+    are outside S, so that their spread is not η: grey crosses.
     """
     style.ready(backend)
     rows = scan_rows(rows) if isinstance(rows, Store) else rows
@@ -45,7 +45,7 @@ def indeterminacy(
             points = statistics.means(beside[source], name, factor=factor)
             if points:
                 curves.append((points, f"{label}, {source}", style.COLOURS[k], dash, k))
-    # Above the curves is room for the inset.
+    # Leave room for the inset above the curves.
     top = max((y + e for points, *_ in curves for _, y, e in points), default=1.0) or 1.0
     linear = style.graph(
         *(curves, backend),
@@ -62,7 +62,7 @@ def indeterminacy(
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     contacts = style.graph(z, backend, title="Coordination", x="μ", y="z", logx=True)
     both = style.inset(linear, log, (0.25, 0.56, 0.72, 0.42), backend)
-    # In pictures the legend stands beside the last frame.
+    # In pictures the legend is next to the last frame.
     frames = [*both, contacts] if backend == "bokeh" else [contacts, *both]
     return style.page(frames, backend)
 
@@ -78,7 +78,7 @@ def _crosses(rows: Rows, backend: str, *, logarithmic: bool = False) -> list[Any
     return [style.dots(points, "outside S", style.GREY, backend, "x")] if points else []
 
 
-# Up to which μ a distribution is drawn among those of small and of intermediate friction.
+# Largest μ of the distributions drawn as small and as intermediate friction.
 _SMALL, _MIDDLE = 0.02, 0.3
 
 
@@ -93,10 +93,9 @@ def extents(
     """Figure 4: P(ΔF_n) for several μ, linear, and semi-logarithmic by ranges of μ.
 
     groups: {μ: list of arrays (N_c,) of ΔF_n, one for each packing}. ΔF_n is drawn in units of its
-    mean, or in the unit that it has and that is named, such as "⟨f_n⟩"; it is
-    drawn up to the largest value that is given, in so many bins. Bars are standard errors
-    over packings, empty bins interrupt the lines, and tails P(ΔF_n > x) ~ exp(−(λx)^b) are fitted
-    beyond the upper quartile.
+    mean, or of the named unit, such as "⟨f_n⟩", up to `largest` in `bins` bins. Bars are standard
+    errors over packings, empty bins interrupt the lines, and tails P(ΔF_n > x) ~ exp(−(λx)^b) are
+    fitted beyond the upper quartile.
     """
     style.ready(backend)
     edges = np.linspace(0, largest, bins + 1)
@@ -109,7 +108,7 @@ def extents(
         label = f"μ = {mu:g}" + (f", b = {b:.2f}" if np.isfinite(b) else "")
         series[mu] = _density(group, edges), label, style.COLOURS[k % 7], style.MARKERS[k % 5]
     axes = {"x": f"ΔF_n / {unit or '⟨ΔF_n⟩'}", "y": "P(ΔF_n)"}
-    # As the paper's insets.
+    # As in the paper's insets.
     words = "small μ", "intermediate μ", "large μ"
     ranges = [[mu for mu in series if (mu > _SMALL) + (mu > _MIDDLE) == k] for k in range(3)]
     frames = [_densities(series, series, False, backend, title="Extent", **axes)]
@@ -119,13 +118,13 @@ def extents(
             room: dict[str, Any] = {
                 "legend": "top_right",
                 "ylim": (None, 20 * top),
-            }  # above what falls
+            }  # above falling curves
             frames.append(_densities(series, some, True, backend, title=word, **room, **axes))
     return style.page(frames, backend, columns=2)
 
 
 def _density(group: Sequence[Floats], edges: Floats) -> list[tuple[float, float, float]]:
-    """Points (x, P, standard error over packings) of the bins up to the last that holds any."""
+    """Points (x, P, standard error over packings) of the bins up to the last nonempty one."""
     heights = np.array([statistics.density(values, edges) for values in group])
     sizes = np.array([len(values) for values in group])
     mean = sizes @ heights / sizes.sum()
@@ -161,8 +160,8 @@ def correlations(
 
     rows: dicts with mu, correlation, correlation_low and correlation_high (the least and largest
     with any other sampled network in place of the original); means over rows of one μ. beside:
-    {name: rows} with mu and correlation. chance: {μ: what means of as many packings with shuffled
-    forces reach either way}, dotted.
+    {name: rows} with mu and correlation. chance: {μ: the largest |mean| that shuffled forces in as
+    many packings give by chance}, dotted.
     """
     style.ready(backend)
     middle, low, high = (

@@ -1,4 +1,4 @@
-"""Figures 3 and 5: the forces that single contacts can have, and where those contacts are."""
+"""Figures 3 and 5: the possible forces of single contacts, and the positions of those contacts."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,8 +11,8 @@ from granforce.records import Packing
 from granforce.types import Floats, Integers
 
 SHOWN_CONTACTS = 40
-LARGEST = 3.0  # f_n / f_n,orig at which frames are cut
-RATIOS = np.linspace(0, LARGEST, 121)  # edges of the bins that states are counted in
+LARGEST = 3.0  # f_n / f_n,orig at which frames are cut off
+RATIOS = np.linspace(0, LARGEST, 121)  # edges of the bins in which states are counted
 
 
 def possible_forces(
@@ -25,9 +25,9 @@ def possible_forces(
     """Figure 3: values of f_n / f_n,orig of contacts, weak to strong, for several μ.
 
     groups: {μ: (original (N_c,), states (S, N_c), least (N_c,), extent (N_c,))}: normal forces of
-    the original network and of some states, and the interval seen in all of them, in one unit.
-    So many contacts, evenly spaced in the order of their force, are drawn (all where there are no
-    more): the interval as a bar, states as points. Frames are cut at the largest ratio.
+    the original network and of some states, and the interval seen in all of them, in one unit. The
+    given number of contacts (or all, if there are fewer), evenly spaced in order of force, are
+    drawn: the interval as a bar, states as points. Frames are cut off at the largest ratio.
     """
     style.ready(backend)
     frames = []
@@ -46,10 +46,10 @@ def possible_forces(
 def force_densities(
     groups: Mapping[float, Sequence[Floats]], *, backend: str = "bokeh"
 ) -> hv.Layout:
-    """Figure 3 of every contact and any number of states, counted by `ratio_counts`.
+    """Figure 3 for every contact and any number of states, counted by `ratio_counts`.
 
-    groups: {μ: (original (N_c,), counts (N_c, bins), least (N_c,), extent (N_c,))}. Colours tell
-    which fraction of the states has the ratio, bars the interval seen in all of them.
+    groups: {μ: (original (N_c,), counts (N_c, bins), least (N_c,), extent (N_c,))}. Colours show
+    the fraction of states at a ratio, bars the interval seen in all of them.
     """
     style.ready(backend)
     frames = []
@@ -68,10 +68,10 @@ def force_densities(
 
 
 def ratio_counts(original: Floats, states: Floats) -> Integers:
-    """How many states have f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
+    """Number of states with f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
 
-    original (N_c,) and states (S, N_c): f_n. States beyond the last edge are in none; contacts
-    without a force are not counted.
+    original (N_c,) and states (S, N_c): f_n. States beyond the last edge and contacts without force
+    are not counted.
     """
     counts = np.zeros((len(original), len(RATIOS) - 1), dtype=np.int64)
     for c in np.flatnonzero(original > 0):
@@ -80,7 +80,7 @@ def ratio_counts(original: Floats, states: Floats) -> Integers:
 
 
 def _weak_to_strong(original: Floats) -> Integers:
-    """Contacts that carry, in order of their force."""
+    """Contacts that carry force, in order of their force."""
     order = np.argsort(original, kind="stable")
     return order[original[order] > 0]
 
@@ -95,7 +95,7 @@ def _ratios(
     largest: float,
     backend: str,
 ) -> hv.Overlay:
-    """A frame of what is drawn over the intervals of chosen contacts; it says what is cut."""
+    """A frame of elements over the intervals of chosen contacts, with a note on cut-off values."""
     x, scale = np.arange(1, len(chosen) + 1), original[chosen]
     low, high = least[chosen] / scale, (least + extent)[chosen] / scale
     cut = int((high > largest).sum())
@@ -119,11 +119,11 @@ def places(
     backend: str = "bokeh",
     part: float = 0.1,
 ) -> hv.Layout:
-    """Figure 5: where the strongest and the least determined contacts are.
+    """Figure 5: the positions of the strongest and the least determined contacts.
 
     groups: {μ: (packing, contacts, normal, extent)}: a Packing, positions in its contact list, and
-    their f_n and ΔF_n, in any unit. The given part of the contacts is marked, those with largest
-    f_n on the left, with largest ΔF_n on the right.
+    their f_n and ΔF_n, in any unit. A fraction `part` of the contacts is marked: those with the
+    largest f_n on the left, with the largest ΔF_n on the right.
     """
     style.ready(backend)
     frames = []
@@ -152,9 +152,9 @@ def places(
 def overlaid(
     groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]], *, backend: str = "bokeh"
 ) -> hv.Layout:
-    """Figure 5: where forces are strong, f_n > 2⟨f_n⟩, and where undetermined, ΔF_n > ⟨ΔF_n⟩.
+    """Figure 5: the positions of strong forces, f_n > 2⟨f_n⟩, and undetermined ones, ΔF_n > ⟨ΔF_n⟩.
 
-    groups: as for `places`; both are drawn over each other, and the title counts them.
+    groups: as for `places`; both are drawn in one frame, and the title counts them.
     """
     style.ready(backend)
     frames = []
@@ -181,14 +181,14 @@ def overlaid(
 
 
 def outline(packing: Packing, backend: str) -> list[hv.Curve]:
-    """The cell as a list of one line, where the frame's own edges are not it."""
+    """The cell as a list of one curve, or an empty list if the frame's edges show it."""
     if not packing.tilt:
         return []
     return [style.line(packing.cell.corners, "cell", style.GREY, backend, "dashed")]
 
 
 def _axes(packing: Packing, backend: str) -> dict[str, Any]:
-    """Options of a frame that shows the cell, both axes in one scale."""
+    """Options of a frame that shows the cell with equal scales on both axes."""
     low, high = packing.cell.extent
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     words = {"x": "x / r_max", "y": "y / r_max"}

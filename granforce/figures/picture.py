@@ -1,4 +1,4 @@
-"""A packing with one of its force networks, or what many of them have in common."""
+"""A packing with one of its force networks, or the mean or spread of many."""
 
 from typing import Any
 
@@ -12,8 +12,8 @@ from granforce.records import InputError, Packing, brief, float_array, takes
 from granforce.types import Floats
 
 COLOURS = ("mobilisation", "force", "spread")
-WIDEST = 4.0  # f_n / ⟨f_n⟩ from which lines grow no wider
-MOST_DISKS = 4000  # beyond, disks are left out
+WIDEST = 4.0  # f_n / ⟨f_n⟩ beyond which lines have constant width
+MOST_DISKS = 4000  # disks are not drawn in larger packings
 _MAPS = {"mobilisation": "coolwarm", "force": "viridis_r", "spread": "magma_r"}
 _WORDS = {
     "mobilisation": "f_t / (μ f_n)",
@@ -32,16 +32,16 @@ def plot(
     contacts: npt.ArrayLike | None = None,
     backend: str = "bokeh",
 ) -> hv.Overlay:
-    """A packing to scale, with contacts as lines: width f_n, and a colour with its scale.
+    """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
-    states: a network (k, 2) or networks (…, k, 2), also of several chains, of which the mean is
-    drawn, force; by default the packing's own. contacts (k,): their numbers in the packing, needed
-    where they are fewer than its own (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
-    "force", "spread" (standard deviation of f_n over states), or numbers (k,). Walls are drawn at
-    the places that they touch. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with
-    the one, and .pdf, .png, .svg with the other.
+    states: a network (k, 2) or networks (…, k, 2), also of several chains, whose mean is drawn,
+    force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
+    there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
+    "force", "spread" (standard deviation of f_n over states), or numbers (k,). Walls are drawn
+    where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the
+    first, and .pdf, .png, .svg with the second.
 
-    Raises InputError for states that are not of these contacts, and for an unknown colour.
+    Raises InputError for states that do not match these contacts, and for an unknown colour.
     """
     style.ready(backend)
     count = len(packing.contacts.i)
@@ -69,7 +69,7 @@ def plot(
 def _coloured(
     packing: Packing, several: Floats, mean: Floats, colour: str | npt.ArrayLike, unit: float
 ) -> tuple[Floats, str, dict[str, Any]]:
-    """Numbers (k,) to be coloured, their name, and the scale."""
+    """Numbers (k,) for the colour, their name, and the colour scale."""
     if not isinstance(colour, str):
         values = float_array(colour, (len(mean),), "colour")
         return values, "colour", {"cmap": "viridis_r"}
@@ -93,7 +93,7 @@ def _lines(
     look: dict[str, Any],
     backend: str,
 ) -> hv.Segments:
-    """Contacts that press, from centre to centre, or to the wall; every image in the cell."""
+    """Pressing contacts as lines between centres or to a wall, with every image in the cell."""
     c, cell = packing.contacts.picked(numbers), packing.cell
     pressing = np.flatnonzero(force > 0)
     begin = cell.wrapped(packing.x[c.i[pressing]])
@@ -134,7 +134,7 @@ def _disks(packing: Packing, backend: str) -> list[Any]:
 
 
 def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[Any]:
-    """Short lines along what holds grains from outside, at the points of contact."""
+    """Short lines along external supports, at the points of contact."""
     c, held = packing.contacts.picked(numbers), _held(packing)
     touched = np.flatnonzero(held[c.j])
     if not len(touched):
@@ -146,7 +146,7 @@ def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[An
 
 
 def _window(packing: Packing) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of what is drawn: the cell, or the disks where open."""
+    """Lower left and upper right corners of the picture: the cell, or the disks if it is open."""
     disks = ~_held(packing)
     x, r = packing.x[disks], packing.r[disks, None]
     margin = 0.1 * packing.r[disks].mean()

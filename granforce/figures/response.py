@@ -1,4 +1,4 @@
-"""Figure 2: how a packing answers to a local force, against its indeterminacy."""
+"""Figure 2: the response of a packing to a local force, against its indeterminacy."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -15,8 +15,8 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
     """Figure 2: ⟨F_crit⟩/⟨f_n⟩ and the decay exponent α against η2, joined in order of μ.
 
     rows: dicts with mu, eta2, critical_force (mean over contacts, in ⟨f_n⟩) and decay_exponent, one
-    for each packing; points are means over packings, each μ with a symbol of its own. limit: with
-    the mean limit load (limit_load, in ⟨f_n⟩) beside the critical force.
+    for each packing; points are means over packings, with one symbol per μ. limit: also draw the
+    mean limit load (limit_load, in ⟨f_n⟩).
     """
     style.ready(backend)
     forces = [("critical_force", "critical force", "solid")]
@@ -39,7 +39,7 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
 
 
 def _points(rows: Rows, name: str) -> list[tuple[float, ...]]:
-    """[(μ, η2, value, standard error of η2, of the value)], means over packings."""
+    """[(μ, η2, value, standard error of η2, standard error of value)], means over packings."""
     rows = [row for row in rows if np.isfinite(row.get(name, np.nan))]
     across, up = statistics.means(rows, "eta2"), statistics.means(rows, name)
     return [(mu, x, y, dx, dy) for (mu, x, dx), (_, y, dy) in zip(across, up, strict=True)]

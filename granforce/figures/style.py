@@ -1,4 +1,4 @@
-"""How figures look, in either backend: colours, lines, points, frames; and how they are saved."""
+"""The style of figures in either backend: colours, lines, points, frames; and how to save them."""
 
 import io
 import re
@@ -14,18 +14,18 @@ from granforce.records import InputError
 from granforce.system.files import written
 from granforce.types import Floats
 
-# Okabe and Ito's palette: told apart by colour-blind eyes.
+# Okabe and Ito's palette, distinguishable with colour-vision deficiency.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 GREY = "#999999"
 MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
-# Of a line: x, y and, with bars, how far they reach.
+# Points of a line: x, y and, with bars, the size of the error.
 Points = Sequence[Any] | Floats
 
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)
 
-# Symbols as they are written here: as mathtext for pictures, in Unicode for pages.
+# Symbols as written here: as mathtext for pictures, in Unicode for web pages.
 SYMBOLS = {
     "ΔF_n": (r"\Delta F_n", "ΔFₙ"),
     "F_crit": (r"F_\mathrm{crit}", "Fᶜʳⁱᵗ"),
@@ -43,12 +43,12 @@ SYMBOLS = {
     "α": (r"\alpha", "α"),
     "P(": ("P(", "P("),
 }
-# Letters alone are symbols, too, where a value, a unit or nothing follows; units are not.
+# Single letters are symbols too if followed by a value, a unit or nothing; units are not.
 _SYMBOL = re.compile("|".join(map(re.escape, SYMBOLS)) + r"|(?<!/ )\b[a-zA-Z]\b(?= =|$| /)")
 
 
 def typeset(text: str, backend: str) -> str:
-    """A text with its symbols in mathematical type; what is typeset already stays as it is."""
+    """A text with its symbols in mathematical type; symbols already in it stay unchanged."""
     if "$" in text:
         return text
 
@@ -61,9 +61,9 @@ def typeset(text: str, backend: str) -> str:
 
 
 def ready(backend: str) -> None:
-    """Load a plotting backend of HoloViews without changing which one is current.
+    """Load a plotting backend of HoloViews without changing the current one.
 
-    Raises InputError for another backend than "bokeh" and "matplotlib".
+    Raises InputError for a backend other than "bokeh" and "matplotlib".
     """
     if backend not in ("bokeh", "matplotlib"):
         raise InputError(f"no figures for the backend {backend!r}: take bokeh or matplotlib")
@@ -105,7 +105,7 @@ def bars(points: Points, colour: str, backend: str, horizontal: bool = False) ->
 
 
 def looks(keys: Sequence[Any]) -> dict[Any, tuple[str, str]]:
-    """{key: (colour, marker)} of points in order, from dark blue to yellow, each of its own."""
+    """{key: (colour, marker)} for points in order, from dark blue to yellow, all different."""
     names = process_cmap("viridis", len(keys) + 1)
     return {key: (names[k], MARKERS[k % 5]) for k, key in enumerate(keys)}
 
@@ -115,22 +115,22 @@ def curves(
 ) -> Iterator[Any]:
     """Lines with points and error bars: series of (points, label, colour, dash, marker's number).
 
-    points: (x, y, standard error), as `statistics.means` gives them; those that a logarithmic axis
+    points: (x, y, standard error), as returned by `statistics.means`; those that a logarithmic axis
     cannot show are left out.
     """
     for points, label, colour, dash, k in series:
         shown = [p for p in points if (p[0] > 0 or not logx) and (p[1] > 0 or not logy)]
         yield line([p[:2] for p in shown], label, colour, backend, dash)
         yield dots([p[:2] for p in shown], label, colour, backend, MARKERS[k % len(MARKERS)])
-        # On a logarithmic axis a bar may not reach 0.
+        # On a logarithmic axis a bar must not reach 0.
         reach = [(x, y, min(e, 0.9 * y) if logy else e, e) for x, y, e in shown]
         yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
 def beside(corner: str, backend: str) -> str:
-    """Place of a legend that would lie over data: beside the frame, in pages in this corner.
+    """Place of a legend that would cover data: next to the frame, or in web pages in this corner.
 
-    A page has no room beside its frames, and can be moved under the legend.
+    A web page has no room next to its frames, but data can be moved out from under the legend.
     """
     return corner if backend == "bokeh" else "right"
 
@@ -158,7 +158,7 @@ def frame(
     words = {"title": title, "xlabel": x, "ylabel": y}
     words = {name: typeset(text, backend) for name, text in words.items()}
     options = words | {"padding": 0.05} | options
-    # Ranges are each frame's own: by their names HoloViews would share them along a layout.
+    # Ranges for each frame; by default HoloViews shares them across a layout by axis name.
     elements = [element.opts(axiswise=True, backend=backend) for element in elements]
     return hv.Overlay(elements).opts(
         backend=backend,
@@ -186,10 +186,10 @@ def graph(
 def inset(
     outer: hv.Overlay, inner: hv.Overlay, place: Sequence[float], backend: str
 ) -> list[hv.Overlay]:
-    """The frames of which one is an inset of the other, as a list.
+    """The frames, of which one is an inset of the other, as a list.
 
-    place: (left, bottom, width, height) in parts of the outer frame. Pages have no insets: there
-    both frames stand beside each other.
+    place: (left, bottom, width, height) in fractions of the outer frame. Web pages have no insets:
+    there the two frames are next to each other.
     """
     if backend == "bokeh":
         return [outer, inner]
@@ -199,7 +199,7 @@ def inset(
         small = inner.opts(backend=backend, clone=True, title="", fontscale=0.65, show_legend=False)
         kind = hv.Store.registry[backend][hv.Overlay]
         made = kind(small, fig=axes.figure, axis=axes)
-        made._close_figures = False  # the outer frame's is not done
+        made._close_figures = False  # otherwise Matplotlib would close the unfinished outer frame
         made.initialize_plot()
 
     hooks = [_legend_of(outer.values()), draw]
@@ -207,7 +207,7 @@ def inset(
 
 
 def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
-    """A hook that typesets a picture's legend, and shows the symbols of its points on its lines."""
+    """A hook that typesets a picture's legend, with the symbols of points on its lines."""
     looks = {
         element.label: element.opts.get("style", backend="matplotlib").kwargs
         for element in elements
@@ -229,7 +229,7 @@ def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
 
 
 def equal_scales(box: Sequence[float] | Floats, backend: str) -> dict[str, Any]:
-    """Options of a frame in which both axes have the same scale: box, its sides."""
+    """Options of a frame with equal scales on both axes; box: its sides."""
     if backend == "matplotlib":
         return {"aspect": "equal"}
     width = FRAME_PIXELS[0]
@@ -237,7 +237,7 @@ def equal_scales(box: Sequence[float] | Floats, backend: str) -> dict[str, Any]:
 
 
 def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
-    """Frames beside each other."""
+    """Frames next to each other."""
     layout = hv.Layout(list(frames)).cols(columns)
     if backend == "bokeh":
         return layout.opts(shared_axes=False, backend=backend)
@@ -249,10 +249,10 @@ def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
 def save(figure: Any, path: str | Path, caption: str = "") -> None:
     """Write a figure to a path.
 
-    The suffix decides: a page that needs no network (.html), or a picture (.png, .svg, .pdf).
-    Pages are for figures made with the backend "bokeh", pictures with "matplotlib": no browser.
-    caption: what the figure shows, kept in the file: the title of a page, the Description of a PNG,
-    <desc> in an SVG, the Subject of a PDF.
+    The suffix selects the format: a self-contained web page (.html), or a picture (.png, .svg,
+    .pdf). Pages need the backend "bokeh", pictures "matplotlib"; no browser is needed. caption: a
+    description stored in the file: the title of a page, the Description of a PNG, <desc> in an SVG,
+    the Subject of a PDF.
     """
     path = Path(path)
     if path.suffix == ".html":
@@ -270,7 +270,7 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
 
 
 def rendered(figure: Any) -> Any:
-    """A figure for pictures as a Matplotlib figure of the size that all its frames need."""
+    """A figure for pictures as a Matplotlib figure, large enough for all its frames."""
     ready("matplotlib")
     drawn = hv.render(figure, backend="matplotlib")
     rows, columns = figure.shape if isinstance(figure, hv.Layout) else (1, 1)
@@ -282,14 +282,14 @@ def rendered(figure: Any) -> Any:
 def _picture(figure: Any, form: str, caption: str) -> bytes:
     """A figure as the bytes of a PNG or an SVG, with its caption."""
     drawn = rendered(figure)
-    from matplotlib import rc_context  # seconds to load, of use here only
+    from matplotlib import rc_context  # takes seconds to load
 
     described = "Subject" if form == "pdf" else "Description"
     metadata: dict[str, str | None] = {"Title": "granforce", described: caption}
-    if form != "png":  # the same figure, the same file
+    if form != "png":  # the same figure gives the same file
         metadata["Date" if form == "svg" else "CreationDate"] = None
     file = io.BytesIO()
-    # Names in SVG come from a fixed salt, not from chance.
+    # Names in SVG come from a fixed salt instead of random numbers.
     with rc_context({"svg.hashsalt": "granforce"}):
         drawn.savefig(file, format=form, dpi=150, bbox_inches="tight", metadata=metadata)
     content = file.getvalue()

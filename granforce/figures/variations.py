@@ -15,16 +15,16 @@ _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.
 
 
 def samplers(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
-    """η1, η2 and 0.15 η3 against μ, one frame each, of states drawn in several ways.
+    """η1, η2 and 0.15 η3 against μ, one frame each, for states from several samplers.
 
-    groups: {name: rows}, dicts with mu and those of eta1, eta2, eta3 that it has.
+    groups: {name: rows}, dicts with mu and any of eta1, eta2, eta3.
     """
     sources = [(word, rows, "solid") for word, rows in groups.items()]
     return _frames(sources, backend, _MEASURES, "right", columns=3)
 
 
 def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
-    """Accepted part of attempts and sweeps per state against μ, of walks by sweeps alone.
+    """Acceptance of attempts and sweeps per state against μ, for walks by sweeps alone.
 
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
     """
@@ -53,9 +53,9 @@ def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
 
 
 def opened(rows: Rows, own: Rows, *, backend: str = "bokeh") -> hv.Layout:
-    """η2 and 0.15 η3 of packings made without friction whose cones are opened to μ.
+    """η2 and 0.15 η3 of frictionless packings whose cones are opened to μ.
 
-    rows: dicts with mu (of the cones), eta2, eta3; own: the same of packings made with that μ.
+    rows: dicts with mu (of the cones), eta2, eta3; own: the same for packings made at that μ.
     """
     sources = (("made at μ = 0", rows, "solid"), ("made at μ", own, "dashed"))
     names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
@@ -63,11 +63,11 @@ def opened(rows: Rows, own: Rows, *, backend: str = "bokeh") -> hv.Layout:
 
 
 def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
-    """Part of contacts without a unique force, and their clusters, against μ.
+    """Fraction of contacts without a unique force, and their clusters, against μ.
 
-    periodic: rows (dicts with mu, undetermined_part, clusters) where only the pressure is
-    prescribed; inner: where the forces on all contacts outside an inner part are held; larger: the
-    same in packings of more disks, with their number n.
+    periodic: rows (dicts with mu, undetermined_part, clusters) with only the pressure prescribed;
+    inner: with the forces on all contacts outside an inner part fixed; larger: the same in packings
+    of more disks, with their number n.
     """
     sources = [("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed")]
     if larger:
@@ -105,9 +105,9 @@ def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
 def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """Shear stress over pressure against μ: the largest in S and that of the original network.
 
-    Beside it the original network's and uniform states' in parts of the largest in their packing.
-    rows: dicts with mu, seed, friction (the largest) and own_shear (of the original network);
-    uniform: with mu, seed, mean_shear and largest_shear of uniform states.
+    A second frame shows those of the original network and of uniform states as fractions of the
+    largest in their packing. rows: dicts with mu, seed, friction (the largest) and own_shear (of
+    the original network); uniform: with mu, seed, mean_shear and largest_shear of uniform states.
     """
     own, states = (
         [
@@ -140,7 +140,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
             for shown, some in drawn
             if shown == name and some
         ]
-        # The left frame's own room is above the curves at small μ.
+        # In the left frame there is room above the curves at small μ.
         legend = "top_left" if title == "Shear stress" else style.beside("bottom_right", backend)
         axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "ylim": (0, None)}
         frames.append(style.graph(series, backend, title=title, legend=legend, **axes))
@@ -150,7 +150,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
 def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
     """Width of S per free dimension and ln V per grain against μ, and ln V per grain against N.
 
-    rows: dicts with mu, n, extent and log_volume_per_grain; larger: those of other numbers n.
+    rows: dicts with mu, n, extent and log_volume_per_grain; larger: rows for other numbers n.
     """
     style.ready(backend)
     by_mu = (("extent", "width / ⟨f_n⟩", True), ("log_volume_per_grain", "ln V / grain", False))
@@ -179,7 +179,7 @@ def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layou
 def tails(groups: Mapping[str, Mapping[float, Points]], *, backend: str = "bokeh") -> hv.Layout:
     """P(f_n/⟨f_n⟩) of uniform states, semi-logarithmic, one frame for each word.
 
-    groups: {word: {μ: [(f, P), …]}}. Beside them exponential and Gaussian forces of mean 1.
+    groups: {word: {μ: [(f, P), …]}}. Exponential and Gaussian forces of mean 1 are drawn too.
     """
     style.ready(backend)
     points = [point for curves in groups.values() for some in curves.values() for point in some]
@@ -215,7 +215,7 @@ def _frames(
 ) -> hv.Layout:
     """One frame for each name against μ > 0, with all sources: (word, rows, dash).
 
-    logy: names that are drawn logarithmically.
+    logy: names with a logarithmic axis.
     """
     style.ready(backend)
     frames = []
@@ -224,7 +224,7 @@ def _frames(
             (statistics.means(rows, name, factor=factor), word, style.COLOURS[k], dash, k)
             for k, (word, rows, dash) in enumerate(sources)
         ]
-        shown = None if last and legend == "right" else legend  # between frames is no room for one
+        shown = None if last and legend == "right" else legend  # no room between frames
         axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "logy": name in logy}
         frames.append(style.graph(series, backend, title=label, legend=shown, **axes))
     return style.page(frames, backend, columns=columns)

@@ -1,4 +1,4 @@
-"""Measures of states, and statistics over packings: of any arrays, wherever they come from."""
+"""Measures of states, and statistics over packings, for arrays from any source."""
 
 from granforce.measures import statistics
 from granforce.measures.sampling import Sampling, sampling

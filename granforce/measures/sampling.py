@@ -1,8 +1,8 @@
 """Sampling of η: its standard error, whether states have mixed, and their effective size.
 
-All come from the states alone, in the order in which they were drawn. η is a sum over contacts, so
-the diagnostics sum variances and covariances over all components, too: the extreme of thousands of
-single components would say "not mixed" of independent states.
+All are computed from the states alone, in the order in which they were drawn. η is a sum over
+contacts, so the diagnostics also sum variances and covariances over all components: the extreme of
+thousands of single components would indicate "not mixed" for independent states.
 """
 
 from functools import partial
@@ -14,7 +14,7 @@ from scipy import fft
 from granforce.measures import statistics
 from granforce.types import Floats
 
-BLOCKS = 10  # runs of consecutive states, one of which is left out at a time
+BLOCKS = 10  # runs of consecutive states, left out one at a time
 MIXED = 1.1  # largest R̂ of states that have mixed
 FEWEST = 2 * BLOCKS  # effective states below which blocks depend on each other
 
@@ -22,17 +22,17 @@ Moments = tuple[int, Floats, Floats]  # number of states, sum (N_c, 2), sum of s
 
 
 class Sampling(NamedTuple):
-    """How far states can be relied on; NaN where there are too few of them."""
+    """Reliability of states; NaN if there are too few."""
 
     eta1_error: float  # standard error of η1, by leaving out each block once
-    eta2_error: float  # the same of η2
+    eta2_error: float  # the same for η2
     r_hat: float  # √(variance of all states / that within either half), summed over components
-    effective: float  # number of independent states that they are worth
-    states: int  # how many they are
+    effective: float  # equivalent number of independent states
+    states: int  # number of states
 
     @property
     def mixed(self) -> bool:
-        """Whether both halves agree, and blocks are long enough for the errors to hold."""
+        """Whether both halves agree, and blocks are long enough for the errors to be valid."""
         return self.r_hat <= MIXED and self.effective >= FEWEST
 
 
@@ -87,9 +87,9 @@ def _r_hat(off: Floats) -> float:
 
 
 def _effective(off: Floats) -> float:
-    """S/τ, at most S, with τ the time of the autocorrelation summed over components.
+    """S/τ, at most S, with τ the autocorrelation time summed over components.
 
-    The sum over lags ends before the first pair of them that is not positive (Geyer).
+    The sum over lags ends before the first pair of lags that is not positive (Geyer).
     """
     count = len(off)
     power = np.abs(fft.rfft(off.reshape(count, -1), fft.next_fast_len(2 * count), axis=0)) ** 2

@@ -1,4 +1,4 @@
-"""Measures of force indeterminacy (PRE 79, 052302), of any states from anywhere.
+"""Measures of force indeterminacy (PRE 79, 052302) for states from any source.
 
 States are arrays (S, N_c, 2) of force networks (f_n, f_t) on the same contacts.
 """
@@ -49,7 +49,7 @@ def eta1(states: Floats) -> float:
 def eta2(states: Floats) -> float:
     """η2 = sqrt(⟨Σ_c |F_c − F'_c|²⟩ / Σ_c |G_c|²) over all pairs of different states.
 
-    The mean over pairs is 2 S/(S − 1) times the variance, so no pair is ever formed; 0 for S = 1.
+    The mean over pairs is 2 S/(S − 1) times the variance, so pairs are never formed; 0 for S = 1.
     """
     count = len(_some(states))
     if count < 2:
@@ -60,7 +60,7 @@ def eta2(states: Floats) -> float:
 
 
 def _alike(one: Floats, other: Floats) -> None:
-    """InputError unless both arrays have one shape, as those of one packing have."""
+    """InputError unless both arrays have the same shape, as for one packing."""
     if np.shape(one) != np.shape(other):
         raise InputError(
             f"shapes {np.shape(one)} and {np.shape(other)} differ; take both from one packing"
@@ -70,8 +70,8 @@ def _alike(one: Floats, other: Floats) -> None:
 def eta3(low: Floats, high: Floats) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
 
-    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact. Raises InputError where
-    they are not of as many contacts.
+    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact. Raises InputError if
+    their shapes differ.
     """
     _alike(low, high)
     return float((high - low).mean() / ((high + low) / 2).mean())
@@ -88,10 +88,9 @@ def normal_extent(low: Floats, high: Floats) -> Floats:
 
 
 def correlation(normal_forces: Floats, extent: Floats) -> float:
-    """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary.
+    """corr(f_n, ΔF_n) over contacts (Pearson); nan if one of them does not vary.
 
-    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n. Raises InputError where they are not of as many
-    contacts.
+    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n. Raises InputError if their shapes differ.
     """
     _alike(normal_forces, extent)
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
@@ -116,10 +115,10 @@ def distances(states: Floats, centre: Floats) -> Floats:
 def principal_axes(states: Floats, count: int = 2) -> tuple[Floats, Floats]:
     """Directions along which states vary most: axes (count, N_c, 2), and their share of variance.
 
-    Axes have length 1 and a positive largest component; those along which nothing varies are zero.
+    Axes have length 1 and a positive largest component; axes without variation are zero.
     """
     flat = (states - mean_network(states)).reshape(len(states), -1)
-    # States are fewer than components as a rule: their Gram matrix is the smaller one.
+    # States are usually fewer than components, so their Gram matrix is smaller.
     value, left = np.linalg.eigh(flat @ flat.T)
     axes, share = np.zeros((count, flat.shape[1])), np.zeros(count)
     varies = value > 1e-12 * max(value[-1], np.finfo(float).tiny) * len(value)
@@ -137,12 +136,12 @@ class Growth:
         self.count = 0
 
     def add(self, state: Floats) -> tuple[float, float, float]:
-        """One more state (N_c, 2); (η1, η2, η3) of all until now."""
+        """Add a state (N_c, 2); return (η1, η2, η3) of all states so far."""
         if not self.count:
             self._first, self._low, self._high = state, state, state
             self._shift, self._square = np.zeros(state.shape), np.zeros(len(state))
         self.count += 1
-        # Moments about the first state: where all are alike, their variance is 0 to the last bit.
+        # Moments about the first state: if all are equal, their variance is exactly 0.
         moved = np.subtract(state, self._first, dtype=float)
         self._shift += moved
         self._square += (moved**2).sum(axis=1)
@@ -166,7 +165,7 @@ def growing(states: Floats) -> dict[str, Floats]:
 
 
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
-    """Where each f_n lies in its interval, 0 at the least and 1 at the largest; nan where ΔF_n = 0.
+    """Position of each f_n in its interval, from 0 (least) to 1 (largest); nan if ΔF_n = 0.
 
     normal_forces (N_c,); low, high (N_c, 2).
     """
@@ -178,11 +177,11 @@ def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Fl
 def undetermined_clusters(
     i: Integers, j: Integers, extent: Floats, tolerance: float
 ) -> tuple[Integers, Integers]:
-    """Clusters of contacts whose forces are not fixed: connected through shared grains.
+    """Clusters of contacts with undetermined forces, connected through shared grains.
 
     i, j (N_c,) grains; extent (N_c, 2) lengths of the intervals of f_n and f_t; a contact is
-    undetermined where one of them exceeds the tolerance. Returns the cluster of each contact
-    (N_c,), −1 for determined ones, and the number of contacts of each cluster, largest first.
+    undetermined if one of them exceeds the tolerance. Returns the cluster of each contact (N_c,),
+    −1 for determined ones, and the number of contacts of each cluster, largest first.
     """
     loose = np.asarray(extent).max(axis=1) > tolerance
     label = np.full(len(i), -1)

@@ -19,7 +19,7 @@ RESAMPLES = 999
 def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float, float, float]:
     """Mean and its confidence interval (Student's t): (mean, low, high); NaN where unknown.
 
-    values: one number per packing; NaN are left out. One packing has no interval.
+    values: one number per packing; NaN are left out. A single packing has no interval.
     """
     values = _finite(values)
     if not len(values):
@@ -34,7 +34,7 @@ def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float,
 def difference_interval(
     values: Floats, others: Floats, level: float = LEVEL
 ) -> tuple[float, float, float]:
-    """Mean of values less that of others, (difference, low, high), by Welch's t.
+    """Mean of values minus that of others, (difference, low, high), by Welch's t.
 
     At least two values each.
     """
@@ -53,8 +53,8 @@ def jackknife(
 ) -> tuple[float, float, float]:
     """(value, low, high) of statistic(items), by leaving out each item once (Student's t).
 
-    items: one per packing. The interval is a function of the data alone, and wants a statistic
-    that changes little with any one item. One item has no interval (NaN).
+    items: one per packing. The interval depends on the data alone, and requires a statistic that
+    changes little with any one item. A single item has no interval (NaN).
     """
     items = list(items)
     value = float(statistic(items))
@@ -72,9 +72,9 @@ def jackknife_error(statistic: Callable[[list[T]], float], items: Sequence[T]) -
 
 
 def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dict[float, Floats]:
-    """{μ: array of the values of one name over packings}, in order of μ; NaN left out.
+    """{μ: array of the values of one name over packings}, in order of μ, without NaN.
 
-    rows: dicts with μ (or what else to group by) and the name; rows without it are passed over.
+    rows: dicts with μ (or another key to group by) and the name; rows without it are skipped.
     """
     found: dict[Any, list[float]] = {}
     for row in rows:
@@ -85,7 +85,7 @@ def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dic
 
 
 def paired(rows: Rows, others: Rows) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Rows that have one of the same μ and seed among the others, each with that one."""
+    """Rows with a match of the same μ and seed among the others, each with its match."""
     known = {(row["mu"], row["seed"]): row for row in others}
     keys = [(row, (row["mu"], row["seed"])) for row in rows]
     return [(row, known[key]) for row, key in keys if key in known]
@@ -110,9 +110,9 @@ def bootstrap(
 ) -> tuple[float, float, float]:
     """(value, low, high) of statistic(*groups) with a percentile interval.
 
-    groups: sequences, one item per packing; each group is resampled on its own. Groups of one
-    packing do not vary; where all are such there is no interval (NaN). The result is a function of
-    the seed.
+    groups: sequences, one item per packing; each group is resampled separately. Groups of one
+    packing do not vary; if all groups are such there is no interval (NaN). The result depends only
+    on the seed.
     """
     rng = np.random.default_rng(seed)
     groups = [list(group) for group in groups]
@@ -132,7 +132,7 @@ def bootstrap(
 def resampled_means(
     groups: Sequence[npt.ArrayLike], seed: int = 0, resamples: int = RESAMPLES
 ) -> Floats:
-    """Means (resamples, groups, …) of groups whose items, one per packing, are drawn anew."""
+    """Means (resamples, groups, …) of groups whose items, one per packing, are resampled."""
     rng = np.random.default_rng(seed)
     drawn = []
     for group in map(np.asarray, groups):
@@ -142,10 +142,10 @@ def resampled_means(
 
 
 def percentile_ends(drawn: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Percentile interval of draws, (low, high), and the farthest that chance may put its ends.
+    """Percentile interval of draws, (low, high), and the range in which chance may put its ends.
 
-    With other draws from the same distribution an end would have another rank among these: it is
-    not beyond the farthest with 99 % confidence.
+    With other draws from the same distribution an end would have another rank among these; with 99
+    % confidence it is within this range.
     """
     drawn, tail = np.sort(drawn), (1 - LEVEL) / 2
     rank = int(stats.binom.ppf(0.01, len(drawn), tail))
@@ -154,7 +154,7 @@ def percentile_ends(drawn: Floats) -> tuple[tuple[float, float], tuple[float, fl
 
 
 def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
-    """Spearman's rank correlation; ties share their rank. NaN where one of them does not vary."""
+    """Spearman's rank correlation; ties share their rank. NaN if one of them does not vary."""
     ranks = stats.rankdata(x), stats.rankdata(y)
     if min(map(np.ptp, ranks)) == 0:
         return float("nan")
@@ -162,19 +162,20 @@ def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
 
 
 def density(values: Floats, edges: Floats) -> Floats:
-    """Probability density of values in the bins of edges; values outside count in the norm."""
+    """Probability density of values in the bins of edges; outside values count in the norm."""
     counts = np.histogram(values, edges)[0]
     return counts / (len(values) * np.diff(edges))
 
 
 def departure(values: npt.ArrayLike) -> float:
-    """How far a density on x ≥ 0 is from falling everywhere: sup of Ĉ − F over x.
+    """Departure of a density on x ≥ 0 from one that falls everywhere: sup of Ĉ − F over x.
 
-    F is the distribution function of the values (n,), Ĉ its least concave majorant, whose slope
-    is Grenander's estimate of a density that never rises (Skand. Aktuarietidskr. 39, 125 (1956)).
-    It is the part of the values that lie too far right for that, and Hartigan's dip (Ann. Stat.
-    13, 70 (1985)) with the mode held at 0: no bins, the same in any unit; 0.002 for 20,000 numbers
-    of an exponential distribution, 0.05 and 0.11 of Weibull's with exponents 1.5 and 2.
+    F is the distribution function of the values (n,), Ĉ its least concave majorant, whose slope is
+    Grenander's estimate of a density that never rises (Skand. Aktuarietidskr. 39, 125 (1956)). It
+    is the fraction of the values that are too far right for such a density, and equals Hartigan's
+    dip (Ann. Stat. 13, 70 (1985)) with the mode fixed at 0. It needs no bins and does not depend on
+    the unit; it is 0.002 for 20,000 numbers from an exponential distribution, 0.05 and 0.11 for
+    Weibull distributions with exponents 1.5 and 2.
     """
     at, count = np.unique(np.asarray(values, float), return_counts=True)
     if at[0] > 0:
@@ -188,10 +189,10 @@ def departure(values: npt.ArrayLike) -> float:
 
 
 def chance_departure(number: float, level: float = LEVEL) -> float:
-    """The departure that so many values of a falling density exceed in 1 − level of cases.
+    """The departure that this many values of a falling density exceed in 1 − level of cases.
 
-    The uniform density comes nearest to rising, so it is the null; √n times its departure has a
-    distribution of its own, drawn once.
+    The uniform density is closest to rising, so it is the null; the distribution of √n times its
+    departure is simulated once.
     """
     return float(np.quantile(_uniform_departures(), level) / np.sqrt(number))
 
@@ -203,10 +204,10 @@ def _uniform_departures(size: int = 1000, repeats: int = 4999) -> Floats:
 
 
 def effective_number(groups: Sequence[Sequence[float] | Floats]) -> float:
-    """How many independent values groups of values, one per packing, are worth for their F.
+    """Effective number of independent values for F, of groups of values, one per packing.
 
-    The variance of F over packings at its deciles, over that of as many independent values: values
-    of one packing go together, and packings differ.
+    It is based on the variance of F over packings at its deciles, compared with that of as many
+    independent values: values of one packing are correlated, and packings differ.
     """
     joined = np.concatenate(groups)
     if len(groups) < 2:
@@ -220,7 +221,7 @@ def effective_number(groups: Sequence[Sequence[float] | Floats]) -> float:
 
 
 def decay_misfits(r: Floats, u: Floats) -> tuple[float, float]:
-    """How far ln u (k,) at distances r (k,) lies from its best power law and exponential, rms.
+    """Root mean square misfit of ln u (k,) at distances r (k,) to a power law and an exponential.
 
     NaN for fewer than three distances.
     """

@@ -1,1 +1,1 @@
-"""What is asked of the operating system: files, the terminal, cancelling, compiled kernels."""
+"""Operating-system services: files, the terminal, cancelling, and compiled kernels."""

@@ -1,7 +1,7 @@
-"""Cancelling: one flag for all that is under way, which kernels read in their own loops.
+"""Cancelling: one flag for all running work, which kernels read in their own loops.
 
-A thread asks cancel() ten times a second and raises the flag, and so does Ctrl-C in the main
-thread, where no signal handler of Python's own can run before a kernel ends.
+A thread calls cancel() ten times a second and sets the flag. So does Ctrl-C in the main thread,
+where Python's signal handlers cannot run before a kernel ends.
 """
 
 import atexit
@@ -25,9 +25,9 @@ from granforce.types import Cancel, Mask
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# Seconds between two askings of cancel().
+# Seconds between two calls of cancel().
 _ASK_EVERY = 0.1
-# Seconds that a call of another library gets to end by itself before it is left behind.
+# Seconds that a call of another library gets to end before it is abandoned.
 _GRACE = 0.3
 
 
@@ -36,7 +36,7 @@ class _Scope(NamedTuple):
     cancel: Cancel | None
 
 
-# Set once the process is about to end.
+# Set when the process is about to end.
 _ending = threading.Event()
 _NEVER = _Scope(np.zeros(1, dtype=bool), None)
 _scope = contextvars.ContextVar("scope", default=_NEVER)
@@ -47,7 +47,7 @@ _APART = "granforce-apart"  # threads with a call that cannot read the flag
 def watched(cancel: Cancel | None = None) -> Iterator[None]:
     """Within, all work ends soon after cancel() → True, or after Ctrl-C in the main thread.
 
-    Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones count as well.
+    Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones also apply.
     """
     outer = _scope.get()
     main = threading.current_thread() is threading.main_thread()
@@ -78,7 +78,7 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
 
 
 def cancellable(function: Callable[P, T]) -> Callable[P, T]:
-    """The function `watched` with its own keyword argument `cancel`."""
+    """Run the function inside `watched`, with its own keyword argument `cancel`."""
 
     @functools.wraps(function)
     def inside(*arguments: P.args, **options: P.kwargs) -> T:
@@ -96,12 +96,12 @@ def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:
 
 
 def end_everything() -> None:
-    """All work that can be cancelled ends, now and later: for a process that is about to end."""
+    """End all cancellable work, now and later, in a process that is about to end."""
     _ending.set()
 
 
 def _wake_by_signals(mouth: socket.socket) -> bool:
-    """Have signals write their number to the socket, unless an event loop has them already."""
+    """Make signals write their number to the socket, unless an event loop already does so."""
     before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
     if before != -1:
         signal.set_wakeup_fd(before)
@@ -119,18 +119,18 @@ def _watch(scope: _Scope, ears: socket.socket, asks: bool) -> None:
         try:
             cancelled_now = scope.cancel is not None and scope.cancel()
         except Exception:
-            return  # the working thread, which asks it too, meets the same error
+            return  # the working thread, which also calls it, gets the same error
         if cancelled_now:
             scope.flag[0] = True
 
 
 def flag() -> Mask:
-    """The flag (1,) of the work under way, for kernels: they return early once it is True."""
+    """The flag (1,) of the running work, for kernels: they return early once it is True."""
     return _scope.get().flag
 
 
 def cancelled() -> bool:
-    """Whether the work under way was asked to end."""
+    """Whether the running work was cancelled."""
     scope = _scope.get()
     if not scope.flag[0] and scope.cancel is not None and scope.cancel():
         scope.flag[0] = True
@@ -138,7 +138,7 @@ def cancelled() -> bool:
 
 
 def check(what: str = "work") -> None:
-    """Raise Cancelled if the work under way was asked to end."""
+    """Raise Cancelled if the running work was cancelled."""
     if cancelled():
         raise Cancelled(f"{what} cancelled")
 
@@ -146,7 +146,7 @@ def check(what: str = "work") -> None:
 def threads(workers: int) -> ThreadPoolExecutor:
     """A ThreadPoolExecutor whose work is cancelled with the caller's.
 
-    Raises InputError for a number of workers that is none.
+    Raises InputError for an invalid number of workers.
     """
     workers = worker_count(workers)
     return ThreadPoolExecutor(workers, initializer=_scope.set, initargs=(_scope.get(),))
@@ -155,10 +155,10 @@ def threads(workers: int) -> ThreadPoolExecutor:
 def apart(
     call: Callable[..., T], *arguments: Any, interrupt: Callable[[], object] | None = None
 ) -> T:
-    """call(*arguments), which cannot read the flag, in a thread that is left behind if need be.
+    """call(*arguments), which cannot read the flag, in a thread that is abandoned if necessary.
 
-    interrupt(): asks it to end, where that is possible. The call must return numbers: memory that
-    SuperLU takes in one thread is lost if another frees it.
+    interrupt(): requests its end, if that is possible. The call must return numbers: memory
+    allocated by SuperLU in one thread is lost if another frees it.
     """
     if _scope.get().cancel is None:
         return call(*arguments)
@@ -187,12 +187,12 @@ def apart(
 
 
 def left_behind() -> list[threading.Thread]:
-    """Threads with a call that is still running, at an end of the work."""
+    """Abandoned threads whose call is still running, at the end of the work."""
     return [thread for thread in threading.enumerate() if thread.name == _APART]
 
 
 @atexit.register
 def _wait_for_left() -> None:
-    # Where C++ returns to an interpreter that has ended, the process aborts.
+    # If C++ returns to an interpreter that has ended, the process aborts.
     for thread in left_behind():
         thread.join()

@@ -1,4 +1,4 @@
-"""What something takes, beside what it gives."""
+"""Run times of function calls."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ def timed(
     clock: Callable[[], float] = time.perf_counter,
     **options: Any,
 ) -> tuple[float, T]:
-    """Seconds that action(…) takes, by a clock, and what it returns."""
+    """Seconds that action(…) takes, by a clock, and its return value."""
     begin = clock()
     found = action(*arguments, **options)
     return clock() - begin, found

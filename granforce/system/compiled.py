@@ -1,6 +1,6 @@
-"""Compiled kernels: where numba keeps them, saying that it compiles, and doing so ahead of time.
+"""Compiled kernels: the location of numba's cache, messages, and compilation ahead of time.
 
-Where they are kept must be told before numba is imported.
+The location must be set before numba is imported.
 """
 
 import atexit
@@ -17,14 +17,14 @@ from granforce.system.streams import tell
 
 
 def find_a_place() -> None:
-    """Name a temporary folder to numba where it could write neither beside us nor at home.
+    """Set a temporary cache folder for numba if it can write neither here nor in the user's cache.
 
-    Without one numba refuses to compile for keeping, and so every module with kernels.
+    Without one numba refuses to compile cached kernels, and so every module with kernels fails.
     """
     if os.environ.get("NUMBA_CACHE_DIR") or any(map(_writable, _usual_places())):
         return
     place = temporary_place()
-    os.environ["NUMBA_CACHE_DIR"] = place  # workers get it from here
+    os.environ["NUMBA_CACHE_DIR"] = place  # inherited by workers
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = place
     tell(
@@ -34,10 +34,10 @@ def find_a_place() -> None:
 
 
 def tell_when_compiling(say: Callable[[], object]) -> None:
-    """Call say() once, as soon as a kernel is compiled that is not kept from an earlier run."""
+    """Call say() once, as soon as a kernel is compiled that is not in the cache."""
     from numba.core import event
 
-    class Listener(event.Listener):  # type: ignore[misc]  # numba says no types
+    class Listener(event.Listener):  # numba has no type hints
         def on_start(self, happening: Any) -> None:
             event.unregister("numba:compile", self)
             say()
@@ -49,13 +49,13 @@ def tell_when_compiling(say: Callable[[], object]) -> None:
 
 
 def are_kept(last: str) -> bool:
-    """Whether kernels are kept from an earlier run; last: "module.kernel" that is compiled last."""
+    """Whether kernels are in the cache; last: the "module.kernel" that is compiled last."""
     places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
     return any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place)
 
 
 def compile_ahead(statement: str, last: str) -> bool:
-    """Run a statement that compiles kernels in a process of its own, where none are kept yet.
+    """Run a statement that compiles kernels in a separate process if none are cached yet.
 
     last: as for `are_kept`. The process ends with this one at the latest. Returns whether there was
     nothing to do.
@@ -69,7 +69,7 @@ def compile_ahead(statement: str, last: str) -> bool:
 
 
 def skip_unreadable_indices() -> None:
-    """Let numba compile kernels anew whose cached index names a class that has gone.
+    """Make numba recompile kernels whose cached index refers to a class that no longer exists.
 
     It unpickles the index before it compares dates, and would raise after an upgrade of granforce.
     """
@@ -87,7 +87,7 @@ def skip_unreadable_indices() -> None:
 
 
 def _usual_places() -> Iterator[Path]:
-    """Where numba looks first: beside the sources, then the user's folder of caches."""
+    """Where numba looks first: next to the sources, then in the user's cache folder."""
     yield Path(__file__).parent / "__pycache__"
     if os.name == "nt":
         yield Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
@@ -98,7 +98,7 @@ def _usual_places() -> Iterator[Path]:
 
 
 def _writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, or in the first one above it that there is."""
+    """Whether files can be created in a folder, or in its first existing parent."""
     while not folder.exists():
         if folder == folder.parent:
             return False
@@ -107,9 +107,9 @@ def _writable(folder: Path) -> bool:
 
 
 def temporary_place(folder: str | None = None) -> str:
-    """The same place each time, so that kernels are compiled once; a new one if it is not ours.
+    """The same folder each time, so that kernels are compiled once; a new one if it is not ours.
 
-    folder: where it lies, by default that of temporary files.
+    folder: its parent, by default that of temporary files.
     """
     if not hasattr(os, "getuid"):
         return tempfile.mkdtemp(prefix="granforce-", dir=folder)

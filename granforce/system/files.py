@@ -1,4 +1,4 @@
-"""Files for the user: whole or not at all, and never in place of what is no file."""
+"""Files for the user: written completely or not at all, and replacing only regular files."""
 
 import errno
 import os
@@ -12,27 +12,27 @@ from typing import IO
 
 from granforce.records import InputError
 
-# What is open already, by any of its names.
+# Files that are already open, by any of their names.
 _OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
 
 
-MOST_STREAMED = 2**30  # bytes taken from a device or a pipe, which may never end
+MOST_STREAMED = 2**30  # bytes read from a device or a pipe, which may never end
 
-ASIDE = ".granforce-{}.part"  # what is still being written
+ASIDE = ".granforce-{}.part"  # a file being written
 
 
 def beside(path: Path) -> Path:
-    """A path of its own for what will be moved to `path`: names made from its can be too long."""
+    """A separate path for a file that will be moved to `path`, short enough for any name."""
     return path.with_name(ASIDE.format(secrets.token_hex(8)))
 
 
 @contextmanager
 def written(path: str | Path) -> Iterator[IO[bytes]]:
-    """An open binary file; what was written to it stands at path when the block ends, or nothing.
+    """An open binary file whose contents appear at path when the block ends without error.
 
-    A new file gets the mode that the umask leaves, an existing one keeps its own; links are
-    followed. Devices, pipes and open files (/dev/stdout) cannot be replaced: they are written to.
-    Raises InputError where that is not possible.
+    A new file gets the mode given by the umask, an existing one keeps its mode; links are followed.
+    Devices, pipes and open files (/dev/stdout) cannot be replaced: they are written to directly.
+    Raises InputError if that is not possible.
     """
     path = expanded(path)
     with _refusing(path):
@@ -58,8 +58,8 @@ def written(path: str | Path) -> Iterator[IO[bytes]]:
 def content_of(path: str | os.PathLike[str], most: int | None = None) -> bytes:
     """The bytes of a file, a device or a pipe.
 
-    most: how many there may be; by default any number in a file, else MOST_STREAMED. Raises
-    InputError where there are more, or it cannot be read.
+    most: largest number of bytes; by default unlimited for a file, otherwise MOST_STREAMED. Raises
+    InputError if there are more, or the file cannot be read.
     """
     try:
         with open(path, "rb") as file:
@@ -75,9 +75,9 @@ def content_of(path: str | os.PathLike[str], most: int | None = None) -> bytes:
 
 
 def check_file(path: str | Path) -> None:
-    """InputError unless a file can be written at path; nothing is left or changed there.
+    """InputError unless a file can be written at path; nothing there is created or changed.
 
-    Rights do not say all: a new file is begun beside it, and removed.
+    Permissions are not sufficient: a new file is created next to it and removed.
     """
     path = expanded(path)
     with _refusing(path):
@@ -90,17 +90,17 @@ def check_file(path: str | Path) -> None:
             os.unlink(aside)
 
 
-# Paths, each with what names it: an option, say.
+# Paths, each with its name, such as an option.
 Named = Sequence[tuple[str, str | Path]]
 
 
 def check_apart(
     *, replaced: Named = (), folders: Named = (), stores: Named = (), read: Named = ()
 ) -> None:
-    """InputError where writing would destroy what is read or written elsewhere, links resolved.
+    """InputError if writing would destroy files that are read or written elsewhere; follows links.
 
-    replaced: files, or whole folders, that will be replaced; folders: those that get files of their
-    own; stores: those that get entries; read: files and folders that are read.
+    replaced: files, or whole folders, that will be replaced; folders: those to which files are
+    added; stores: those to which entries are added; read: files and folders that are read.
     """
     for said, path in (*replaced, *folders):
         if not str(path):
@@ -120,9 +120,9 @@ def check_apart(
 
 
 def _places(path: str | Path) -> list[object]:
-    """What tells a file or folder from all others, then the same of the folders that hold it.
+    """The identity of a file or folder, then those of the folders that contain it.
 
-    Empty for what cannot be replaced, such as a device or a pipe.
+    Empty for things that cannot be replaced, such as a device or a pipe.
     """
     target = Path(os.path.realpath(expanded(path)))
     try:
@@ -131,7 +131,7 @@ def _places(path: str | Path) -> list[object]:
             return []
     except FileNotFoundError:
         pass
-    except OSError:  # told where it is opened
+    except OSError:  # reported when it is opened
         return []
     return [_place(one) for one in (target, *target.parents)]
 
@@ -145,7 +145,7 @@ def _place(path: Path) -> object:
 
 
 def make_folder(path: str | Path) -> Path:
-    """The folder at path, made with its parents if missing; InputError unless it can be written."""
+    """The folder at path, created with its parents if missing; InputError unless writable."""
     path = expanded(path)
     with _refusing(path):
         path.mkdir(parents=True, exist_ok=True)
@@ -155,7 +155,7 @@ def make_folder(path: str | Path) -> Path:
 
 
 def expanded(path: str | Path) -> Path:
-    """The path with ~ and ~user replaced; InputError where it cannot be a path."""
+    """The path with ~ and ~user expanded; InputError for an invalid path."""
     try:
         found = Path(path).expanduser()
     except RuntimeError:
@@ -166,15 +166,15 @@ def expanded(path: str | Path) -> Path:
 
 
 def _regular(path: str | Path) -> tuple[Path, int | None] | None:
-    """(file that path leads to, its mode or None if missing), or None for what is no file."""
+    """(file to which path leads, its mode or None if missing), or None if not a regular file."""
     path = os.path.abspath(path)
     if _OPEN_FILE.fullmatch(path):
-        return None  # also where it leads to a file: what writes there beside us has it open
+        return None  # even if it leads to a file: another program has it open
     target = Path(os.path.realpath(path))
     try:
         found = target.stat()
     except FileNotFoundError:
-        target.parent.stat()  # tells a missing folder
+        target.parent.stat()  # reveals a missing folder
         return target, None
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a folder")
@@ -191,7 +191,7 @@ def _may_write(path: Path) -> bool:
 
 @contextmanager
 def _refusing(path: Path) -> Iterator[None]:
-    """Errors of the operating system become one line; a reader who has gone is no error."""
+    """Convert errors of the operating system to one line; a closed reader is not an error."""
     try:
         yield
     except BrokenPipeError:

@@ -1,10 +1,10 @@
-"""An address of a server that says that it is alive: of Panel's --plugins, for supervisors."""
+"""A server address that reports that the server is alive, for supervisors (Panel's --plugins)."""
 
 from tornado.web import RequestHandler
 
 
 class Health(RequestHandler):
-    """Answers once the server's loop has its turn; asks no store and makes no page."""
+    """Responds once the server's event loop is free, without a store or a page."""
 
     def get(self) -> None:
         """{"alive": true}."""

@@ -1,11 +1,11 @@
-"""Ctrl-C that cannot be lost.
+"""Ctrl-C that is never lost.
 
-Python turns the signal into a KeyboardInterrupt wherever the main thread happens to be. Within an
-import, or a call of a library in C, that may swallow the exception, or make another one of it: the
-command would go on, or end in a traceback. So it is noted besides, and work that is watched
-(cancelling.py) asks for the note.
+Python turns the signal into a KeyboardInterrupt wherever the main thread happens to be. An import,
+or a call of a C library, may swallow the exception or replace it: the command would then continue,
+or end in a traceback. So the signal is also recorded, and work inside `watched` (cancelling.py)
+checks the record.
 
-Only the standard library, and little of it: this is in force before anything else is imported.
+Standard library only: this runs before anything else is imported.
 """
 
 import signal
@@ -18,18 +18,18 @@ _asked = threading.Event()
 
 
 def interrupted() -> bool:
-    """Whether Ctrl-C was pressed during the command that is running."""
+    """Whether Ctrl-C was pressed during the running command."""
     return _asked.is_set()
 
 
 @contextmanager
 def noted() -> Iterator[None]:
-    """Within, Ctrl-C is noted before its KeyboardInterrupt is raised; main thread, else nothing."""
+    """Within, record Ctrl-C before its KeyboardInterrupt is raised; only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:  # ignored, or somebody else's
+    if before is not signal.default_int_handler:  # ignored, or handled by other code
         yield
         return
     signal.signal(signal.SIGINT, _note)
@@ -41,7 +41,7 @@ def noted() -> Iterator[None]:
 
 
 def check() -> None:
-    """Raise the KeyboardInterrupt that was noted, if any."""
+    """Raise the recorded KeyboardInterrupt, if any."""
     if _asked.is_set():
         raise KeyboardInterrupt
 

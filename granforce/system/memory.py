@@ -1,4 +1,4 @@
-"""How much memory this machine has: what would need more is refused before it is begun."""
+"""The memory of this machine: computations that need more are rejected before they start."""
 
 import os
 
@@ -6,11 +6,11 @@ from granforce.records import InputError
 
 
 def check_memory(needed: float, what: str) -> None:
-    """InputError where what needs more bytes than this machine has memory."""
+    """InputError if a computation needs more bytes than this machine has memory."""
     try:
         there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
-        return  # not told by this system: an allocation will fail instead
+        return  # unknown on this system: an allocation will fail instead
     if needed > there:
         raise InputError(
             f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, and this machine has "

@@ -1,9 +1,9 @@
-"""Compile parts of kernels once: optimised and made machine code only in the kernels around them.
+"""Compile parts of kernels once: optimised only inside the kernels that contain them.
 
-Numba compiles every function by itself, and again within each function that calls it: what lies
-five calls deep is optimised five times over, and its own machine code is never called. Functions
-that only kernels call stay here as they are lowered; the optimiser sees them, whole, in the kernels
-that Python calls. Numbers are the same: it may not change the rounding of any operation.
+Numba compiles every function separately, and again within each function that calls it: code five
+calls deep is optimised five times, and its own machine code is never called. Functions called only
+by kernels stay unoptimised here; the optimiser sees them, whole, in the kernels that Python calls.
+Results are the same, as it may not change the rounding of any operation.
 """
 
 from typing import Any
@@ -13,14 +13,14 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 
-class _Part(JITCodeLibrary):  # type: ignore[misc]  # numba says no types
-    """Code that others link: neither optimised nor run by itself."""
+class _Part(JITCodeLibrary):  # numba has no type hints
+    """Code that others link, neither optimised nor run separately."""
 
     def _optimize_final_module(self) -> None:
         pass
 
     def _finalize_final_module(self) -> None:
-        # Numba sets the address of the function's environment, which must exist therefore.
+        # Numba sets the address of the function's environment, which must therefore exist.
         environments = [
             str(variable)
             for variable in self._final_module.global_variables
@@ -36,7 +36,7 @@ class _Part(JITCodeLibrary):  # type: ignore[misc]  # numba says no types
 
 
 class PartCompiler(Compiler):  # type: ignore[misc]
-    """Numba's compiler, for functions that only kernels call."""
+    """Numba's compiler, for functions called only by kernels."""
 
     def define_pipelines(self) -> Any:
         self.state.library = _Part(self.state.targetctx.codegen(), self.state.func_id.func_name)

@@ -1,4 +1,4 @@
-"""Values as JSON has them (RFC 8259), which knows neither NaN nor infinities."""
+"""Values in JSON (RFC 8259), which has neither NaN nor infinities."""
 
 import json
 import math

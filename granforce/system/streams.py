@@ -1,7 +1,7 @@
 """Standard output and standard error that may be full, closed, or without a reader.
 
-A result that cannot be printed is an error; a line of progress that cannot is none. Only the
-standard library: this is in force before anything else is imported.
+Failure to print a result is an error; failure to print progress is not. Standard library only: this
+runs before anything else is imported.
 """
 
 import errno
@@ -14,15 +14,15 @@ from typing import Any, TextIO
 
 
 class OutputError(Exception):
-    """Standard output takes no more; the message says why."""
+    """Standard output cannot be written; the message gives the reason."""
 
 
 class ReaderGone(OutputError):
-    """Whatever read our output (head, less) has ended, which is no error."""
+    """The reader of our output (head, less) has ended, which is not an error."""
 
 
 class _Stream:
-    """A text stream, or None for one that was closed before we began."""
+    """A text stream, or None for one that was closed at the start."""
 
     def __init__(self, stream: TextIO | None, number: int) -> None:
         self._stream, self._number = stream, number
@@ -49,7 +49,7 @@ class _Stream:
         raise NotImplementedError
 
     def _drain(self) -> None:
-        """What is left in buffers goes nowhere, or Python would try again as it ends."""
+        """Discard buffers, or Python would try to write them again at exit."""
         with suppress(OSError, AttributeError):
             if self._stream is not None and self._stream.fileno() == self._number:
                 nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -71,7 +71,7 @@ class _Progress(_Stream):
 
 @contextmanager
 def guarded() -> Iterator[None]:
-    """Within, stdout raises OutputError where it cannot be written, and stderr never raises."""
+    """Within, stdout raises OutputError if it cannot be written, and stderr never raises."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = _OutputStream(sys.stdout, 1), _Progress(sys.stderr, 2)
     try:
@@ -81,10 +81,10 @@ def guarded() -> Iterator[None]:
 
 
 def prepare() -> None:
-    """Open what was closed of the first three descriptors, and let all letters be printed.
+    """Open those of the first three descriptors that are closed, and make all letters printable.
 
-    A file would get one of their numbers, and what libraries print would be written into it.
-    Letters that the encoding of stdout lacks are written as their codes.
+    Otherwise a file would get one of their numbers, and output of libraries would be written into
+    it. Letters missing from the encoding of stdout are written as their codes.
     """
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")

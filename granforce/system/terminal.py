@@ -1,4 +1,4 @@
-"""What commands print: reports and tables on stdout, progress on stderr."""
+"""Output of commands: reports and tables on stdout, progress on stderr."""
 
 import math
 import sys
@@ -58,22 +58,22 @@ def one_line(
     lineno: int,
     line: str | None = None,
 ) -> str:
-    """A warning as one line without the place in the code, for warnings.formatwarning."""
+    """A warning as one line without its place in the code, for warnings.formatwarning."""
     return f"{Bar.line_end()}granforce: {' '.join(str(message).split())}\n"
 
 
 class Bar:
-    """A tqdm bar on stderr that a progress(done, total) callable drives; unseen when not used."""
+    """A tqdm bar on stderr that a progress(done, total) callable drives; invisible until used."""
 
     _drawn: ClassVar[set[int]] = set()  # those whose line has not ended
 
     @classmethod
     def line_end(cls) -> str:
-        """What goes before another line: the end of the line of a bar, if there is one."""
+        """The end of an unfinished line of a bar, or an empty string."""
         return "\n" if cls._drawn else ""
 
     def __init__(self, label: str, unit: str) -> None:
-        # Made at once, so that its rate counts from the beginning, and shown from the first call.
+        # Created now, so that its rate counts from the beginning, and shown at the first call.
         self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, delay=math.inf)
 
     def __enter__(self) -> Self:
@@ -84,13 +84,13 @@ class Bar:
         self._drawn.discard(id(self))
 
     def __call__(self, done: float, total: float | None) -> None:
-        """So much is done of a total, if that is known."""
+        """Set the progress; total may be unknown (None)."""
         self._drawn.add(id(self))
         self.bar.delay, self.bar.total = 0, total
-        # Set, not added: quarters of cells would leave whole numbers as 2.0.
+        # Set, not added: quarters of cells would turn integers into 2.0.
         self.bar.n = int(done) if done == int(done) else done
         self.bar.update(0)
 
     def note(self, text: str) -> None:
-        """What stands behind the bar when it is next drawn."""
+        """Set the text after the bar when it is next drawn."""
         self.bar.set_postfix_str(text, refresh=False)

@@ -1,4 +1,4 @@
-"""The commands, by what they are about: each takes its arguments, and may return an exit code."""
+"""The commands, by subject: each takes its arguments and may return an exit code."""
 
 from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
 from granforce.cli.commands.inference import infer, informative

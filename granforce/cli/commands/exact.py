@@ -1,4 +1,4 @@
-"""Exact answers: intervals, limit loads, stresses, and what one contact takes."""
+"""Exact results: intervals, limit loads, stresses, and critical forces of contacts."""
 
 import argparse
 import json
@@ -24,7 +24,7 @@ from granforce.system.terminal import print_report
 
 
 def perturb(arguments: argparse.Namespace) -> None:
-    """Critical forces and first motions of contacts, computed or found; report them."""
+    """Compute or load critical forces and first motions of contacts, and report them."""
     chosen = numbers("--contacts", arguments.contacts, int)
     _, _, dataset, ends = found(
         *(arguments, kinds.PERTURBATION, arguments.out),
@@ -72,7 +72,7 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[
 
 
 def intervals(arguments: argparse.Namespace) -> None:
-    """Exact intervals, computed or found; report them."""
+    """Compute or load exact intervals, and report them."""
     dataset, ends = _exact(arguments, kinds.INTERVALS)
     forces = unit(arguments, dataset)
     position = dataset["position"].values
@@ -104,7 +104,7 @@ def intervals(arguments: argparse.Namespace) -> None:
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
-    """Limit loads, computed or found; report them."""
+    """Compute or load limit loads, and report them."""
     dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
     forces, load = unit(arguments, dataset), dataset["limit_load"].values
     reported = {
@@ -127,7 +127,7 @@ def limit_loads(arguments: argparse.Namespace) -> None:
 
 
 def stress(arguments: argparse.Namespace) -> None:
-    """The outline of stresses, computed or found; report it."""
+    """Compute or load the outline of stresses, and report it."""
     asked = {"angles": arguments.angles, **known_forces(arguments)}
     _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **asked)
     own = dataset["stress_own"].values

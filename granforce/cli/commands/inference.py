@@ -1,4 +1,4 @@
-"""Forces that were measured."""
+"""Commands for measured forces."""
 
 import argparse
 
@@ -20,7 +20,7 @@ INFERENCE_LINES = (
 
 
 def informative(arguments: argparse.Namespace) -> None:
-    """Contacts worth measuring, ranked or found; report them. Intervals are in ⟨f_n⟩."""
+    """Rank contacts worth measuring, or load the ranking, and report them; intervals in ⟨f_n⟩."""
     entry, _, dataset, ends = found(
         *(arguments, kinds.INFORMATIVE, arguments.out),
         k=arguments.best,
@@ -47,7 +47,7 @@ def informative(arguments: argparse.Namespace) -> None:
 
 
 def infer(arguments: argparse.Namespace) -> int | None:
-    """The likeliest network of measured forces, with error bars if wanted; report it."""
+    """Report the likeliest network of measured forces, with error bars on request."""
     if arguments.frames is not None:
         options = flaws_and_walls(arguments) | {"columns": named_columns(arguments)}
         return frames.infer_frames(arguments, options)

@@ -1,4 +1,4 @@
-"""Packings: made, or from elsewhere."""
+"""Commands that make, import and export packings."""
 
 import argparse
 import sys
@@ -28,7 +28,7 @@ from granforce.system.terminal import print_report
 
 
 def pack(arguments: argparse.Namespace) -> None:
-    """Make or find a packing, or a scene; report it."""
+    """Make or load a packing or a scene, and report it."""
     if arguments.scene is not None:
         return _scene(arguments)
     parameters = packing_parameters(arguments, required_mu(arguments), arguments.seed)
@@ -43,7 +43,7 @@ def pack(arguments: argparse.Namespace) -> None:
 
 
 def _report(lines: Mapping[str, Any], packing: Packing, arguments: argparse.Namespace) -> None:
-    """Save a packing where it is wanted, then report it: that, too, where it cannot be saved."""
+    """Save a packing if requested, then report it, even if it could not be saved."""
     try:
         if arguments.out is not None:
             importers.save_packing(packing, arguments.out)
@@ -57,25 +57,25 @@ def _scene(arguments: argparse.Namespace) -> None:
     _report({"scene": arguments.scene, **importers.report(packing)}, packing, arguments)
 
 
-# What reads each format; pegs gives more than a packing.
+# Reader of each format; that of pegs returns more than a packing.
 READERS: dict[str, Callable[..., Packing]] = {
     "lammps": importers.read_lammps,
     "yade": importers.read_yade,
     "mercury": importers.read_mercury,
     "table": importers.read_table,
 }
-# What opens formats of many snapshots.
+# Functions that open formats with many snapshots.
 OPENERS: dict[str, Callable[..., Snapshots]] = {
     "lammps": importers.open_lammps,
     "mercury": importers.open_mercury,
 }
-# What of the arguments is not an option of a reader.
+# Arguments that are not options of a reader.
 _NO_OPTIONS = ("command", "format", "run", "json", "grains", "contacts", "out")
 _NO_OPTIONS += ("frames", "states", "walk_seed", "csv", "workers", "scheduler", "cache")
 
 
 def import_(arguments: argparse.Namespace) -> int | None:
-    """Read a packing from elsewhere, or many; report and save. Returns 1 if one of many failed."""
+    """Import one packing or many, report and save. Returns 1 if one of many failed."""
     if getattr(arguments, "frames", None) is None:
         check_outputs(arguments.out)
     if arguments.format == "pegs":
@@ -100,7 +100,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:
-    """Read a photoelastic frame; report and save it, and what was measured."""
+    """Import a photoelastic frame; report and save it with its measured forces."""
     check_outputs(arguments.measured)
     found = read_pegs(
         *(arguments.grains, arguments.contacts),
@@ -120,19 +120,19 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
 
 
 def named_columns(arguments: argparse.Namespace) -> dict[str, str] | None:
-    """What columns are called in the files, as the options say it."""
+    """The names of columns in the files, from the options."""
     return None if arguments.columns is None else importers.read_columns(arguments.columns)
 
 
 def export(arguments: argparse.Namespace) -> None:
-    """Write a packing as files of other programs."""
+    """Write a packing in a format of other programs."""
     check_outputs(arguments.grains, arguments.contacts)
     packing = importers.load_packing(arguments.packing)
     exporters.export(packing, arguments.grains, arguments.contacts)
 
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the options say of flaws and walls, as `read_pegs` takes it."""
+    """The options on repair and walls, as arguments of `read_pegs`."""
     repair = True if arguments.repair is None else arguments.repair
     forces = dict(read_wall_force(text) for text in arguments.wall_force)
     return {

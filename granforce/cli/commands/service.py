@@ -1,4 +1,4 @@
-"""The study, the page, the documentation, the benchmark and the store."""
+"""The study, the app, the documentation, the benchmark and the store."""
 
 import argparse
 import glob
@@ -28,14 +28,14 @@ from granforce.system.terminal import print_list, print_report
 
 
 def study_(arguments: argparse.Namespace) -> int:
-    """The study of the paper. Returns 1 if a cell failed."""
+    """Run the paper's study. Returns 1 if a cell failed."""
     from granforce.paper.main import main
 
     return main(arguments)
 
 
 def app(arguments: argparse.Namespace) -> None:
-    """The page, served by `panel serve` in this process until it is interrupted."""
+    """Serve the app by `panel serve` in this process until interrupted."""
     port = whole(arguments.port, "--port", 0, 65_535)
     for origin in arguments.allow_websocket_origin:
         if not re.fullmatch(r"[^\s:/,]+(:\d{1,5})?", origin):
@@ -55,7 +55,7 @@ def app(arguments: argparse.Namespace) -> None:
 
 
 def _page() -> Path:
-    """The page's folder: inside the installed package, beside it in a checkout."""
+    """The app's folder: inside the installed package, or next to it in a clone."""
     package = Path(__file__).resolve().parents[2]
     for folder in (package / "app", package.parent / "app"):
         if (folder / "main.py").is_file():
@@ -64,7 +64,7 @@ def _page() -> Path:
 
 
 def _check_address(address: str, port: int) -> None:
-    """InputError where nothing can listen there, or something listens already."""
+    """InputError if the address cannot be used, or is already in use."""
     if not address.strip():
         raise InputError("--address is empty; give a name or a number, such as localhost")
     try:
@@ -72,7 +72,7 @@ def _check_address(address: str, port: int) -> None:
         with socket.socket(family, kind) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
-    except (OSError, ValueError) as error:  # ValueError: what cannot be a name at all
+    except (OSError, ValueError) as error:  # ValueError: not a valid name
         reason = getattr(error, "strerror", None) or "no such name"
         raise InputError(
             f"cannot listen at {address[:40]!r}, port {port}: {reason}; choose another with "
@@ -81,7 +81,7 @@ def _check_address(address: str, port: int) -> None:
 
 
 def docs(arguments: argparse.Namespace) -> None:
-    """Build the documentation; without a folder for it, serve it until interrupted."""
+    """Build the documentation; without a target folder, serve it until interrupted."""
     if importlib.util.find_spec("mkdocs") is None:
         raise InputError("the documentation needs more packages: pip install 'granforce[docs]'")
     if arguments.out:
@@ -93,7 +93,7 @@ def docs(arguments: argparse.Namespace) -> None:
         return
     folder = make_folder(platformdirs.user_cache_path("granforce")) / "docs"
     _build_docs(folder)
-    # Over HTTP, as browsers run no search in pages that are opened from files.
+    # Over HTTP, because browsers do not run the search in pages opened from files.
     handler = partial(_QuietHandler, directory=str(folder))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         address = f"http://127.0.0.1:{server.server_address[1]}/index.html"
@@ -120,7 +120,7 @@ class _QuietHandler(http.server.SimpleHTTPRequestHandler):
 
 
 def completion(arguments: argparse.Namespace) -> None:
-    """The script with which a shell completes what is typed."""
+    """Print the script for completion in a shell."""
     import shtab
 
     from granforce.cli.words import make_parser
@@ -135,7 +135,7 @@ def completion(arguments: argparse.Namespace) -> None:
 
 
 def bench(arguments: argparse.Namespace) -> None:
-    """The benchmark's report."""
+    """Print the benchmark's report."""
     from granforce.bench import main
 
     main(arguments.out, arguments.quick, arguments.json)
@@ -147,7 +147,7 @@ def cache(arguments: argparse.Namespace) -> int:
         path = str(open_store(arguments.cache).path)
         print(json_text({"path": path}) if arguments.json else path)
         return 0
-    store = open_store(arguments.cache, readonly=True)  # which makes none where there is none
+    store = open_store(arguments.cache, readonly=True)  # readonly: does not create a missing store
     if arguments.kind is not None:
         _check_kind(store, arguments.kind)
     if arguments.action == "clear":
@@ -178,7 +178,7 @@ def cache(arguments: argparse.Namespace) -> int:
 
 
 def _check_kind(store: Store, kind: str) -> None:
-    """InputError for what is no kind of result, nor begins the name of an entry of others."""
+    """InputError for a name that is neither a kind of result nor the beginning of other entries."""
     if kind not in kinds.KINDS and not any(store.path.glob(f"{glob.escape(kind)}-*")):
         raise InputError(
             f"no kind of results is called {kind[:40]!r}; there are {', '.join(kinds.KINDS)}"

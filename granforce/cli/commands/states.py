@@ -30,7 +30,7 @@ from granforce.types import Rows
 
 
 def walk(arguments: argparse.Namespace) -> None:
-    """Random walk, made or found; report how it went."""
+    """Make or load a random walk, and report its course."""
     entry, parameters, dataset, ends = walked(arguments, arguments.out)
     write_states(arguments, parameters, dataset)
     lines = {
@@ -53,7 +53,7 @@ UNIFORM_LINES = (
 
 
 def uniform(arguments: argparse.Namespace) -> int:
-    """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
+    """Draw or load a uniform sample and report it. Returns 1 if it missed the requested size."""
     entry, parameters, dataset, ends = found(
         *(arguments, kinds.UNIFORM, arguments.out),
         states=arguments.states,
@@ -83,7 +83,7 @@ def uniform(arguments: argparse.Namespace) -> int:
 
 
 def volume(arguments: argparse.Namespace) -> int:
-    """The volume of S, measured or found; report it. Returns 1 if it is not as sure as wanted."""
+    """Compute or load the volume of S and report it. Returns 1 if its error is too large."""
     asked = {"accuracy": arguments.accuracy, "seed": arguments.volume_seed, **conditions(arguments)}
     entry, _, dataset, ends = found(arguments, kinds.VOLUME, **asked)
     down, up = dataset["log_volume_ladders"].values
@@ -106,7 +106,7 @@ def volume(arguments: argparse.Namespace) -> int:
 
 
 def measure(arguments: argparse.Namespace) -> None:
-    """Measures of a walk, made or found."""
+    """Measures of a walk, made or loaded."""
     _, parameters, dataset, _ = walked(arguments, arguments.contacts)
     forces = unit(arguments, dataset)
     names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
@@ -132,7 +132,7 @@ def measure(arguments: argparse.Namespace) -> None:
 
 
 def scan(arguments: argparse.Namespace) -> int:
-    """Cells over processes into a store; print their table. Returns 1 if a cell failed."""
+    """Compute cells by processes into a store; print their table. Returns 1 if a cell failed."""
     mus = numbers("--mu", arguments.mu, float) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     worker_count(arguments.workers, "--workers")
@@ -165,7 +165,7 @@ def scan(arguments: argparse.Namespace) -> int:
 
 
 def figures(arguments: argparse.Namespace) -> None:
-    """Figure 1 from the store of a scan."""
+    """Draw Figure 1 from the store of a scan."""
     from granforce.figures import indeterminacy, save
 
     backend = "bokeh" if arguments.out.endswith(".html") else "matplotlib"
