@@ -14,8 +14,8 @@ __version__ = "0.2.0"
 
 _find_a_place()
 
-# Names are looked up on first use, so that `granforce --help` need not load numba and HiGHS. A
-# function and the record it returns have the same home.
+# Names are looked up on first use, so that `granforce --help` does not load numba and HiGHS. A
+# function and the record it returns come from the same module.
 _HOME = {
     "Cancelled": "records",
     "Cell": "cell",

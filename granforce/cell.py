@@ -14,7 +14,7 @@ class Cell(NamedTuple):
     """The periodic cell, spanned by a = (L_x, 0) and b = (tilt, L_y); tilt is LAMMPS' ``xy``."""
 
     box: Floats  # (2,) L_x, L_y, length; inf in an open direction
-    tilt: float  # x component of b, length; 0 where a direction is open
+    tilt: float  # x component of b, length; 0 if a direction is open
 
     @property
     def vectors(self) -> Floats:
@@ -24,25 +24,25 @@ class Cell(NamedTuple):
 
     @property
     def heights(self) -> Floats:
-        """Distances (2,) between the sides that face each other along a and b; inf where open."""
+        """Distances (2,) between opposite sides along a and b; inf in open directions."""
         if not self.tilt:
             return self.box
         return self.box * [self.box[1] / np.hypot(self.tilt, self.box[1]), 1.0]
 
     @property
     def corners(self) -> Floats:
-        """Corners (5, 2) of the parallelogram, back to the first; needs both sides periodic."""
+        """Corners (5, 2) of the parallelogram, back to the first; both sides must be periodic."""
         return np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]) @ self.vectors
 
     @property
     def extent(self) -> Floats:
-        """Lower left and upper right corner (2, 2) around the parallelogram; inf where open."""
+        """Lower left and upper right corners (2, 2) of the bounding box; inf in open directions."""
         lean = np.array([self.tilt, 0.0])
         return np.array([np.minimum(lean, 0.0), self.box + np.maximum(lean, 0.0)])
 
     @property
     def shortest(self) -> float:
-        """Distance of a point from its nearest own image; inf without one."""
+        """Distance of a point from its own nearest image; inf without an image."""
         return float(np.linalg.norm(self.reduced[0]) if self.tilt else self.box.min())
 
     @property
@@ -54,12 +54,12 @@ class Cell(NamedTuple):
         return np.array([short, long])
 
     def parts(self, x: Floats) -> Floats:
-        """Points (…, 2) as parts of a and b, from 0 to 1 inside; needs both directions periodic."""
+        """Points (…, 2) in fractions of a and b, from 0 to 1 inside; both must be periodic."""
         up = x[..., 1] / self.box[1]
         return np.stack([(x[..., 0] - self.tilt * up) / self.box[0], up], axis=-1)
 
     def across(self, x: Floats) -> Floats:
-        """Distances (…, 2) of points from the sides b and a; x and y themselves where straight."""
+        """Distances (…, 2) of points from the sides b and a; equal to x and y without tilt."""
         if not self.tilt:
             return np.array(x, dtype=np.float64)
         return self.parts(x) * self.heights
@@ -67,10 +67,11 @@ class Cell(NamedTuple):
     def images(
         self, low: Floats, high: Floats, margin: float = 0.0
     ) -> Iterator[tuple[Floats, Integers]]:
-        """Which images of what reaches from low to high (k, 2), told as `across`, are in the cell.
+        """Yield the images that are in the cell, for things that extend from low to high (k, 2).
 
-        margin: width of a strip around the cell that counts as well. Yields vectors (2,) of whole
-        cells, and the rows (m,) of which the image by that vector is seen.
+        low and high are in the coordinates of `across`. margin: width of a strip around the cell
+        that also counts. Yields vectors (2,) of whole cells, and the rows (m,) whose image by that
+        vector is in the cell.
         """
         periodic = np.isfinite(self.box)
         side = np.where(periodic, self.heights, 1.0)
@@ -83,7 +84,7 @@ class Cell(NamedTuple):
             yield step @ self.vectors, np.flatnonzero(np.all(seen | ~periodic, axis=1))
 
     def wrapped(self, x: npt.ArrayLike) -> Floats:
-        """Points (…, 2) at their image in the parallelogram of a and b, as they are along open."""
+        """Points (…, 2) at their image in the parallelogram, unchanged in open directions."""
         found = np.array(x, dtype=np.float64)
         lean = np.zeros(found.shape[:-1])
         if np.isfinite(self.box[1]):
@@ -104,8 +105,8 @@ class Cell(NamedTuple):
             periodic = np.isfinite(self.box)
             side = np.where(periodic, self.box, 1.0)
             return branch - np.where(periodic, side * np.round(branch / side), 0.0)
-        # Between the two shortest vectors the angle is 60° or more: from the rounded image, the
-        # shortest is at most one step away along each.
+        # The angle between the two shortest vectors is 60° or more: the shortest image is at most
+        # one step along each from the rounded one.
         short = self.reduced
         branch = branch - np.round(branch @ np.linalg.inv(short)) @ short
         steps = [(0, 0), *(s for s in itertools.product((-1, 0, 1), repeat=2) if any(s))]
@@ -115,6 +116,6 @@ class Cell(NamedTuple):
 
 
 def _remainder(values: Floats, side: float) -> Floats:
-    """Numbers modulo a side, in [0, side): a tiny negative number plus the side rounds to it."""
+    """Numbers modulo a side, in [0, side), even if a tiny negative one rounds to the side."""
     left = np.mod(values, side)
     return np.where(left >= side, 0.0, left)

@@ -1,6 +1,6 @@
-"""The glossary: every symbol and every choice in a sentence or two, in everyday words.
+"""The glossary: every symbol and every option in a sentence or two, in everyday words.
 
-The page shows these where a word stands, notebooks beside the names of their tables, the README
+The app shows these next to a word, notebooks next to the names in tables, and the documentation
 lists the symbols. Plain text; nothing is imported.
 """
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Term(NamedTuple):
-    """A word, its symbol where it has one, and what it means."""
+    """A word, its symbol if it has one, and its meaning."""
 
     word: str
     sentence: str
@@ -16,7 +16,7 @@ class Term(NamedTuple):
 
 
 TERMS = {
-    # What everything is about
+    # The subject
     "packing": Term(
         "packing",
         "Rigid disks compressed until they jam. They never move here: every network is another "
@@ -181,7 +181,7 @@ TERMS = {
         "nothing about its extent.",
         "corr(fₙ, ΔFₙ)",
     ),
-    # Kinds of knowing
+    # Kinds of knowledge
     "exact": Term(
         "possible (exact)",
         "All values that a contact's force can take: bounds over all of S, computed and certified.",
@@ -234,7 +234,7 @@ TERMS = {
         "is drawn on both sides, so there are more lines than contacts.",
     ),
     "backbone": Term("backbone", "The disks and contacts that can carry a force."),
-    # Where states come from
+    # Sources of states
     "walk": Term(
         "the paper's random walk",
         "At each step, all forces are kicked at random and then brought back into balance. Most "
@@ -264,7 +264,7 @@ TERMS = {
         "After a kick, contacts are adjusted one by one, again and again (Gauss–Seidel), until "
         "all disks are in balance, as in the paper: slow, and some attempts fail.",
     ),
-    # What colours, widths and orders show
+    # Meanings of colours, widths and orders
     "change": Term(
         "change from the forces as packed",
         "Orange contacts carry more than when the disks came to rest, blue ones less.",
@@ -321,7 +321,7 @@ TERMS = {
         "directions; the distance from there is the largest shear stress over P.",
     ),
     "outline": Term("outline", "The edge of the shadow of S: no balanced network lies outside."),
-    # Doing
+    # Actions
     "push": Term(
         "push a contact",
         "Two opposite forces push the disks of one contact apart, growing until the packing "
@@ -350,5 +350,5 @@ TERMS = {
 
 
 def title(key: str) -> str:
-    """A term as it is named: "friction coefficient μ"."""
+    """A term with its symbol: "friction coefficient μ"."""
     return f"{TERMS[key].word} {TERMS[key].symbol}".strip()

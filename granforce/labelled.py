@@ -16,8 +16,8 @@ _SAMPLE = {
     "flat": "state contact component",
     "chain": "state",
 }
-# Dimensions of the arrays of each kind of result, by the name of its type. What a result holds for
-# its contacts only is labelled with their numbers.
+# Dimensions of the arrays of each kind of result, by the name of its type. Arrays over only the
+# contacts of a result are labelled with their numbers.
 _DIMENSIONS = {
     "Packing": {
         "forces": "contact component",
@@ -97,7 +97,7 @@ class _CriticalForces(NamedTuple):
 
 
 def _several(result: Any) -> Any:
-    """A list of critical forces as one result; others as they are."""
+    """A list of critical forces as one result; other results unchanged."""
     critical = isinstance(result, list) and result
     if not critical or any(type(one).__name__ != "CriticalForce" for one in result):
         return result
@@ -107,7 +107,7 @@ def _several(result: Any) -> Any:
 
 
 def _arrays(result: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The arrays of a result; those of an outline, inner and outer corners, as one."""
+    """The arrays of a result; the inner and outer corners of an outline are joined."""
     if type(result).__name__ == "Outline":
         return {"corners": np.concatenate([result.inner, result.outer])}
     return {name: getattr(result, name) for name in names}
@@ -116,15 +116,15 @@ def _arrays(result: Any, names: Sequence[str]) -> dict[str, Any]:
 def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
 
-    result: a Packing, a record that `intervals`, `walk` and others return, the list of
+    result: a Packing, a record returned by `intervals`, `walk` and others, the list from
     `critical_forces`, networks (N_c, 2), (S, N_c, 2) or (chains, S, N_c, 2), or a number per
     contact (N_c,), such as limit loads of all of S. ensemble: of the result, not needed for a
     Packing, Volume or Outline. Coordinates: contact, its number in the packing; i and j, its
     grains; x and y, the point of contact, length; component, "f_n" or "f_t"; polygon, "inner" or
-    "outer" of an outline's corners. Forces are in the packing's unit. Numbers and texts of the
+    "outer" for an outline's corners. Forces are in the packing's unit. Numbers and texts of the
     record become attributes.
 
-    Raises InputError for anything else, and where the ensemble is missing or another one's.
+    Raises InputError for anything else, and if the ensemble is missing or does not match.
     """
     result = _several(result)
     if isinstance(result, np.ndarray) and result.ndim == 1:
@@ -158,10 +158,10 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
 def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
     """The same as a pandas table: a row for each contact, or for each contact in each state.
 
-    Columns: contact, i, j, x, y, then f_n and f_t of networks, and of others with their name:
-    low_f_n, high_f_t; forces in the packing's unit. Of a Volume there is a row for each ladder, of
-    an Outline for each corner, of a Body for each contact along each direction. Arguments and
-    errors as for `to_dataset`.
+    Columns: contact, i, j, x, y, then f_n and f_t for networks, and with a prefix for other arrays:
+    low_f_n, high_f_t; forces in the packing's unit. A Volume has a row for each ladder, an Outline
+    for each corner, a Body for each contact along each direction. Arguments and errors as for
+    `to_dataset`.
     """
     dataset = to_dataset(result, ensemble)
     if "contact" not in dataset.sizes:
@@ -214,7 +214,7 @@ def _contact_labels(packing: Packing, contacts: Integers) -> dict[str, Any]:
 
 
 def _labels(result: Any) -> dict[str, Any]:
-    """Labels of all dimensions but contacts."""
+    """Labels of all dimensions except contacts."""
     labels: dict[str, Any] = {
         "component": COMPONENTS,
         "side": ["low", "high"],

@@ -1,6 +1,6 @@
-"""How records show themselves in a notebook: a packing as a picture (SVG), others as small tables.
+"""The display of records in notebooks: a packing as a picture (SVG), others as small tables.
 
-Plain arrays and numbers in, text out: every room may use this, and it needs no plotting library.
+Plain arrays and numbers in, text out: every package may use this; it needs no plotting library.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from granforce.types import Floats, Integers
 T = TypeVar("T")
 
 SIDE = 420  # of the picture, pixels
-LINE = 16  # height of a line of words below it, pixels
-# Beyond so many disks they are not outlined, and only so many contacts, the strongest, are drawn.
+LINE = 16  # height of a line of text below it, pixels
+# In larger packings disks are not outlined, and only this many of the strongest contacts are drawn.
 MOST_DRAWN = 20_000
 THICKEST = 5.0  # width of a contact that carries WIDE ⟨f_n⟩ or more, in 1/100 of the picture
 WIDE = 4.0
@@ -58,7 +58,7 @@ def _short(record: Any) -> str:
 def table(title: str, lines: Mapping[str, Any]) -> str:
     """A small HTML table: lines {name: value}, numbers rounded to four digits.
 
-    What a name means is told under the pointer, where the glossary has it.
+    Names that are in the glossary show their meaning on hover.
     """
     rows = "".join(
         f'<tr><td style="text-align:left"{_hint(name)}>{escape(name)}</td>'
@@ -85,7 +85,7 @@ def _text(value: Any) -> str:
 
 
 class Picture(NamedTuple):
-    """What a picture of a packing shows, as arrays."""
+    """The contents of a picture of a packing, as arrays."""
 
     cell: Cell
     x: Floats  # (N, 2) centres, length
@@ -126,7 +126,7 @@ def packing_svg(packing: Picture) -> str:
 
 
 def _window(packing: Picture) -> tuple[Floats, Floats]:
-    """Lower left corner (2,) and sides (2,) of what is drawn: the cell, or the disks where open."""
+    """Lower left corner (2,) and sides (2,) of the picture: the cell, or the disks if open."""
     if not len(packing.r):
         return np.zeros(2), np.ones(2)
     low = (packing.x - packing.r[:, None]).min(axis=0)
@@ -138,11 +138,11 @@ def _window(packing: Picture) -> tuple[Floats, Floats]:
 
 
 def _cut(packing: Picture, place: Callable[[Floats], Floats], drawn: list[str]) -> list[str]:
-    """What is drawn, cut at the sides of a tilted cell, and those sides."""
+    """Draw inside a tilted cell only, and add its sides."""
     if not packing.cell.tilt:
         return drawn
     outline = " ".join(f"{a:.1f},{b:.1f}" for a, b in place(packing.cell.corners[:4]))
-    # Named by its shape: pictures of one document that share a name share the shape.
+    # Named by its shape: pictures in one document that share a name share the shape.
     name = "cell-" + outline.replace(" ", "-").replace(",", "-")
     return [
         f'<clipPath id="{name}"><polygon points="{outline}"/></clipPath>',
@@ -169,7 +169,7 @@ def _disks(
 def _chains(
     packing: Picture, place: Callable[[Floats], Floats], x: Floats, scale: float
 ) -> Iterator[str]:
-    """Contacts that press, as lines between centres: one path for each width and colour."""
+    """Pressing contacts as lines between centres: one path for each width and colour."""
     normal, tangential = packing.forces.T
     pressing = np.flatnonzero(normal > 0)
     if not len(pressing):

@@ -1,7 +1,7 @@
-"""The records that the parts of granforce hand to each other: named tuples of arrays.
+"""The records that the parts of granforce exchange: named tuples of arrays.
 
-Units: length = largest radius, pressure = P0, mass density = 1; nothing depends on them except by
-scaling, so any consistent units will do for packings from elsewhere.
+Units: length = largest radius, pressure = P0, mass density = 1. Results depend on them only by
+scaling, so any consistent units work for imported packings.
 Signs: **n** points from grain i to grain j, **t** = (−n_y, n_x); the force on j from i is
 f_n n + f_t t, and f_n ≥ 0 presses.
 """
@@ -27,19 +27,19 @@ from granforce.tolerances import (
 )
 from granforce.types import Floats, Integers, Mask
 
-# Whole numbers up to here are exact in kernels, in JSON and in floats alike.
+# Integers up to here are exact in kernels, in JSON and as floats.
 LARGEST_WHOLE = 2**53
-# More threads, or processes, than any machine has.
+# More threads, or processes, than any machine can run.
 MOST_WORKERS = 4096
 
 P = ParamSpec("P")
 T = TypeVar("T")
-# What arrays may hold instead of real numbers, by numpy's letters.
+# Kinds of array elements that are not real numbers, by numpy's letters.
 _KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "text", "V": "records"}
 
 
 class InputError(ValueError):
-    """What was given cannot be used; the message says what is wrong and what to do, in one line."""
+    """Input cannot be used; the message says in one line what is wrong and what to do."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
@@ -50,11 +50,11 @@ class NotJammedError(InputError):
 
 
 class UndecidedError(InputError):
-    """Solvers reached no result that could be checked: nothing is known either way."""
+    """Solvers reached no result that could be verified: the question is open."""
 
 
 class Cancelled(Exception):
-    """The work was cancelled on request; nothing was kept of the unit under way."""
+    """The work was cancelled on request; the current unit of work is lost."""
 
 
 @notebook.brief
@@ -65,7 +65,7 @@ class Contacts(NamedTuple):
     j: Integers  # (N_c,) second grain
     normal: Floats  # (N_c, 2) unit vector n from i to j
     length: Floats  # (N_c,) centre distance ℓ
-    gap: Floats  # (N_c,) ℓ − r_i − r_j, negative where grains overlap
+    gap: Floats  # (N_c,) ℓ − r_i − r_j, negative if grains overlap
     arm_i: Floats  # (N_c,) lever arm a_i from the centre of i to the contact point
     arm_j: Floats  # (N_c,) lever arm a_j
 
@@ -88,10 +88,10 @@ class Packing(NamedTuple):
     contacts: Contacts
     forces: Floats  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
     mu: float  # friction coefficient μ
-    pressure: float  # P0, force per length; nan where no pressure is prescribed
+    pressure: float  # P0, force per length; nan if no pressure is prescribed
     load: Floats  # (N, 3) external force and torque on each grain; NaN: its balance is left open
-    info: dict[str, Any]  # how it was made: seed, steps, skipped work, … (plain values)
-    tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 where a direction is open
+    info: dict[str, Any]  # origin: seed, steps, skipped work, … (plain values)
+    tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 if a direction is open
 
     @property
     def cell(self) -> Cell:
@@ -111,11 +111,11 @@ class Packing(NamedTuple):
 
     @property
     def packing_fraction(self) -> float:
-        """φ = Σ π r² / V, rattlers included; NaN where the box is open."""
+        """φ = Σ π r² / V, including rattlers; NaN in an open box."""
         return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan
 
     def _repr_svg_(self) -> str:
-        """The packing as notebooks show it."""
+        """The packing as displayed in notebooks."""
         contacts = self.contacts
         return notebook.packing_svg(
             notebook.Picture(
@@ -133,7 +133,7 @@ class Packing(NamedTuple):
 
 @notebook.brief
 class Relaxation(NamedTuple):
-    """What a relaxation solver reached."""
+    """The result of a relaxation solver."""
 
     forces: Floats  # (N_c, 2)
     iterations: int  # sweeps or iterations used
@@ -143,7 +143,7 @@ class Relaxation(NamedTuple):
     seconds: float  # wall time
 
 
-# The call that makes what a function takes first.
+# The call that makes the first argument of a function.
 _MADE_BY = {
     "Ensemble": "S = gf.ensemble(packing)",
     "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
@@ -151,9 +151,9 @@ _MADE_BY = {
 
 
 def takes(kind: type) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """A decorator: the function raises InputError unless its first argument is of this kind.
+    """A decorator: the function raises InputError unless its first argument has this type.
 
-    The message names the call that makes one.
+    The message names the call that makes such an object.
     """
 
     def checked(function: Callable[P, T]) -> Callable[P, T]:
@@ -177,7 +177,7 @@ def takes(kind: type) -> Callable[[Callable[P, T]], Callable[P, T]]:
 
 
 def refuse_hidden(values: T, name: str) -> T:
-    """The values themselves, unless a cast to floats would change them in silence.
+    """The values themselves, unless a cast to floats would silently change them.
 
     Raises InputError naming the array for masked values, imaginary parts, dates, and text.
     """
@@ -193,9 +193,9 @@ def refuse_hidden(values: T, name: str) -> T:
 
 
 def real_array(values: npt.ArrayLike, name: str) -> Floats:
-    """A contiguous float64 array of its own, of real numbers; NaN and infinity may be among them.
+    """A new contiguous float64 array of real numbers, which may include NaN and infinity.
 
-    Raises InputError as `refuse_hidden`, and for what is no regular array of numbers.
+    Raises InputError as `refuse_hidden`, and for irregular arrays or entries that are not numbers.
     """
     try:
         return np.array(refuse_hidden(values, name), dtype=np.float64, order="C")
@@ -221,7 +221,7 @@ def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
 
 
 def real(value: Any, name: str) -> float:
-    """One real number as a float, NaN and infinity among them; InputError otherwise."""
+    """One real number as a float, which may be NaN or infinity; InputError otherwise."""
     array = real_array(value, name)
     if array.ndim:
         raise InputError(f"{name} must be one number, got {brief(value)}")
@@ -242,14 +242,14 @@ def worker_count(value: Any, name: str = "workers") -> int:
 
 
 def brief(value: Any) -> str:
-    """A value as a message shows it: one line of at most 40 characters."""
+    """A value for a message: one line of at most 40 characters."""
     return " ".join(repr(value).split())[:40]
 
 
 def friction(mu: Any) -> float:
     """μ as a float on the storage grid (15 digits).
 
-    Raises InputError unless it is 0 or lies between 1/LARGEST_UNIT and LARGEST_FRICTION.
+    Raises InputError unless it is 0 or between 1/LARGEST_UNIT and LARGEST_FRICTION.
     """
     try:
         value = float(mu)
@@ -262,11 +262,11 @@ def friction(mu: Any) -> float:
             f"friction coefficient {value:g} is too large for the balance of forces in double "
             f"precision; use at most {LARGEST_FRICTION:g}"
         )
-    if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would leave the doubles
+    if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would overflow
         raise InputError(
             f"friction coefficient {value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
         )
-    return float(f"{abs(value):.{MU_DIGITS}g}")  # of −0, too
+    return float(f"{abs(value):.{MU_DIGITS}g}")  # also for −0
 
 
 def positive(
@@ -303,15 +303,15 @@ def whole(value: Any, name: str, least: int = 0, most: int | None = LARGEST_WHOL
 
 
 def are_whole(values: npt.ArrayLike, most: int = LARGEST_WHOLE) -> Mask:
-    """Mask of values (…) that are whole numbers from 0 to `most`: those that a cast to int keeps.
+    """Mask of values (…) that are integers from 0 to `most`, which a cast to int preserves.
 
-    To be asked before every cast: what int64 cannot hold becomes another number in silence.
+    For use before every cast: numbers too large for int64 would silently become other numbers.
     """
     values = np.asarray(values)
     try:
         with np.errstate(invalid="ignore"):
             return (values >= 0) & (values <= most) & (values % 1 == 0)
-    except TypeError:  # no numbers at all
+    except TypeError:  # not numbers
         return np.zeros(values.shape, dtype=bool)
 
 
@@ -337,10 +337,12 @@ def make_contacts(
     """Contacts from array-likes, cast once.
 
     i, j (N_c,): grains, from 0. normal (N_c, 2): unit vectors from i to j. length (N_c,): centre
-    distances. r (N,): radii. Lever arms are the radii where no contact overlaps by more than
-    RIGID_OVERLAP, and reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
+    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than
+    RIGID_OVERLAP, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
+    disks).
 
-    Raises InputError for grains outside 0 … N − 1, self-contacts, no unit vectors, distances ≤ 0.
+    Raises InputError for grains outside 0 … N − 1, self-contacts, normals of other length,
+    distances ≤ 0.
     """
     r = float_array(r, (-1,), "radii")
     i, j = _numbers_of_grains(i, "i"), _numbers_of_grains(j, "j")
@@ -366,7 +368,7 @@ def make_contacts(
 
 
 def _numbers_of_grains(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
-    """As they are: a cast to floats would round large ones."""
+    """Numbers of grains without a cast to floats, which would round large ones."""
     values = np.asarray(refuse_hidden(values, f"contact list {name}"))
     return real_array(values, f"contact list {name}") if values.dtype.kind == "O" else values
 
@@ -386,14 +388,14 @@ def make_packing(
     """A Packing from array-likes, cast and validated once, all in one system of units.
 
     x (N, 2): centres. r (N,): radii. box: sides (L_x, L_y) of the cell, inf in an open direction;
-    tilt: x component of its second vector. contacts: by `make_contacts`. forces (N_c, 2): f_n, f_t
-    of the network at hand, zeros if there is none. pressure: P0, force per length, NaN where none
-    is prescribed. load (N, 3): external force and torque on each grain, by default none; a row of
-    NaN leaves its balance open. info: plain values, kept with it. A tilt beyond ±L_x/2 becomes the
-    one between them that spans the same lattice.
+    tilt: x component of its second vector. contacts: from `make_contacts`. forces (N_c, 2): f_n,
+    f_t of the packing's network, zeros if there is none. pressure: P0, force per length, NaN if
+    none is prescribed. load (N, 3): external force and torque on each grain, by default none; a row
+    of NaN leaves its balance open. info: plain values to store with the packing. A tilt beyond
+    ±L_x/2 is replaced by the one in this range that spans the same lattice.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, and
-    grains that touch their own images.
+    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, and grains
+    that touch their own images.
     """
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
@@ -418,9 +420,9 @@ def make_packing(
 
 
 def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
-    """A Cell of sides (2,) > 0, inf where open, whose tilt is taken between ±L_x/2.
+    """A Cell of sides (2,) > 0, inf in open directions, with a tilt reduced to ±L_x/2.
 
-    Raises InputError for anything else, and for a tilted cell that is open in a direction.
+    Raises InputError for anything else, and for a tilted cell with an open direction.
     """
     try:
         box = real_array(box, "box")
@@ -447,8 +449,8 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
 def _check_own_images(cell: Cell, diameter: float) -> None:
     if not cell.tilt and np.any(cell.box <= diameter):
         raise InputError(f"box sides must be above the largest diameter, got {cell.box}")
-    # A tilted cell may be lower than a diameter, as its images lie aside; where it is lower than a
-    # radius, every search would go through images by the hundred.
+    # A tilted cell may be lower than a diameter, because its images are displaced sideways; if it
+    # is lower than a radius, every search would visit hundreds of images.
     if cell.tilt and cell.box[1] < diameter / 2:
         raise InputError(
             f"the tilted cell of sides {cell.box} is lower than the largest radius, "
@@ -472,11 +474,11 @@ def _loads(load: npt.ArrayLike, count: int) -> Floats:
 
 
 def repeated(contacts: Contacts) -> tuple[int, int] | None:
-    """The first contact that was given before, behind the one that it repeats; None without any.
+    """The first repeated contact, after the contact that it repeats; None if there is none.
 
-    Two grains touch twice only through different images, whose normals differ by 60° or more. No
-    more than eight directions are 41° (n·n′ = 0.75) apart, so a contact that is the first to repeat
-    one has at most eight of its pair before it.
+    Two grains touch twice only through different images, whose normals differ by 60° or more. At
+    most eight directions are 41° (n·n′ = 0.75) apart, so at most eight contacts of a pair precede
+    its first repetition.
     """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)

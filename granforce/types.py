@@ -1,4 +1,4 @@
-"""Type aliases: what arrays hold, tables, and the callbacks that long computations take.
+"""Type aliases: contents of arrays, tables, and the callbacks of long computations.
 
 Shapes are given in comments and docstrings.
 """
@@ -13,6 +13,6 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.integer[Any]]
 Mask = npt.NDArray[np.bool_]
 
-Rows = Sequence[dict[str, Any]]  # a table: a line is plain values by name
-Progress = Callable[[float, float | None], object]  # progress(done, total), as work goes on
+Rows = Sequence[dict[str, Any]]  # a table: a row is plain values by name
+Progress = Callable[[float, float | None], object]  # progress(done, total), called repeatedly
 Cancel = Callable[[], bool]  # polled; True ends the computation

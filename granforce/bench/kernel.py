@@ -43,7 +43,7 @@ print(2 * 1200**3 / best / 1e9)
 def kernel(
     quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
 ) -> list[dict[str, Any]]:
-    """Rows: Gflop/s of one factorisation, single and in lanes, as a fraction of a dense product."""
+    """Rows: Gflop/s of one factorisation, single and in lanes, and the ratio to a dense product."""
     dense = _dense_product()
     base = ensemble(pack(n, mu, 1))
     rows = []

@@ -1,4 +1,4 @@
-"""What the options ask for: parameters, conditions, and the dataset, found or computed."""
+"""The meaning of options: parameters, conditions, and the dataset, loaded or computed."""
 
 import argparse
 import threading
@@ -36,7 +36,7 @@ def radii(text: str, n: int) -> str | list[float]:
 
 
 def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
-    """The numbers of an option, separated by commas; None where it was not given."""
+    """The numbers of an option, separated by commas; None if it was not given."""
     if text is None:
         return None
     try:
@@ -46,7 +46,7 @@ def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[A
 
 
 def check_outputs(*paths: str | None) -> None:
-    """Files that cannot be written are told before anything is computed."""
+    """InputError for files that cannot be written, before anything is computed."""
     for path in paths:
         if path is not None and path.endswith(".zarr"):
             check_folder(path)
@@ -76,9 +76,9 @@ def required_mu(arguments: argparse.Namespace) -> float:
 
 
 def store_of(arguments: argparse.Namespace) -> Store:
-    """The store of a command, by which it is known at the end whether all results were kept."""
+    """The store of a command; it is remembered, to report results that could not be stored."""
     arguments.store = open_store(arguments.cache)
-    arguments.store.make()  # before anything is computed for it
+    arguments.store.make()  # before any computation
     return arguments.store
 
 
@@ -88,9 +88,9 @@ def prepared(
     name: Callable[[Parameters], Parameters],
     *outputs: str | None,
 ) -> tuple[Store, Parameters]:
-    """The store, with the packing in it, and the parameters that name(packing's) gives.
+    """The store, containing the packing, and the parameters name(its parameters).
 
-    Everything that can be told from the command line alone is told before a packing is made.
+    All errors that the command line alone can show are raised before a packing is made.
     """
     worker_count(arguments.workers, "--workers")
     if arguments.packing is None:
@@ -111,7 +111,7 @@ def prepared(
 
 
 def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
-    """The packing of these parameters, made or found, and whether it was found."""
+    """The packing of these parameters, made or loaded, and whether it was loaded."""
     with Bar(kinds.PACKING.title, kinds.PACKING.unit) as progress:
 
         def watch(glimpse: Any) -> None:
@@ -121,12 +121,12 @@ def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[P
 
 
 class StoredResult(NamedTuple):
-    """What a command reports: a result that is kept."""
+    """The result that a command reports."""
 
     entry: str  # its name in the store
     parameters: Parameters
     dataset: xr.Dataset
-    ends: dict[str, Any]  # last lines of the report: what it took, and whether it was there
+    ends: dict[str, Any]  # last lines of the report: cost, and whether it was stored already
 
 
 def found(
@@ -137,10 +137,10 @@ def found(
     options: Any = None,
     **named: Any,
 ) -> StoredResult:
-    """The result of a kind, computed or found; outputs: files that will be written.
+    """The result of a kind, computed or loaded; outputs: files that will be written.
 
-    named: its parameters beside the packing and the friction of the cones. watching(bar): what the
-    kind's compute calls with what it finds, which tells of it on the bar; options: its others.
+    named: its parameters in addition to the packing and the friction of the cones. watching(bar): a
+    callback for the kind's compute that shows progress on the bar; options: its other arguments.
     """
     store, parameters = prepared(
         arguments,
@@ -157,7 +157,7 @@ def found(
 
 
 def telling_eta(bar: Any) -> Callable[[Any], None]:
-    """watch(Found) of a walk: η1 of all states until now stands beside the bar."""
+    """watch(Found) of a walk, which shows η1 of all states so far next to the bar."""
     growth, lock = measures.Growth(), threading.Lock()
 
     def watch(found: Any) -> None:
@@ -168,7 +168,7 @@ def telling_eta(bar: Any) -> Callable[[Any], None]:
 
 
 def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the options say of conditions, as parameters of kinds."""
+    """The conditions in the options, as parameters of kinds."""
     asked = {
         "prescribed": arguments.prescribe,
         "stress": numbers("--stress", arguments.stress, float),
@@ -177,7 +177,7 @@ def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The same of known forces."""
+    """The known forces in the options, likewise."""
     given = getattr(arguments, "known", None)
     return {} if given is None else {"known": importers.read_known(given)}
 
@@ -186,10 +186,10 @@ class Unit(NamedTuple):
     """The unit in which a command reports and writes forces."""
 
     word: str  # packing or mean
-    scale: float  # this unit in the packing's
+    scale: float  # this unit in units of the packing's
 
     def named(self, forces: Mapping[str, Any]) -> dict[str, Any]:
-        """Forces in the packing's unit by name, in this one, which the names then carry."""
+        """Named forces converted from the packing's unit to this one, which is added to names."""
         return {f"{name} [{self.word}]": values / self.scale for name, values in forces.items()}
 
     def reported(self, forces: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,7 +200,7 @@ class Unit(NamedTuple):
 PACKING_UNIT = Unit("packing", 1.0)
 
 
-# Forces in reports on packings, which are in one unit whatever is asked for.
+# Forces in reports on packings, which have one fixed unit.
 _REPORTED = {
     "mean_normal_force": "packing",
     "mean_change_of_f_n": "mean",
@@ -209,7 +209,7 @@ _REPORTED = {
 
 
 def with_units(lines: Mapping[str, Any]) -> dict[str, Any]:
-    """A report on a packing, with the units of forces in their names."""
+    """A report on a packing, with the units of forces in the names."""
     return {
         f"{name} [{_REPORTED[name]}]" if name in _REPORTED else name: value
         for name, value in lines.items()
@@ -217,14 +217,14 @@ def with_units(lines: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
-    """What --unit asks for: the packing's own, or the mean normal force of its ensemble."""
+    """The unit of --unit: the packing's own, or the mean normal force of its ensemble."""
     if arguments.unit == "mean":
         return Unit("mean", dataset["force_scale"].item())
     return PACKING_UNIT
 
 
 def extents(dataset: xr.Dataset) -> dict[str, float]:
-    """How long the intervals of f_n are, by name, in the packing's unit; and the mean f_n."""
+    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n."""
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
     return {
         "mean_normal_force": dataset["force_scale"].item(),
@@ -234,7 +234,7 @@ def extents(dataset: xr.Dataset) -> dict[str, float]:
 
 
 def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
-    """The walk that the options ask for; output: a file that will be written."""
+    """The walk of the options; output: a file that will be written."""
     return found(
         *(arguments, kinds.WALK, output),
         watching=telling_eta,
@@ -247,7 +247,7 @@ def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredRe
 
 
 def extension(dataset: xr.Dataset) -> dict[str, Any]:
-    """The dimension of S, and of results that say so which directions are taken as pinned."""
+    """The dimension of S and, for results that include it, directions taken as pinned."""
     lines = {"dimension": dataset["dimension"].item()}
     if "flat_directions" in dataset and dataset["flat_directions"].item():
         lines["directions_taken_as_pinned"] = dataset["flat_directions"].item()
@@ -256,7 +256,7 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def write_columns(path: str, columns: Mapping[str, Any]) -> None:
-    """Columns {name: array}, contact by contact or so, in the format of a suffix."""
+    """Write columns {name: array} in the format given by the suffix."""
     if path.endswith(".zarr"):
         rows = next(iter(columns))
         named = {name: (rows, values) for name, values in columns.items() if name != rows}
@@ -275,7 +275,7 @@ def write_arrays(path: str, arrays: Mapping[str, Any]) -> None:
 def write_states(
     arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
 ) -> None:
-    """The states of a walk or sample with their contacts, where --out asks for them."""
+    """Write the states of a walk or sample with their contacts to the file of --out."""
     path = arguments.out
     if path is None:
         return
@@ -301,7 +301,7 @@ def write_states(
 
 
 def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Columns {name: array} as a table; whole numbers stay whole."""
+    """Write columns {name: array} as a table; integers stay integers."""
     with written(path) as file:
         np.savetxt(
             file,

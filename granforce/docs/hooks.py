@@ -1,4 +1,4 @@
-"""Pages generated from code: library, command line and symbols; and the gallery's pictures."""
+"""Documentation pages generated from code: library, command line, symbols, and the gallery."""
 
 import argparse
 import contextlib
@@ -22,10 +22,10 @@ from granforce.paper.formatting import markdown_table
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "examples.md"
 GALLERY = HERE / "pages" / "gallery.md"
-DATA = next(  # inside an installed wheel, beside the package in a checkout
+DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
-DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as links of the sources are
+DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as linked in the sources
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 BENCH = re.compile(r"<!-- bench: (\w+) -->")
 
@@ -59,7 +59,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Fill in the tables of the benchmark, and link figures where the site has them."""
+    """Fill in the tables of the benchmark, and link figures to their place on the site."""
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
     if page.file.src_uri == GALLERY.name:
@@ -68,7 +68,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def gallery() -> Iterator[tuple[str, bytes]]:
-    """Name and PNG of every picture of the gallery, drawn by its own lines."""
+    """Name and PNG of every picture of the gallery, drawn by the code shown with it."""
     with contextlib.chdir(DATA.parent), tempfile.TemporaryDirectory() as folder:
         for heading, _, _, code in SHOWN.findall(GALLERY.read_text()):
             names: dict[str, Any] = {}
