@@ -1,12 +1,12 @@
 """`panel serve app` from the repository's root.
 
-It opens on the precomputed results in data/start.zarr, or in the folder that the environment
-variable GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE); GRANFORCE_LIMITS says
-how much a visitor may ask for, see app/limits.py.
+It opens with the precomputed results in data/start.zarr, or in the folder named by the environment
+variable GRANFORCE_DATA, and with the user's own cache (GRANFORCE_CACHE); GRANFORCE_LIMITS sets the
+limits per visitor, see app/background/limits.py.
 """
 
-# Bokeh runs this file anew for each visitor, and clears its names when the visitor leaves while
-# work goes on that may still need them: nothing but the call belongs here.
+# Bokeh runs this file for each visitor, and clears its names when the visitor leaves, while running
+# work may still need them: only the call belongs here.
 from .page import page
 
 page().servable()

@@ -1,4 +1,4 @@
-"""The two doors: the instrument at `/app`, the lesson and small scenes at `/app?learn`."""
+"""The two entry pages: the instrument at `/app`, the lesson and small scenes at `/app?learn`."""
 
 from typing import Any
 from urllib.parse import parse_qs
@@ -12,10 +12,10 @@ from .learn.model import small_scenes
 
 
 def page() -> Any:
-    """One visitor's page, by what its address asks for."""
+    """One visitor's page, chosen by its address."""
     pn.extension()
     document = pn.state.curdoc
-    assert document is not None  # a page is made for one
+    assert document is not None  # a page always has a document
     mend_late_views(document)
     answer_with_lock()
     query = (pn.state.location.search if pn.state.location else "") or ""
@@ -26,5 +26,5 @@ def page() -> Any:
 
 
 def learns(query: str) -> bool:
-    """Whether an address is of Learn: `?learn`, `?learn=groove`."""
+    """Whether an address belongs to Learn: `?learn`, `?learn=groove`."""
     return "learn" in parse_qs(query.lstrip("?"), keep_blank_values=True)

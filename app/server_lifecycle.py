@@ -1,6 +1,6 @@
-"""Run once when the server starts: kernels are compiled, and it ends where it could not serve.
+"""Run when the server starts and when it ends.
 
-And once when it ends.
+At the start kernels are compiled, and the server ends at once if it could not serve.
 """
 
 import argparse
@@ -17,10 +17,10 @@ from granforce.system.compiled import compile_ahead
 
 
 def _processes() -> int:
-    """The processes that `panel serve` was asked for: it tells nobody until it has forked."""
+    """The number of processes given to `panel serve`, which reports it only after forking."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--num-procs", type=int, default=1)
-    # Panel hides the command line from what it serves, but not this copy of it.
+    # Panel hides the command line from what it serves, but not this copy.
     return int(parser.parse_known_args(sys.orig_argv)[0].num_procs)
 
 
@@ -29,13 +29,13 @@ def _end(line: object) -> None:
     sys.exit(2)
 
 
-# Before anything is forked or served.
+# Before any fork and any request.
 if _processes() != 1:
     _end(
         "the app computes in threads of its own, which forked processes lack, and cannot run with "
         "--num-procs: start panel serve without"
     )
-if config.autoreload:  # Panel runs main.py then, but not as a part of its package
+if config.autoreload:  # Panel then runs main.py, but not as part of its package
     _end(
         "the app is a package, which Panel cannot reload, and cannot run with --autoreload or "
         "--dev: start panel serve without"
@@ -47,14 +47,14 @@ except InputError as error:
 
 
 def on_server_loaded(server_context: object) -> None:
-    """Import and load what visitors will need, or compile it first; they may come meanwhile."""
-    if config.nthreads is not None:  # a page takes its turns on one thread, the server's own
+    """Import, load or compile what visitors will need; they may arrive meanwhile."""
+    if config.nthreads is not None:  # a page runs on one thread, the server's own
         _end(
             "the app computes in threads of its own, and cannot run with --num-threads or "
             "PANEL_NUM_THREADS: start panel serve without"
         )
-    # xarray imports dask, where it is installed, with the first array it looks at, which fails
-    # where two threads do so at once.
+    # xarray imports dask, if installed, with the first array it examines, which fails if two
+    # threads do so at once.
     with suppress(ImportError):
         importlib.import_module("dask.base")
     importlib.import_module(".page", __package__)
@@ -63,5 +63,5 @@ def on_server_loaded(server_context: object) -> None:
 
 
 def on_server_unloaded(server_context: object) -> None:
-    """Whatever is being computed ends, or the process would wait for its threads."""
+    """End all computations; otherwise the process would wait for their threads."""
     end_everything()

@@ -1,1 +1,1 @@
-"""Work off the event loop, and limits of a shared server."""
+"""Work off the event loop, and the limits of a shared server."""

@@ -1,6 +1,7 @@
-"""Collections of garbage hold every page up, so they spare what stays anyway.
+"""Garbage collection blocks all pages, so it skips long-lived objects.
 
-A full one takes 0.1 s for 200,000 objects; imported modules hold 300,000 and more, a page 20,000.
+A full collection takes 0.1 s for 200,000 objects; imported modules hold more than 300,000, a page
+20,000.
 """
 
 import gc
@@ -9,13 +10,13 @@ from collections.abc import Callable
 
 from tornado.ioloop import IOLoop
 
-TIDY_S = 2  # after the last page was closed, when it has been taken apart
+TIDY_S = 2  # after the last page was closed and taken apart
 
 _pages = _spared = 0
 
 
 def settle() -> None:
-    """Spare what has been imported until now; what open pages hold by now is spared, too."""
+    """Exempt everything imported so far; current objects of open pages are exempt too."""
     global _spared
     loaded = sum(not name.startswith("bokeh_app_") for name in sys.modules.copy())
     if loaded > _spared:
@@ -24,7 +25,7 @@ def settle() -> None:
 
 
 def opened() -> Callable[[], None]:
-    """Count a page; returns what to call when it is closed."""
+    """Count a page; return the function to call when it is closed."""
     global _pages
     _pages += 1
     return _closed
@@ -38,7 +39,7 @@ def _closed() -> None:
 
 
 def tidy() -> None:
-    """Collect all garbage, also among what was spared, unless a page is open and would wait."""
+    """Collect all garbage, including exempt objects, unless an open page would have to wait."""
     if not _pages:
         gc.unfreeze()
         gc.collect()

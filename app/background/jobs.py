@@ -1,6 +1,6 @@
-"""Work off the event loop: threads run it, the page asks now and then how far it is.
+"""Work off the event loop: threads run it, and the page polls its progress.
 
-The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
+The kernels release the interpreter lock, so a thread blocks neither the page nor other threads.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from .gc_pauses import settle
 from .limits import LIMITS
 from .turns import Later, Turn, turn_of
 
-ESTIMATED = 2.0  # s of a stage from which on its end can be told
-LONGEST_LINE = 500  # characters of what a page tells about an error
+ESTIMATED = 2.0  # s of a stage after which its end can be estimated
+LONGEST_LINE = 500  # characters of an error message on a page
 LONG = 3.0  # s after which a job is a long one
-_ASK = 0.2  # s between two looks at what nobody tells
+_ASK = 0.2  # s between two polls
 WAITING = "waiting for a free processor"  # stage of a job that has not begun
 
 _log = logging.getLogger(__name__)
 
 
 class Visitor(NamedTuple):
-    """For whom a job works; the pages of one address have their share together."""
+    """The owner of a job; pages from the same address share its quota."""
 
     address: str
     page: str
@@ -43,19 +43,19 @@ class Visitor(NamedTuple):
 class Pool:
     """Threads that run jobs; they end with the server, whatever the jobs are doing.
 
-    Of jobs that wait, those come first whose visitor has the fewest under way. While all threads
-    are held by long jobs, who has none under way does not wait for them: `extra` more threads are
-    for their jobs, which all together slow each other down instead.
+    Waiting jobs of the visitors with the fewest running jobs come first. If long jobs occupy all
+    threads, a visitor without a running job does not wait for them: `extra` more threads run such
+    jobs, and all jobs then slow each other down.
     """
 
     def __init__(
         self, workers: int, name: str, *, extra: int = 0, seconds: float | None = None
     ) -> None:
-        """seconds: after which a job is ended, None: never."""
+        """seconds: time limit of a job, or None."""
         self.seconds = seconds
         self._workers, self._extra = workers, extra
         self._waiting: list[Job] = []
-        self._running: list[tuple[Job, float]] = []  # and since when
+        self._running: list[tuple[Job, float]] = []  # with their start times
         self._changed = threading.Condition()
         for k in range(workers + extra):
             # Not concurrent.futures: its threads would keep a server that is to end waiting.
@@ -69,7 +69,7 @@ class Pool:
                 self._changed.notify_all()
 
     def before(self, job: Job) -> int:
-        """How many jobs come before one that waits: those that run, and those that wait first."""
+        """Number of jobs before a waiting one: running jobs, and jobs ahead of it in the queue."""
         with self._changed:
             waiting = [other for other in self._waiting if not other.ended]
             if job not in waiting:
@@ -81,40 +81,40 @@ class Pool:
         while True:
             with self._changed:
                 while (job := self._next()) is None:
-                    # What is long by then, or may be tried again, nobody tells.
+                    # No event signals that a job has become long or may be retried.
                     self._changed.wait(_ASK if self._waiting else None)
                 running = job, time.monotonic()
                 self._running.append(running)
             try:
                 job.run()
                 settle()
-            except BaseException:  # a thread that ends is missing to all visitors from then on
+            except BaseException:  # a thread that ended would be missing for all visitors
                 _log.exception("a job failed outside its work")
             finally:
                 with self._changed:
                     self._running.remove(running)
                     self._changed.notify_all()
-                del job, running  # or the thread would keep it until the next
+                del job, running  # otherwise the thread would keep the job until the next one
 
     def _next(self) -> Job | None:
-        """The job to be run now, taken from those that wait; None: none of them yet."""
+        """Remove and return the next job to run, or None if none can run yet."""
         now = time.monotonic()
         self._waiting = [job for job in self._waiting if not job.ended]
         ready = [job for job in self._waiting if job.not_before <= now]
         if not ready or len(self._running) >= self._workers + self._extra:
             return None
-        job = min(ready, key=self._under_way)  # of several the one that came first
+        job = min(ready, key=self._under_way)  # the earliest of several
         if len(self._running) >= self._workers:
             of_address, of_page = self._under_way(job)
             long = sum(now - since > LONG for _, since in self._running)
-            # One place is left to those of another address, however many pages one has.
+            # One thread is reserved for other addresses, however many pages one address has.
             if long < self._workers or of_page or of_address > self._workers:
                 return None
         self._waiting.remove(job)
         return job
 
     def _under_way(self, job: Job) -> tuple[int, int]:
-        """How many jobs of its visitor's address, and of its page, are run just now."""
+        """Number of running jobs of its visitor's address, and of its page."""
         if job.visitor is None:
             return 0, 0
         others = [other.visitor for other, _ in self._running if other.visitor is not None]
@@ -122,20 +122,20 @@ class Pool:
         return of_address, sum(other == job.visitor for other in others)
 
 
-# All users together: more would only slow each other down.
+# For all users together: more threads would only slow each other down.
 computing = Pool(
     LIMITS.computations,
     "granforce-compute",
     extra=LIMITS.computations,
     seconds=LIMITS.seconds,
 )
-# What only reads stores must not wait for a computation to end.
+# Reading stores must not wait for a computation to end.
 reading = Pool(2, "granforce-read")
 
 
 @dataclass(frozen=True)
 class Work:
-    """Work for a Job that will take turns: `wants` names them, so that others wait for it."""
+    """Work for a Job that takes turns: `wants` names what it needs, so that others wait for it."""
 
     run: Callable[[Job], Any]
     wants: tuple[Any, ...]
@@ -146,12 +146,12 @@ class Work:
 
 
 class Job:
-    """One piece of work under way. Fields are written by its thread and read by the page.
+    """One piece of work. Its thread writes the fields, and the page reads them.
 
-    work(job) returns the result; once it sets `job.keeps`, `stop` ends it with what it has so far.
-    It may give `job.tell` as progress callback and set `job.stage` to
-    say what it is doing. All of it ends soon after `cancel`, unless other jobs want what it makes.
-    Raising Later it is called again. Where it takes turns it is a Work, which names them.
+    work(job) returns the result; if it sets `job.keeps`, `stop` ends it with the partial result. It
+    may pass `job.tell` as progress callback and set `job.stage` to a description of its current
+    step. It ends soon after `cancel`, unless other jobs need its result. If it raises Later it is
+    called again. Work that takes turns is a Work, which names what it needs.
     """
 
     def __init__(
@@ -163,47 +163,47 @@ class Job:
     ) -> None:
         """on_end(): called from another thread when the job has ended.
 
-        visitor: for whom it works; None: for itself.
+        visitor: its owner; None: the job itself.
         """
         self.stage = WAITING
         self.visitor = visitor
-        self.not_before = 0.0  # when it may be run (again), as time.monotonic
+        self.not_before = 0.0  # earliest time to run (again), as time.monotonic
         self._until = math.inf  # when it is ended
-        self.fraction: float | None = None  # done, 0 … 1; None where unknown
+        self.fraction: float | None = None  # done, 0 … 1; None if unknown
         self.seconds_left: float | None = None  # of this stage
         self.error = ""
-        self.so_far: Any = None  # what of its result is there already, if the work says so
+        self.so_far: Any = None  # its partial result, if the work provides one
         self.result: Any = None
         self._work: Callable[[Job], Any] | None = work
         self._pool, self._on_end = pool, on_end
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
-        self.keeps = False  # whether what it has so far is a result
+        self.keeps = False  # whether its partial result is a valid result
         self._stop = threading.Event()
-        self.turns: list[Turn] = []  # that it has just now
+        self.turns: list[Turn] = []  # its current turns
         self._wants = [turn_of(named) for named in (work.wants if isinstance(work, Work) else ())]
         for turn in self._wants:
             turn.join(self)
-        self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
+        self._taken = threading.Lock()  # by the thread that runs it, or the first caller of cancel
         pool.submit(self)
 
     @property
     def doing(self) -> str:
-        """What it is doing, or its place in the queue, in words."""
+        """Its current step, or its place in the queue, in words."""
         count = self._pool.before(self) if self.stage == WAITING else 0
         if not count:
             return self.stage
         return f"{WAITING}: {count} {'computation' if count == 1 else 'computations'} before it"
 
     def begin(self, stage: str) -> None:
-        """Enter a stage; its time left is counted from here."""
+        """Enter a stage; its remaining time is counted from here."""
         self.stage, self._begun = stage, time.perf_counter()
         self.seconds_left = None
 
     def tell(
         self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
     ) -> None:
-        """Progress of the stage; part: where on the whole bar the stage begins and ends."""
+        """Progress of the stage; part: begin and end of the stage on the whole bar."""
         if total is None:
             self.fraction = self.seconds_left = None
             return
@@ -214,42 +214,42 @@ class Job:
         self.seconds_left = spent / done * (total - done) if known else None
 
     def cancel(self) -> None:
-        """Ask it to end: at once if it has not begun, else within a second once it is unwanted."""
+        """Request its end: at once if not yet begun, else within a second unless it is needed."""
         self._cancel.set()
         if self._taken.acquire(blocking=False):
             self._end()
 
     def stop(self) -> None:
-        """Ask it to end with the result that it has so far, unless other jobs want more."""
+        """Request its end with the partial result, unless other jobs need more."""
         self._stop.set()
 
     def enough(self) -> bool:
-        """Whether what it has so far is all that is wanted; from then on it is no cancelling."""
+        """Whether the partial result is all that is needed; afterwards cancelling has no effect."""
         return self._stop.is_set() and not any(turn.wanted(self) for turn in list(self.turns))
 
     def cancelled(self) -> bool:
-        """Whether it was asked to end."""
+        """Whether its end was requested."""
         return self._cancel.is_set()
 
     def unwanted(self) -> bool:
-        """Whether it was asked to end, and no other job needs what it is making just now."""
+        """Whether its end was requested, and no other job needs what it is computing."""
         return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
 
     def _ends(self) -> bool:
-        """Whether its work is to end: nobody wants it, or it takes too long."""
+        """Whether its work is to end: nobody needs it, or it exceeds the time limit."""
         return self.unwanted() or time.monotonic() > self._until
 
     @property
     def ended(self) -> bool:
-        """Whether it has ended, one way or another."""
+        """Whether it has ended, for any reason."""
         return self._ended.is_set()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Whether it ends in time, in s; for tests and scripts."""
+        """Wait up to a time in s for its end; return whether it ended. For tests and scripts."""
         return self._ended.wait(timeout)
 
     def run(self) -> None:
-        """Do the work, unless cancelled before; called by a thread of the pool."""
+        """Do the work unless cancelled; called by a thread of the pool."""
         if not self._taken.acquire(blocking=False):
             return
         if self.stage == WAITING:
@@ -261,10 +261,10 @@ class Job:
                 with cancelling.watched(self._ends):
                     self.result = work(self)
         except Later:
-            self.not_before = time.monotonic() + _ASK  # meanwhile others have the thread
+            self.not_before = time.monotonic() + _ASK  # meanwhile the thread is free for others
             self._taken.release()
             self._pool.submit(self)
-            if self.cancelled():  # meanwhile: it need not come to its turn
+            if self.cancelled():  # cancelled meanwhile: it need not wait for its turn
                 self.cancel()
             return
         except Cancelled:
@@ -274,12 +274,12 @@ class Job:
                     "on this server: choose smaller values, or run it on your computer (Copy CLI "
                     "command)"
                 )
-        except BaseException as error:  # told on the page, or nobody would see it
+        except BaseException as error:  # reported on the page, where it would otherwise be lost
             self.error = told(error)
         self._end()
 
     def _end(self) -> None:
-        self._work = None  # what it refers to may be large
+        self._work = None  # it may refer to large objects
         self._ended.set()
         on_end, self._on_end = self._on_end, None
         try:
@@ -290,7 +290,7 @@ class Job:
 
 
 def told(error: BaseException) -> str:
-    """What went wrong, in one line for the page."""
+    """An error in one line for the page."""
     line = " ".join(str(error).split())[:LONGEST_LINE]
     if isinstance(error, InputError):
         return line
@@ -299,7 +299,7 @@ def told(error: BaseException) -> str:
 
 @contextmanager
 def as_one(*parts: param.Parameterized) -> Iterator[None]:
-    """What is set of these parts is told when all of it is there; the last part tells first."""
+    """Announce changes of these parts together, when all are set; the last part announces first."""
     with ExitStack() as stack:
         for part in parts:
             stack.enter_context(param.parameterized.batch_call_watchers(part))
@@ -307,7 +307,7 @@ def as_one(*parts: param.Parameterized) -> Iterator[None]:
 
 
 class Task(param.Parameterized):
-    """One kind of work as a view sees it: at most one job at a time, a later one replaces it.
+    """One kind of work as a view sees it: at most one job at a time; a new one replaces it.
 
     Jobs run in threads, but the parameters change only within `poll`, on the page's own thread.
     """
@@ -327,17 +327,17 @@ class Task(param.Parameterized):
         visitor: Visitor | None = None,
         **params: Any,
     ) -> None:
-        """wake(function): call a function soon on the page's thread; without it, poll yourself."""
-        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
+        """wake(function): call a function soon on the page's thread; without it, call `poll`."""
+        super().__init__(**params)  # param has no type hints
         self._pool, self._wake, self._visitor = pool, wake, visitor
-        self.job: Job | None = None  # the one that is under way
+        self.job: Job | None = None  # the running job
         self._done: Callable[[Any], object] | None = None
         self._closed = False
 
     def start(
         self, work: Callable[[Job], Any], done: Callable[[Any], object] | None = None
     ) -> None:
-        """Begin work(job), as for Job; done(result) follows within `poll` unless it failed.
+        """Begin work(job), as for Job; done(result) is called within `poll` unless it failed.
 
         Nothing begins once the task is closed.
         """
@@ -352,11 +352,11 @@ class Task(param.Parameterized):
         )  # fmt: skip
 
     def poll(self) -> None:
-        """Take over how far the job is; when it has ended, its result."""
+        """Update the progress of the job and, when it has ended, its result."""
         job = self.job
         if job is None:
             return
-        if job.cancelled():  # it ends by itself, soon, or goes on for others
+        if job.cancelled():  # it ends soon, or continues for others
             self.job = self._done = None
             self.param.update(running=False, message="")
             return
@@ -369,7 +369,7 @@ class Task(param.Parameterized):
             )
             return
         done, self.job, self._done = self._done, None, None
-        # Told as one: at no moment is the work over and its result not yet there.
+        # Announced together, so that the work is never over without its result.
         with as_one(self):
             self.param.update(running=False, message=job.error)
             if done is not None and not job.error:
@@ -380,23 +380,23 @@ class Task(param.Parameterized):
                     self.message = told(error)
 
     def cancel(self) -> None:
-        """Ask the job to end; its result is dropped."""
+        """Request the end of the job; its result is dropped."""
         if self.job is not None:
             self.job.cancel()
 
     def dismiss(self) -> None:
-        """Cancel, as the visitor wishes; those who know what was there before bring it back."""
+        """Cancel on the visitor's request; observers then restore the previous view."""
         self.cancel()
         self.poll()
         self.dismissed = True
         self.dismissed = False
 
     def stop(self) -> None:
-        """Ask the job to end with the result that it has so far."""
+        """Request the end of the job with its partial result."""
         if self.job is not None and self.job.keeps:
             self.job.stop()
 
     def close(self) -> None:
-        """End the job, and begin no other: nobody is there any more."""
+        """End the job and accept no other: the page is closed."""
         self._closed = True
         self.cancel()

@@ -1,4 +1,4 @@
-"""How much one visitor may ask of the server, from the environment variable GRANFORCE_LIMITS."""
+"""Limits per visitor, from the environment variable GRANFORCE_LIMITS."""
 
 import math
 import os
@@ -9,23 +9,23 @@ from granforce.records import InputError
 LIMITS_VARIABLE = "GRANFORCE_LIMITS"
 
 
-MOST = 10**9  # of any limit,
-MOST_COMPUTATIONS = 64  # and of threads
-LONGEST = 600  # s that a computation may take on a shared server, if nothing else is said
-MOST_SEED = 2**53 - 1  # whole numbers that browsers know, too
+MOST = 10**9  # largest value of any limit
+MOST_COMPUTATIONS = 64  # largest number of threads
+LONGEST = 600  # default time limit of a computation on a shared server, s
+MOST_SEED = 2**53 - 1  # integers that browsers represent exactly
 
 
 class Limits(NamedTuple):
-    """Largest sizes that are computed or taken; the defaults suit a machine of one's own.
+    """Largest sizes that are computed or accepted; the defaults suit a personal machine.
 
-    On one for others, `shared`, what only makes a computation longer has narrower bounds.
+    On a `shared` server, parameters that only lengthen a computation have narrower bounds.
     """
 
     n: int = 20_000  # disks of a packing
     states: int = 20_000  # states of a walk or sample
     upload: int = 64  # size of an uploaded file, MB
-    computations: int = 2  # at the same time, all visitors together
-    seconds: int | None = None  # that one may take; None on a machine of one's own
+    computations: int = 2  # simultaneous ones, for all visitors together
+    seconds: int | None = None  # per computation; None on a personal machine
 
     @property
     def shared(self) -> bool:
@@ -33,7 +33,7 @@ class Limits(NamedTuple):
         return self.seconds is not None
 
     def check(self, **asked: Any) -> None:
-        """InputError if a number lies outside its limits, or radii differ by more than SIZE_RATIO.
+        """InputError if a number is outside its limits, or radii differ by more than SIZE_RATIO.
 
         asked: any of NAMES.
         """
@@ -42,19 +42,18 @@ class Limits(NamedTuple):
                 _check_radii(value)
                 continue
             if name in ("box", "version"):
-                continue  # a name that was checked when it was given; of the algorithm
+                continue  # checked when it was given, or a parameter of the algorithm
             words, least, most = (SHARED_NAMES if self.shared else NAMES)[name]
             most = getattr(self, name) if most is None else most
-            if not least <= value <= most:  # nor if it is NaN
+            if not least <= value <= most:  # also refuses NaN
                 raise InputError(
                     f"{words} must lie between {least:g} and {most}, got {_told(value)}"
                 )
 
 
-SIZE_RATIO = 20  # largest over smallest radius that a distribution may name
-DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, and how many numbers they take
-# What is asked for in words, and between which values: up to the limit, or where the dynamics makes
-# sense.
+SIZE_RATIO = 20  # largest over smallest radius of a distribution
+DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, with the number of parameters
+# Name in words and range of each parameter: up to the limit, or in which the dynamics makes sense.
 NAMES: dict[str, tuple[str, float, float | None]] = {
     "n": ("N", 1, None),
     "states": ("the number of states", 1, None),
@@ -67,8 +66,8 @@ NAMES: dict[str, tuple[str, float, float | None]] = {
     "sweeps": ("the number of sweeps", 1, 10_000),
     "accuracy": ("the accuracy of a step", 1e-6, 1),
 }
-# Each of these bounds makes a packing take up to some ten times as long as usual; the others' do a
-# thousand times and more.
+# At these bounds a packing takes up to about ten times as long as usual; at the others, a thousand
+# times and more.
 SHARED_NAMES = NAMES | {
     "dt": ("the time step dt", 0.02, 1),
     "box_mass": ("the box mass", 10, 300),
@@ -78,7 +77,7 @@ SHARED_NAMES = NAMES | {
 
 
 def _check_radii(text: Any) -> None:
-    """InputError unless it is a distribution of sizes that can be packed together."""
+    """InputError unless it is a valid distribution of sizes that can be packed together."""
     kind, _, numbers = str(text).partition(":")
     try:
         values = [float(number) for number in numbers.split(",")]
@@ -95,12 +94,12 @@ def _check_radii(text: Any) -> None:
 
 
 def _told(number: float) -> str:
-    """A number as people write it: 1e+09 and not 1000000000.0."""
+    """A number as people write it: 1e+09, not 1000000000.0."""
     return f"{number:g}" if isinstance(number, float) else _short(number)
 
 
 def _short(value: Any) -> str:
-    """A value in few characters, however long it is."""
+    """A value in few characters."""
     text = repr(value)
     return text if len(text) <= 30 else f"{text[:12]}… ({len(text)} characters)"
 
@@ -108,7 +107,7 @@ def _short(value: Any) -> str:
 def read_limits(text: str | None = None) -> Limits:
     """Limits from "n=1000,states=2000,upload=10,computations=2,seconds=600", each optional.
 
-    text: by default what GRANFORCE_LIMITS holds; without it, those of a machine of one's own.
+    text: by default the value of GRANFORCE_LIMITS; without it, the limits of a personal machine.
     InputError for other names or values.
     """
     text = os.environ.get(LIMITS_VARIABLE) if text is None else text

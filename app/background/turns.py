@@ -1,4 +1,4 @@
-"""Of jobs that need the same, one works at a time, and goes on as long as any of them wants it."""
+"""Of jobs that need the same thing one computes it, as long as any of them needs it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 from weakref import WeakSet, WeakValueDictionary
 
-# How long a job stays for its turn before it lets others have the thread, s.
+# Time that a job waits for its turn before it frees the thread, s.
 _ASK = 0.2
 
 _turns: WeakValueDictionary[str, Turn] = WeakValueDictionary()
@@ -16,29 +16,29 @@ _turns_lock = threading.Lock()
 
 
 class Later(Exception):
-    """Raised by work that cannot go on yet; its job stands at the end of the queue again."""
+    """Raised by work that cannot continue yet; its job goes to the end of the queue."""
 
 
 class Waiting(Protocol):
-    """What takes turns: a Job."""
+    """An object that takes turns: a Job."""
 
     stage: str
     fraction: float | None  # done, 0 … 1
     seconds_left: float | None
-    turns: list[Turn]  # that it has just now
+    turns: list[Turn]  # its current turns
 
     def cancelled(self) -> bool:
-        """Whether it was asked to end."""
+        """Whether its end was requested."""
         ...
 
     @property
     def ended(self) -> bool:
-        """Whether it has ended, one way or another."""
+        """Whether it has ended, for any reason."""
         ...
 
 
 class Turn:
-    """Whose turn it is among jobs that need what has one name, and who they are."""
+    """The turn among jobs that need the thing with one name, and the list of these jobs."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -47,28 +47,28 @@ class Turn:
         self._guard = threading.Lock()
 
     def join(self, job: Waiting) -> None:
-        """Count a job among those that need it."""
+        """Add a job to those that need it."""
         with self._guard:
             self._wanting.add(job)
 
     def wanted(self, without: Waiting) -> bool:
-        """Whether a job other than this one needs it that is neither cancelled nor at its end."""
+        """Whether another job needs it that is neither cancelled nor ended."""
         with self._guard:
             others = [job for job in self._wanting if job is not without]
         return not all(job.cancelled() or job.ended for job in others)
 
 
 def turn_of(named: Any) -> Turn:
-    """The Turn of a name; it lasts while somebody refers to it."""
+    """The Turn of a name, which exists while it is referenced."""
     with _turns_lock:
         return _turns.setdefault(repr(named), Turn())
 
 
 @contextmanager
 def in_turn(job: Waiting, *named: Any) -> Iterator[None]:
-    """One job at a time of those named alike: the next finds in the cache what the first made.
+    """Run one job at a time for each name: the next finds the result of the first in the cache.
 
-    Raises Later while another one has its turn: who waits leaves the thread to those who need not.
+    Raises Later while another job has the turn, so that a waiting job frees its thread.
     """
     turn = turn_of(named)
     turn.join(job)
@@ -86,7 +86,7 @@ def in_turn(job: Waiting, *named: Any) -> Iterator[None]:
 
 
 def _goes_as(job: Waiting, other: Waiting | None) -> None:
-    """The progress of the other one, which works for both."""
+    """Copy the progress of the other job, which works for both."""
     job.stage = "already under way"
     if other is not None:
         job.stage += f": {other.stage}"

@@ -1,1 +1,1 @@
-"""How scripts are joined and talk to the server."""
+"""Joining of scripts, and communication with the server."""

@@ -1,4 +1,4 @@
-"""The page's own components, and their scripts."""
+"""The app's own components, and their scripts."""
 
 import re
 import sys
@@ -12,20 +12,20 @@ from panel.custom import JSComponent
 from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
 
 APP = Path(__file__).resolve().parents[1]
-SHARED = Path(__file__).with_name("shared.css").read_text()  # what all styles have in common
+SHARED = Path(__file__).with_name("shared.css").read_text()  # shared by all styles
 
-# What a script may say to be of one module with others, each a line of its own.
+# An import of a script, on a line of its own.
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "(\.[\w./]+\.js)"$', re.M)
 EXPORT = re.compile(r"^export (?=(?:async )?(?:class|function|const) (\w+))", re.M)
 
 
 def module(path: Path) -> str:
-    """One ES module of a script and of all that it imports, as text.
+    """One ES module, as text, of a script and everything it imports.
 
-    A page that was saved has no server to import from; one that is asked for each script answers
-    77 requests before the first picture in place of 28, and a browser that keeps some of them would
-    run old scripts beside new ones. Each script keeps its names to itself: it becomes a function
-    that returns what it exports, after those that it imports.
+    A saved page has no server to import from. Importing each script separately takes 77 requests
+    before the first picture instead of 28, and a browser that cached some of them would mix old and
+    new scripts. Each script keeps its names to itself: it becomes a function that returns its
+    exports, placed after the scripts that it imports.
     """
     parts: dict[Path, str] = {}
     _gather(path.resolve(), parts, ())
@@ -34,12 +34,12 @@ def module(path: Path) -> str:
 
 
 def imported(path: Path, text: str) -> list[tuple[str, Path]]:
-    """The names that a script imports from each other one, whose path is absolute."""
+    """The names that a script imports from each other script, with absolute paths."""
     return [(names, (path.parent / other).resolve()) for names, other in IMPORT.findall(text)]
 
 
 def _gather(path: Path, parts: dict[Path, str], way: tuple[Path, ...]) -> None:
-    """Fill parts {path: text} in an order in which each comes after those that it imports."""
+    """Fill parts {path: text} in an order in which each follows the scripts that it imports."""
     if path in way:
         names = " → ".join(one.stem for one in (*way, path))
         raise ValueError(f"scripts import each other: {names}")
@@ -67,19 +67,19 @@ def _named(one: tuple[str, Path]) -> tuple[str, str]:
 
 
 def _name(path: Path) -> str:
-    """The variable that holds what a script exports."""
+    """The variable that holds the exports of a script."""
     return "$" + "_".join(path.relative_to(APP).with_suffix("").parts)
 
 
 class Scripted(JSComponent):
-    """A component in a file of its own: its script and its style lie beside it, named alike.
+    """A component in its own file, with a script and a style of the same name next to it.
 
-    The browser runs the script as it is written. Panel takes it for TypeScript and has each page
-    translate it, unless it has been bundled: that took 0.2 s of the time until a page was complete,
-    half of it before its first picture.
+    The browser runs the script as written. Panel treats it as TypeScript and makes each page
+    translate it, unless it is bundled: this took 0.2 s of the time to a complete page, half of it
+    before its first picture.
     """
 
-    _heard: Callable[[Message], object]  # called with what FROM_BROWSER lists
+    _heard: Callable[[Message], object]  # called with the messages in FROM_BROWSER
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -88,22 +88,22 @@ class Scripted(JSComponent):
         cls._stylesheets = [SHARED, path.with_suffix(".css").read_text()]
 
     def __init__(self, **params: Any) -> None:
-        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__(**params)  # param has no type hints
 
     def _get_properties(self, doc: Document | None) -> dict[str, Any]:
         properties = super()._get_properties(doc)
-        if not properties["dev"]:  # where scripts may change under the same name
+        if not properties["dev"]:  # in dev mode scripts may change under the same name
             properties["bundle"] = type(self).__name__
         return properties
 
     def tell(self, message: Message) -> None:
-        """Tell the script something; ValueError for what TO_BROWSER does not list."""
+        """Send a message to the script; ValueError if it is not in TO_BROWSER."""
         if not listed(TO_BROWSER, type(self).__name__, message):
             raise ValueError(f"no message of {type(self).__name__}: {', '.join(message)}")
         self._send_msg(message)
 
     def hear(self, message: Any) -> None:
-        """Take what the script says, if FROM_BROWSER lists it: a page may have been altered."""
+        """Receive a message from the script if FROM_BROWSER lists it: a page may be altered."""
         if listed(FROM_BROWSER, type(self).__name__, message):
             self._heard(message)
 

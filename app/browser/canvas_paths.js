@@ -21,7 +21,7 @@ export function circle(g, [x, y], r) {
   g.arc(x, y, r, 0, 2 * Math.PI)
 }
 
-/** Add an arrow from a to b to the path, with an open head, so long and so wide against that. */
+/** Add an arrow from a to b to the path, with an open head of this length and relative width. */
 export function arrow(g, a, b, head, wide) {
   const size = Math.hypot(b[0] - a[0], b[1] - a[1]), [ux, uy] = [(b[0] - a[0]) / size, (b[1] - a[1]) / size]
   g.moveTo(...a)

@@ -1,4 +1,4 @@
-// The clipboard, which browsers offer to pages of this machine and of https only.
+// The clipboard, which browsers offer only to pages of this machine and of https.
 
 import { made } from "./dom.js"
 

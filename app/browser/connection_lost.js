@@ -1,11 +1,11 @@
-// Where the server is gone, that is said; when there is one again, the page opens anew with its
-// address, which holds the view.
+// Reports a lost connection; when the server is available again, the page reloads its address,
+// which holds the view.
 
 import { made } from "./dom.js"
 
-const RETRY_MS = 1000 // how often a server that is gone is asked for
+const RETRY_MS = 1000 // time between two requests to a missing server
 
-/** The banner that says so; still: what goes on meanwhile. */
+/** The banner that reports it; still: what continues to work meanwhile. */
 export function goneBanner(view, still) {
   const banner = made("div", { className: "gone", role: "alert", hidden: true })
   let lost = false
@@ -13,19 +13,19 @@ export function goneBanner(view, still) {
   function gone() {
     if (lost) return
     lost = true
-    for (const data of wishes()) data.wish = undefined // until now the server heard of them
+    for (const data of wishes()) data.wish = undefined // until now the server received them
     banner.textContent = `Connection lost, trying again. ${still}`
     banner.hidden = false
     retry()
   }
 
-  /** What sliders of μ hold of it, see friction.js. */
+  /** The sliders of μ that hold it, see friction_slider.js. */
   function wishes() {
     return [...view.model.document._all_models.values()].map(({ data }) => data)
       .filter((data) => data?.wish !== undefined)
   }
 
-  /** The same view, with the μ that was asked for meanwhile. */
+  /** The same view, with the μ chosen meanwhile. */
   function reopen() {
     const address = new URL(window.location.href), [asked] = wishes()
     if (asked) address.searchParams.set("mu", asked.wish)
@@ -38,7 +38,7 @@ export function goneBanner(view, still) {
     try {
       const answer = await fetch(asked, { method: "HEAD", cache: "no-store" })
       if (answer.ok) return reopen()
-    } catch { /* still gone */ }
+    } catch { /* still missing */ }
     setTimeout(retry, RETRY_MS)
   }
 

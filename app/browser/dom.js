@@ -1,9 +1,9 @@
-// Elements of the page, with what they look like.
+// Elements of the page, with their properties.
 
 /** An element of this tag with these properties. */
 export function made(tag, look) { return Object.assign(document.createElement(tag), look) }
 
-/** A button with these words that does this. */
+/** A button with this text and action. */
 export function button(textContent, act, look = {}) {
   const it = made("button", { type: "button", textContent, ...look })
   it.addEventListener("click", () => act(it))

@@ -1,4 +1,4 @@
-// What the browser does with what was made for the visitor: it saves a file, or prints a page.
+// Hands results to the browser: saves a file, or prints a page.
 
 import { made } from "./dom.js"
 
@@ -9,12 +9,12 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000)
 }
 
-/** The same of bytes, as base64. */
+/** The same for bytes in base64. */
 export function saveBytes(text, name) {
   save(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]), name)
 }
 
-/** Print an HTML document alone; title: of it, for screen readers. */
+/** Print an HTML document alone; title: its title, for screen readers. */
 export function print(title, html) {
   const sheet = made("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })
   sheet.addEventListener("load", () => {

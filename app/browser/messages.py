@@ -1,8 +1,8 @@
-"""What crosses the wire beside parameters: what scripts tell the server, and what they are told.
+"""Messages between scripts and server, in addition to parameters.
 
-A message is a dict of fields. A field is a number (`int`, `float`), words (`str`), `bool`, `True`
-for what says nothing but its name, a list ([int, float] of two, [float, ...] of any length), a dict
-of fields, an `Array` or, where the one who takes it looks for himself, any `object`.
+A message is a dict of fields. A field is a number (`int`, `float`), text (`str`), `bool`, `True` if
+only its name matters, a list ([int, float] of two, [float, ...] of any length), a dict of fields,
+an `Array`, or any `object` if the receiver checks it.
 """
 
 from collections.abc import Mapping
@@ -14,48 +14,48 @@ import numpy as np
 Array = np.ndarray
 Message = dict[str, Any]
 
-# {component: messages that its script sends}; contacts are positions in the backbone.
+# {component: messages sent by its script}; contacts are positions in the backbone.
 FROM_BROWSER = {
-    "Address": ({"query": str},),  # gone back or forward to
+    "Address": ({"query": str},),  # after going back or forward
     "Dropper": ({"begin": True}, {"name": str, "data": object}, {"end": True}),  # pieces of files
     "FrictionSlider": ({"typed": str},),
-    "Handover": ({"key": str},),  # of a file that is asked for
-    "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; what to measure next
-    "Lesson": ({"want": str, "name": str},),  # what a chapter shows
-    "LoadSlider": ({"push": True}, {"gave": True}),  # was moved; has come to where disks move
+    "Handover": ({"key": str},),  # of the requested file
+    "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; next measurement
+    "Lesson": ({"want": str, "name": str},),  # data for a chapter
+    "LoadSlider": ({"push": True}, {"gave": True}),  # moved; reached the load at which disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
-    "NumberField": ({"typed": str},),  # and is no number
+    "NumberField": ({"typed": str},),  # not a number
     "Player": (
         {"tab": int},  # 1, 2, …
         {"wide": bool},
-        {"keep": True},  # all networks of the walk are to be stored
-        {"hand": {"anew": True}},  # the page is drawn anew, and shows no pull yet
+        {"keep": True},  # store all networks of the walk
+        {"hand": {"anew": True}},  # the page was redrawn and shows no pull yet
         {"hand": {"grab": int}},
         {"hand": {"hold": [int, float]}},  # a contact, and its f_n in ⟨f_n⟩
-        {"hand": {"point": True}},  # in force space is grabbed
+        {"hand": {"point": True}},  # a point in force space is grabbed
         {"hand": {"hold_point": [float, float]}},
         {"hand": {"undo": True}},
         {"hand": {"free": True}},
         {"known": {"hold": [int, float, float]}},  # a contact, its f_n, and ± its error bar
         {"known": {"release": int}},
         {"live": {"anew": True, "seen": bool}},
-        {"live": {"seen": bool}},  # whether the page is looked at
-        {"live": {"painted": int}},  # the number of the last message that was drawn
+        {"live": {"seen": bool}},  # whether the page is visible
+        {"live": {"painted": int}},  # number of the last message that was painted
     ),
     "Progress": ({"stop": True}, {"cancel": True}),
-    "Results": ({"measure": True},),  # the volume of S
+    "Results": ({"measure": True},),  # measure the volume of S
     "Workbench": (
         {"scene": str},
         {"scene": str, "mu": float},
-        {"query": str},  # gone back or forward to
+        {"query": str},  # after going back or forward
         {"built": str, "mu": float},  # by hand
-        # "file", "fall" or "measured", of a scene under loads (3 N) on its disks
+        # "file", "fall" or "measured", for a scene with loads (3 N) on its disks
         {
             **{"find": str, "scene": str, "built": str, "mu": float},
             **{"load": [float, ...], "plane": [int, int]},
         },
     ),
-    "StatusLine": ({"stop": True}, {"cancel": True}, {"read": True}),  # what failed was read
+    "StatusLine": ({"stop": True}, {"cancel": True}, {"read": True}),  # a failure was read
 }
 
 MEASURED = {"scene": str, "mu": float, "plane": [int, int]}  # of a small scene
@@ -68,27 +68,27 @@ RAIL |= {"opened": Array, "sliding": Array, "whole": bool}
 PICTURE = {"mu": float, "box": [float, ...], "tilt": float, "fraction": float, "unbalance": float}
 PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
 PICTURE |= {"normal": Array, "tangential": Array}
-# States of a walk under way, one after the other, and of each the numbers told beside it.
+# States of a walk in progress, one after the other, each with the numbers shown next to it.
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
 STATES |= {"acceptance": Array, "eta1": Array, "eta2": Array, "eta3": Array}
 
-# {component: messages that its script is sent}; forces in ⟨f_n⟩, arrays flat.
+# {component: messages sent to its script}; forces in ⟨f_n⟩, arrays flat.
 TO_BROWSER = {
-    "FrictionSlider": ({"settled": True},),  # what was typed is taken, or refused
+    "FrictionSlider": ({"settled": True},),  # the typed value is accepted or refused
     "Handover": (
         {"name": str, "mime": str, "content": object},  # a file
-        {"name": str, "caption": dict},  # a picture or movie that the browser makes
+        {"name": str, "caption": dict},  # a picture or movie made by the browser
         {"name": str, "caption": dict, "width": int},  # with the plots, in mm
-        {"rest": True},  # nothing comes
+        {"rest": True},  # no file follows
     ),
     "Lesson": (
-        {"what": str, "name": str, "given": dict},  # what was asked for
+        {"what": str, "name": str, "given": dict},  # the requested data
         {"what": str, "name": str, "error": str},
     ),
     "Player": (
         {"held": None},  # the states are on screen again
         {"held": NETWORK | {"pull": list}},
-        {"rail": None},  # there is none
+        {"rail": None},  # without a rail
         {"rail": None, "fan": None},
         {"rail": RAIL},
         {"fan": NETWORKS | {"x": Array, "y": Array}},
@@ -98,7 +98,7 @@ TO_BROWSER = {
     ),
     "Workbench": (
         {"error": str},
-        {"fall": [float, ...]},  # motion (3 N) of the disks; empty where nothing falls
+        {"fall": [float, ...]},  # motion (3 N) of the disks; empty if nothing falls
         {"file": str},  # base64
         {"measured": {"most": float, "outline": list}, **MEASURED},
         {"measured": {"bounds": list, "outline": list}, **MEASURED},
@@ -107,12 +107,12 @@ TO_BROWSER = {
 
 
 def listed(messages: Mapping[str, tuple[Message, ...]], component: str, message: Any) -> bool:
-    """Whether FROM_BROWSER or TO_BROWSER has a component's message, field by field."""
+    """Whether FROM_BROWSER or TO_BROWSER contains a component's message, field by field."""
     return any(fits(message, shape) for shape in messages.get(component, ()))
 
 
 def fits(value: Any, shape: Any) -> bool:
-    """Whether a value is of the shape of a message or field."""
+    """Whether a value has the shape of a message or field."""
     match shape:
         case dict():
             same = isinstance(value, dict) and value.keys() == shape.keys()
@@ -125,7 +125,7 @@ def fits(value: Any, shape: Any) -> bool:
         case None | True:
             return value is shape
     if shape in (int, float):
-        # Larger whole numbers than a browser has are no floats either.
+        # Integers too large for a browser are not valid floats either.
         kind: Any = Integral if shape is int else Real
         whole = isinstance(value, int) and abs(value) > 2**53
         return isinstance(value, kind) and not isinstance(value, bool) and not whole

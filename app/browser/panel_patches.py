@@ -1,4 +1,4 @@
-"""What is private to Panel, Bokeh and Material UI, and how their habits are mended: only here."""
+"""Private features of Panel, Bokeh and Material UI, and workarounds: only in this file."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,11 +11,11 @@ from bokeh.models import CustomJS
 from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
-from panel.util import edit_readonly  # type: ignore[attr-defined]  # which panel says is no export
+from panel.util import edit_readonly  # not exported by panel
 
-# Material UI is fetched and run as soon as the page can, not after the page's contents have come:
-# 0.13 s. Its address must be the one that Panel asks for, or it would be run twice.
-# From one page to another the old one stays until the new one is seen, and fades into it.
+# Fetch and run Material UI as soon as possible, not after the page's contents: saves 0.13 s. Its
+# address must be the one that Panel requests, or it would run twice. On navigation the old page
+# stays until the new one is visible, and fades into it.
 EARLY = """{%% extends "base.html" %%}
 {%% block preamble %%}{{ super() }}<style>@view-transition { navigation: auto; }</style><script>
   document.addEventListener("load", (event) => {
@@ -23,8 +23,8 @@ EARLY = """{%% extends "base.html" %%}
   }, true)
 </script>{%% endblock %%}"""
 
-# Panel builds the views of a new child before React mounts them; told of another size of the
-# window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
+# Panel builds the views of a new child before React mounts them; if the window is resized in
+# between, Bokeh measures plots without a layout, fails, and leaves everything unchanged.
 UNMOUNTED = """
 const view = Bokeh.Models.get("Figure").prototype.default_view.prototype
 for (const name of ["measure_layout", "after_layout"]) {
@@ -33,7 +33,7 @@ for (const name of ["measure_layout", "after_layout"]) {
 }
 """
 
-# Where fingers scroll the page, a plot that is dragged by them would hold it fast.
+# Where fingers scroll the page, a plot under them would block scrolling.
 FINGERS = """
 const {prototype} = Bokeh.Models.get("Figure").prototype.default_view
 const {initialize} = prototype
@@ -43,8 +43,8 @@ prototype.initialize = function () {
 }
 """
 
-# Panel's React components listen to changes only some time after they were first drawn: what came
-# in between would never be seen.
+# Panel's React components listen to changes only some time after they were first drawn; changes in
+# between would be lost.
 LATE_LISTENERS = """
 const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
 const {watch} = prototype
@@ -56,56 +56,55 @@ prototype.watch = function (view, name, changed, state) {
 
 
 def mend_late_views(document: Document) -> None:
-    """Have the browser bear with what is told to it of views that it has not mounted yet.
+    """Make the browser tolerate changes of views that it has not mounted yet.
 
-    Plots that are not on the page yet are passed over where it lays the page out, those under
-    fingers let the page scroll, and components that begin to listen take over what has changed
-    since they were drawn.
+    The page layout skips plots that are not on the page yet, plots under fingers let the page
+    scroll, and components that begin to listen apply the changes since they were drawn.
     """
     mended = [CustomJS(code=code) for code in (UNMOUNTED, FINGERS, LATE_LISTENERS)]
     document.js_on_event("document_ready", *mended)
 
 
 def answer_with_lock() -> None:
-    """Have events of a browser answered while Bokeh's lock is held, as its changes are."""
-    # Panel does without it where changes told just before still wait for their turn, and answers
-    # them, too: Bokeh, through which plots are changed, refuses then, and all of it is lost.
-    Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # a mark on it
+    """Handle browser events while holding Bokeh's lock, as Panel does for changes of parameters."""
+    # Panel handles them without the lock while earlier changes are still queued; Bokeh, through
+    # which plots are changed, then refuses, and the whole change is lost.
+    Syncable._event_coroutine.lock = True  # the attribute acts as a mark
 
 
 def send_what_waits(document: Document) -> None:
-    """Send messages that Panel keeps back although nothing holds them any more."""
-    # One of its tasks, having sent its own, takes away the mark by which the next would know that
-    # it has some to send; they would wait for the next change.
+    """Send messages that Panel holds back although nothing blocks them any more."""
+    # One of its tasks, after sending its own messages, removes the mark that tells the next task to
+    # send; the messages would wait for the next change.
     if document in panel_document._WRITE_MSGS:
         panel_document._WRITE_BLOCK[document] = True
         panel_document._dispatch_write_task(document, panel_document._dispatch_msgs, document)
 
 
 def together(function: Callable[..., object], **arguments: Any) -> None:
-    """Call a function, and send all it changes on the page as one message, in its turn."""
-    # Bokeh sends by itself what Panel does not hold, and that may overtake what waits in Panel's
-    # queue: changes of a plot would reach a browser that has not got the plot yet.
+    """Call a function, and send all its changes of the page as one message, in order."""
+    # Bokeh sends by itself what Panel does not hold, which may overtake Panel's queue: changes of a
+    # plot would reach a browser before the plot.
     with unlocked():
         function(**arguments)
 
 
 def early_template() -> str:
-    """A template of the page that has the browser fetch Material UI as soon as it can."""
+    """A template of the page that makes the browser fetch Material UI as soon as possible."""
     return EARLY % pmui.Page._render_esm(server=True)
 
 
 def without_busy_watch(whole: pmui.Page) -> None:
-    """Free the page from Panel's record of what is busy, which would keep every closed page."""
+    """Remove the page from Panel's busy tracking, which would keep every closed page in memory."""
     with edit_readonly(whole):
         whole.busy = param.rx(False)
 
 
 def in_transit(document: Document) -> bool:
-    """Whether the browser has connected but not yet said that it has the page.
+    """Whether the browser has connected but not yet confirmed that it has the page.
 
-    Panel forgets what changes before that, as if the browser were still to fetch the page: changes
-    after it was fetched would be lost.
+    Panel drops changes before that, as if the browser had yet to fetch the page: changes after the
+    fetch would be lost.
     """
     context: Any = document.session_context
     session = None if context is None else context.session
@@ -113,7 +112,7 @@ def in_transit(document: Document) -> bool:
 
 
 def unseen_ms(context: Any) -> float:
-    """For how long, in ms, no browser has been connected to a page's session; 0 while one is."""
+    """Time in ms without a browser connected to a page's session; 0 while one is connected."""
     session = None if context is None else context.session
     if session is None or session.connection_count:
         return 0.0

@@ -1,15 +1,16 @@
-/** Tell the server something. */
+/** Send a message to the server. */
 export function ask(model, view, message) {
   knownThere(view.model.document)
   model.send_msg(message)
 }
 
-/** Have nothing sent along with messages that the server knows anyway. */
+/** Do not send along with messages what the server already knows. */
 export function knownThere(page) {
   if (!page || page.knownThere) return
   page.knownThere = true
-  // Bokeh takes what came from the server for new until the page next tells the server something, and
-  // would send it along, functions and all: names of the server's models tell them from our own.
+  // Until the page next sends a message, Bokeh treats what came from the server as new and would
+  // send it along, functions included: the names of the server's models distinguish them from our
+  // own.
   const create = page.create_json_patch.bind(page)
   page.create_json_patch = (events) => {
     for (const model of page._new_models) if (/^p\d+$/.test(model.id)) page._new_models.delete(model)

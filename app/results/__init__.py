@@ -1,1 +1,1 @@
-"""What the page shows, as plain arrays."""
+"""The data shown by the app, as plain arrays."""

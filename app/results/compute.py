@@ -1,4 +1,4 @@
-"""What the page computes on demand, as work for jobs.Task; all goes through study and the cache."""
+"""Computations of the app on demand, as work for jobs.Task; all use study and the cache."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .library import SOURCES, Cell, Library, Shown
 from .replays import first_replay
 from .selection import Selection
 
-# A compaction's part of the bar; it never seems to be at its end.
+# The share of a compaction in the progress bar, and the limit it approaches.
 PACKING_SHARE, NEARLY = 0.5, 0.95
 
 
@@ -31,7 +31,7 @@ def found_or_made(
 ) -> xr.Dataset:
     """The dataset of a kind and parameters from a store, or computed in this stage.
 
-    options: as the kind's compute takes them.
+    options: for the kind's compute.
     """
     found = library.stored(kind, params)
     if found is None:
@@ -43,7 +43,7 @@ def found_or_made(
 
 
 def states(library: Library, selection: Selection) -> Work:
-    """Work that finds or computes the states of a Selection; results in their Shown."""
+    """Work that loads or computes the states of a Selection; returns their Shown."""
 
     kind, params = SOURCES[selection.kind], selection.parameters()
 
@@ -70,7 +70,7 @@ def states(library: Library, selection: Selection) -> Work:
 
 
 def all_states(library: Library, cell: Cell) -> Work:
-    """Work that computes all states of a cell of which only some were kept; a Shown."""
+    """Work that computes all states of a cell of which only some are stored; returns a Shown."""
     params = cell.selection.parameters()
 
     def work(job: Job) -> Shown:
@@ -84,7 +84,7 @@ def all_states(library: Library, cell: Cell) -> Work:
 
 
 def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) -> xr.Dataset:
-    """The states of a cell with more of them kept, as these parameters say; counted."""
+    """Compute the states of a cell again and store more of them, as given by these parameters."""
     count = partial(_counted, job, begin=0.0)
     return found_or_made(
         library, job, "reading the packing", SOURCES[cell.kind], params, progress=count
@@ -93,7 +93,7 @@ def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) ->
 
 @contextmanager
 def _told_of_friction(selection: Selection) -> Iterator[None]:
-    """Where no forces balance, say so of a friction smaller than that of the packing."""
+    """If no forces balance, name a friction smaller than that of the packing as the cause."""
     try:
         yield
     except NotJammedError as error:
@@ -107,7 +107,7 @@ def _told_of_friction(selection: Selection) -> Iterator[None]:
 
 
 def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, Any]:
-    """Options of the computation of states that have it seen, and stopped, by who follows it."""
+    """Options of the computation of states that let followers watch and stop it."""
     if selection.kind != "walk":
         return {}
     walking = progress_feed.shared(progress_feed.Walking, params)
@@ -124,7 +124,7 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
 
 
 def exact(library: Library, shown: Shown) -> Work:
-    """Work that computes the exact intervals beside what is shown; results in a new Shown."""
+    """Work that computes the exact intervals for the states shown; returns a new Shown."""
     params = shown.cell.selection.intervals
 
     def work(job: Job) -> Shown:
@@ -145,7 +145,7 @@ def exact(library: Library, shown: Shown) -> Work:
     return Work(work, wants=((kinds.INTERVALS.name, params),))
 
 
-# Standard error of ln V on the page: its width is then known to a part in a thousand.
+# Standard error of ln V in the app; the width of S is then known to 0.1 %.
 VOLUME_ERROR = 0.1
 
 
@@ -155,12 +155,12 @@ def _volume_parameters(cell: Cell) -> Parameters:
 
 
 def known_volume(library: Library, cell: Cell) -> Callable[[Job], tuple[Cell, xr.Dataset | None]]:
-    """Work that looks for the volume of S of a cell's packing: (cell, dataset or None)."""
+    """Work that looks up the volume of S of a cell's packing: (cell, dataset or None)."""
     return lambda job: (cell, library.stored(kinds.VOLUME, _volume_parameters(cell)))
 
 
 def volume(library: Library, cell: Cell) -> Work:
-    """Work that measures the volume of S of a cell's packing; results in (cell, dataset)."""
+    """Work that computes the volume of S of a cell's packing; returns (cell, dataset)."""
     params = _volume_parameters(cell)
 
     def work(job: Job) -> tuple[Cell, xr.Dataset]:
@@ -189,7 +189,7 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
     seen.restart()
 
     def look(glimpse: Any) -> None:
-        job.stage = f"compressing, step {glimpse.step}"  # the rest is told beside the picture
+        job.stage = f"compressing, step {glimpse.step}"  # other numbers are next to the picture
         seen.add(glimpse)
 
     study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)

@@ -1,4 +1,4 @@
-"""What the states in the stores say together: measures and extents against μ, as plain arrays."""
+"""Statistics over the states in the stores: measures and extents against μ, as plain arrays."""
 
 import threading
 from collections import OrderedDict
@@ -18,8 +18,8 @@ from .selection import Selection, unusual
 
 MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
 CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
-KEPT = 1000  # rows in memory, for all visitors: some 10 kB each
-MOST_CURVES = 5  # of a distribution in one plot
+KEPT = 1000  # rows in memory, for all visitors: about 10 kB each
+MOST_CURVES = 5  # distributions in one plot
 
 Row = dict[str, Any]
 
@@ -28,13 +28,13 @@ _lock = threading.Lock()
 
 
 def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
-    """Cells of other packings and μ made like this one: seed and friction may differ."""
+    """Cells of other packings and μ made with the same options; seed and friction may differ."""
     kin = _kin(cell.selection)
     return [other for other in cells if _kin(other.selection) == kin]
 
 
 def _kin(selection: Selection) -> tuple[Any, ...]:
-    """What is the same for all cells of one statistic."""
+    """Properties that all cells of one statistic share."""
     made = selection.packing
     packing = {name: made.get(name) for name in ("imported", "n")}
     packing |= {} if selection.imported else unusual(made)
@@ -44,12 +44,12 @@ def _kin(selection: Selection) -> tuple[Any, ...]:
 
 
 def rows(cells: Iterable[Cell]) -> list[Row]:
-    """One dict a cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
+    """A dict per cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
     return [_row(cell.store, cell.name, cell.selection) for cell in cells]
 
 
 def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
-    """The same from exact intervals, of those packings whose intervals a store has."""
+    """The same from exact intervals, for packings whose intervals are in a store."""
     found = []
     for cell in cells:
         for store in library.stores:
@@ -66,7 +66,7 @@ def _row(store: Store, name: str, selection: Selection) -> Row:
         if key in _rows:
             _rows.move_to_end(key)
             return _rows[key]
-    with readable(store, name) as dataset:  # but for the states, most of it
+    with readable(store, name) as dataset:  # everything except the states, which are most of it
         scale = dataset["force_scale"].item()
         row: Row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
         row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
@@ -80,9 +80,9 @@ def _row(store: Store, name: str, selection: Selection) -> Row:
 
 
 def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
-    """{μ: extents of the packings with it}: of this μ and some others, spread over all there are.
+    """{μ: extents of its packings} for this μ and some others, spread over all available ones.
 
-    Packings whose forces are determined are left out.
+    Packings with determined forces are left out.
     """
     by_mu: dict[float, list[Floats]] = {}
     for row in found:

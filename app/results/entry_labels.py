@@ -1,6 +1,6 @@
-"""Names that a visitor gave to what is in the cache, and those of files that were brought.
+"""Names that a visitor gave to entries of the cache, and those of uploaded files.
 
-They are kept in a hidden file of the store's folder: {entry, or digest of an upload: name}.
+They are stored in a hidden file of the store's folder: {entry, or digest of an upload: name}.
 """
 
 import json
@@ -11,13 +11,13 @@ from granforce.study.store import Store
 from granforce.system.files import written
 
 NAMES = ".names.json"
-LONGEST = 80  # characters of a name
+LONGEST = 80  # characters per name
 
 _lock = threading.Lock()
 
 
 def names(store: Store) -> dict[str, str]:
-    """All names that were given; none where the file is missing or damaged."""
+    """All names; empty if the file is missing or damaged."""
     with suppress(OSError, ValueError):
         found = json.loads((store.path / NAMES).read_text())
         if isinstance(found, dict):
@@ -26,9 +26,9 @@ def names(store: Store) -> dict[str, str]:
 
 
 def call(store: Store, key: str, name: str) -> None:
-    """Give an entry, or the digest of an upload, a name; an empty one takes it away.
+    """Give an entry, or the digest of an upload, a name; an empty name removes it.
 
-    InputError where it cannot be kept.
+    InputError if it cannot be stored.
     """
     name = " ".join(name.split())[:LONGEST]
     with _lock:

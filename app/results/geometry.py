@@ -1,4 +1,4 @@
-"""Disks and contacts as they are drawn, with their periodic images: plain arrays."""
+"""Disks and contacts with their periodic images, for drawing: plain arrays."""
 
 from typing import NamedTuple
 
@@ -9,23 +9,23 @@ from granforce.types import Floats, Integers, Mask
 
 # Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0
-# How far from the middle a contact may be that is to be dragged first, in half of what is seen.
+# Largest distance from the centre of the contact suggested for dragging, in half view widths.
 NEAR = 0.45
-# Of a force chain: its width where it carries the mean normal force, in largest radii, and the
-# change in ⟨f_n⟩ at which its colour is full where nothing else is asked for.
+# Width of a force chain with the mean normal force, in largest radii, and the default change in
+# ⟨f_n⟩ for full colour.
 CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
-FULL_DEVIATION = 4.0  # σ at which the colour of a deviation from what was measured is full
+FULL_DEVIATION = 4.0  # deviation from the measurement, in σ, for full colour
 
 
 class Disks(NamedTuple):
-    """Disks and their periodic images that are seen, k rows."""
+    """Visible disks and periodic images, k rows."""
 
     x: Floats  # (k,) length
     y: Floats
     r: Floats
     grain: Integers  # (k,) number of the grain
-    contacts: Integers  # (k,) its number of force-bearing contacts
-    image: Mask  # (k,) bool, whether the centre lies outside the cell
+    contacts: Integers  # (k,) number of its contacts in the backbone
+    image: Mask  # (k,) bool, whether the centre is outside the cell
 
 
 class Links(NamedTuple):
@@ -41,7 +41,7 @@ class Links(NamedTuple):
 
 
 def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
-    """(x_low, x_high, y_low, y_high) of a square around the cell (where open, the grains)."""
+    """(x_low, x_high, y_low, y_high) of a square around the cell (or the grains, if open)."""
     margin = MARGIN * packing.r.max()
     periodic = np.isfinite(packing.box)
     corner, opposite = packing.cell.extent
@@ -54,7 +54,7 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
 
 
 def inviting(links: Links, normal: Floats, window: tuple[float, ...]) -> int:
-    """Row of the strongest contact near the middle of the window, by f_n (N_c,); −1 without any."""
+    """Row of the strongest contact near the centre of the window, by f_n (N_c,); −1 if none."""
     x_low, x_high, y_low, y_high = window
     away = np.maximum(
         np.abs(links.x0 + links.x1 - x_low - x_high), np.abs(links.y0 + links.y1 - y_low - y_high)
@@ -64,7 +64,7 @@ def inviting(links: Links, normal: Floats, window: tuple[float, ...]) -> int:
 
 
 def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
-    """Disks; x (N, 2) centres in the cell, backbone: (N_c,) its contacts as positions."""
+    """Disks; x (N, 2) centres in the cell, backbone: (N_c,) positions of its contacts."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
     parts = []
@@ -82,7 +82,7 @@ def links(packing: Packing, x: Floats, backbone: Integers) -> Links:
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     reach = packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
     parts = []
-    # From a centre inside the cell a contact may reach out of it, so its image may come in.
+    # A contact of a disk inside the cell may extend outside, and its image then enters the cell.
     cell, begin = packing.cell, x[i]
     end = begin + reach
     ends = cell.across(begin), cell.across(end)

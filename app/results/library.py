@@ -1,6 +1,6 @@
-"""What the app shows, as plain arrays: no widgets, no plots.
+"""The results shown by the app, as plain arrays: no widgets, no plots.
 
-The only module of the app, with those that compute for single tabs, that knows stores and studies.
+The only module of the app, with those that compute for single tabs, that uses stores and studies.
 """
 
 import json
@@ -26,24 +26,24 @@ from .entry_labels import names
 from .replays import Replay, make_replay
 from .selection import Selection, selected, series
 
-# Environment variable naming a store of precomputed results to open instead of data/start.zarr.
+# Environment variable naming a store of precomputed results to use instead of data/start.zarr.
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parents[2] / "data" / "start.zarr"
 
-# Where states come from.
+# Sources of states.
 SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
 
-OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
+OPENING_MU = 0.1  # where forces are least determined, and most interesting to see
 SHOWN_KEPT = 16  # cells in memory, for all visitors
 STEPS_GROW = 0.3  # steps of a compaction ~ n to this power: 325 at 400 disks, 475 at 1600
 
 
 class Cell(NamedTuple):
-    """States that a store holds: what they are, what they are called, where they are."""
+    """States in a store: their parameters, their name, and their location."""
 
     selection: Selection
-    series: str  # everything but μ, in words; cells of one series form one η(μ)
-    params: Parameters  # as its kind names it
+    series: str  # everything except μ, in words; cells of one series form one η(μ)
+    params: Parameters  # parameters of its kind
     store: Store  # the store that holds them
     name: str  # of the entry
 
@@ -54,7 +54,7 @@ class Cell(NamedTuple):
 
     @property
     def kept(self) -> int:
-        """How many of its states are stored."""
+        """Number of its stored states."""
         return int(self.params.get("keep") or self.selection.states)
 
     @property
@@ -64,15 +64,15 @@ class Cell(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """All that the page needs of one cell."""
+    """All data of one cell for the page."""
 
     cell: Cell
     replay: Replay
-    exact: xr.Dataset | None  # of exact intervals, or None where no store has them
+    exact: xr.Dataset | None  # of exact intervals, or None if no store has them
 
 
 class Library:
-    """The stores side by side: precomputed results, read-only, and the user's own cache.
+    """The stores together: precomputed results, read-only, and the user's own cache.
 
     Shared by all visitors; its methods may be called from any thread.
     """
@@ -93,7 +93,7 @@ class Library:
         self.cache = self._open(cache, readonly=False)
         self.catalogue: list[Cell] = []  # as last read
         self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
-        self._damaged: set[tuple[Path, str]] = set()  # the same of those that could not be read
+        self._damaged: set[tuple[Path, str]] = set()  # entries that could not be read
         self._rows: dict[str, dict[str, Any]] = {}
         self._shown: OrderedDict[str, Shown] = OrderedDict()
         self._kept, self._lock = kept, threading.Lock()
@@ -107,20 +107,20 @@ class Library:
 
     @property
     def stores(self) -> list[Store]:
-        """The stores that could be opened; what both hold is taken from the first."""
+        """The stores that could be opened; entries in both are read from the first."""
         return [store for store in (self.shipped, self.cache) if store is not None]
 
     @property
     def own(self) -> Store:
-        """The cache, where what is computed is kept; InputError without one."""
+        """The cache, where computed results are stored; InputError without one."""
         if self.cache is None:
             raise InputError("no cache folder can be written, so nothing can be computed")
         return self.cache
 
     def cells(self) -> list[Cell]:
-        """All states of the current algorithms, by series and μ; also kept as `catalogue`.
+        """All states of the current algorithms, by series and μ; also stored in `catalogue`.
 
-        Of the same states those of which most are stored.
+        If a store has the same states twice, the entry with most stored states.
         """
         found: dict[tuple[str, ...], Cell] = {}
         for store in self.stores:
@@ -144,18 +144,18 @@ class Library:
             if (store.path, name) in self._damaged:
                 if study.load(store, SOURCES[kind], params) is None:
                     continue
-                self._damaged.discard((store.path, name))  # it was computed anew
+                self._damaged.discard((store.path, name))  # it was computed again
             if name in store:
                 return self._cell(store, name)
         return None
 
     def series(self, selection: Selection, parameters: Parameters | None = None) -> str:
-        """Everything but μ, in words; an upload is called by its files."""
+        """Everything except μ, in words; an upload is named by its files."""
         known = names(self.cache) if selection.imported and self.cache is not None else {}
         return series(selection, parameters, known.get(selection.packing.get("imported", "")))
 
     def _cell(self, store: Store, name: str) -> Cell | None:
-        """The Cell of an entry; None where it holds no states of the current algorithms."""
+        """The Cell of an entry; None if it has no states of the current algorithms."""
         entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
         if entry is None or not study.is_current(SOURCES[entry.kind], entry):
             return None
@@ -164,7 +164,7 @@ class Library:
         return Cell(selection, called, entry.params, store, name)
 
     def dataset(self, cell: Cell) -> xr.Dataset:
-        """The dataset of one cell; InputError if it is damaged, and then it is no longer listed."""
+        """The dataset of one cell; if it is damaged, InputError, and it is no longer listed."""
         found = study.load(cell.store, SOURCES[cell.kind], cell.params)
         if found is None:
             self._damaged.add((cell.store.path, cell.name))
@@ -172,7 +172,7 @@ class Library:
         return found
 
     def shown(self, cell: Cell) -> Shown:
-        """Shown of one cell; the last few are kept. InputError if its packing is nowhere."""
+        """Shown of one cell; the last few are cached. InputError if its packing is in no store."""
         found = self.shown_in_memory(cell)
         if found is None:
             packing = self.packing(cell.params["packing"])
@@ -182,14 +182,14 @@ class Library:
         return found
 
     def shown_in_memory(self, cell: Cell) -> Shown | None:
-        """Shown of one cell if it is one of the last, or None: takes no time."""
+        """Shown of one cell if it is cached, otherwise None; returns at once."""
         with self._lock:
             if cell.name in self._shown:
                 self._shown.move_to_end(cell.name)
             return self._shown.get(cell.name)
 
     def keep_in_memory(self, shown: Shown) -> None:
-        """Make this the newest of those kept."""
+        """Make this the newest in the cache."""
         with self._lock:
             self._shown[shown.cell.name] = shown
             while len(self._shown) > self._kept:
@@ -223,7 +223,7 @@ class Library:
         return None
 
     def lend_packing(self, params: Parameters) -> None:
-        """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
+        """Copy a packing from the shipped store to the cache, so that it is not made again."""
         own = self.own
         if self.shipped is not None:
             found = study.load(self.shipped, kinds.PACKING, params)
@@ -236,7 +236,7 @@ class Library:
         for store in self.stores:
             for entry in study.entries(store, kinds.PACKING):
                 if "n" not in entry.params:
-                    continue  # it was imported
+                    continue  # imported
                 larger = n / entry.params["n"]
                 away = abs(np.log((entry.params["mu"] + 1e-3) / (mu + 1e-3)))
                 known.append((abs(np.log(larger)), away, entry.name, store, larger))
@@ -251,10 +251,10 @@ class Library:
 
 @contextmanager
 def readable(store: Store, name: str) -> Iterator[xr.Dataset]:
-    """The dataset of an entry, to be read as needed; InputError where it turns out damaged."""
+    """The dataset of an entry, read on demand; InputError if it turns out to be damaged."""
     try:
         yield store[name]
-    except Exception as error:  # what damage raises depends on codec, zarr and xarray
+    except Exception as error:  # the exception depends on codec, zarr and xarray
         raise _damage(store, name) from error
 
 
@@ -265,7 +265,7 @@ def _damage(store: Store, name: str) -> InputError:
 
 
 def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
-    """Of these cells the one whose μ is nearest, on the logarithmic scale of the slider."""
+    """The cell with the nearest μ, on the logarithmic scale of the slider."""
     return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
 
 
@@ -275,7 +275,7 @@ def cell_of(cells: Sequence[Cell], wanted: Selection | None) -> Cell | None:
 
 
 def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
-    """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
+    """The cell of the wanted Selection, or the best one to open; None without cells."""
     found = cell_of(cells, wanted)
     if found is not None or not cells:
         return found
@@ -285,14 +285,14 @@ def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | 
 
 
 def with_states(cells: Sequence[Cell], wanted: Selection) -> Selection:
-    """The wanted Selection with the largest number of states that a cell has; or as it was."""
+    """The wanted Selection with the largest number of states in a cell, or unchanged."""
     found = [c.selection for c in cells if c.selection._replace(states=wanted.states).names(wanted)]
     return max(found, key=lambda selection: selection.states, default=wanted)
 
 
-LEAST_PLACE = -3.5  # stands for μ = 0
+LEAST_PLACE = -3.5  # represents μ = 0
 
 
 def place(mu: float) -> float:
-    """log10 μ, and LEAST_PLACE for what is below."""
+    """log10 μ, and LEAST_PLACE for smaller values."""
     return max(LEAST_PLACE, np.log10(mu)) if mu > 0 else LEAST_PLACE

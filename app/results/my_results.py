@@ -1,4 +1,4 @@
-"""What is in the cache: computations by name, time and size, to be opened or deleted."""
+"""The contents of the cache: computations by name, time and size, to open or delete."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from .library import SOURCES, Library
 
 
 def rows(library: Library) -> list[dict[str, Any]]:
-    """One dict for each computation in the cache, the newest first: entry, name, what, when, MB."""
+    """A dict per computation in the cache, newest first: entry, name, kind, time, MB."""
     store = library.own
     known, entries = names(store), store.entries()
     cells = [cell for cell in library.cells() if cell.store is store]
@@ -34,7 +34,7 @@ def rows(library: Library) -> list[dict[str, Any]]:
 
 
 def delete(library: Library, name: str) -> None:
-    """Delete a computation from the cache, and its packing with all that is known of it alone."""
+    """Delete a computation from the cache, and its packing with all results on it alone."""
     store = library.own
     entry = store.entry(name)
     if entry is None or entry.kind not in SOURCES:
@@ -48,13 +48,13 @@ def delete(library: Library, name: str) -> None:
 
 
 def _packing(entry: Entry) -> Parameters:
-    """The packing that an entry is, or is of."""
+    """The packing of an entry, or the entry itself if it is one."""
     packing: Parameters = entry.params
     return packing if entry.kind == "packing" else packing.get("packing", {})
 
 
 def _belongs(other: Entry, entry: Entry) -> bool:
-    """Whether an entry is this one of states, or what is known beside it."""
+    """Whether an entry is this entry of states, or a result derived from it."""
     if other.kind in SOURCES:
         return other.name == entry.name
     same = canonical(_packing(other)) == canonical(_packing(entry))

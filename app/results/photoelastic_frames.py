@@ -1,4 +1,4 @@
-"""Photoelastic frames that a visitor brings: measured beside inferred forces, as plain arrays."""
+"""Photoelastic frames uploaded by a visitor: measured and inferred forces, as plain arrays."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -22,47 +22,47 @@ from ..background.limits import LIMITS
 from ..explore.tabs.export import files
 from . import uploads
 
-DRAWS = 80  # for error bars on the page
-CERTAIN = 2.0  # standard errors above 0 from which on a contact is told to carry for certain
+DRAWS = 80  # for error bars in the app
+CERTAIN = 2.0  # standard errors above 0 from which a contact certainly carries force
 
 
 class Frame(NamedTuple):
-    """A frame and the admissible network that its measurement speaks for; forces in ⟨f_n⟩."""
+    """A frame and its likeliest admissible network; forces in ⟨f_n⟩."""
 
-    source: str  # which files it came from, in words
-    report: dict[str, Any]  # of read_pegs
+    source: str  # names of its files
+    report: dict[str, Any]  # report of read_pegs
     numbers: tuple[Any, ...]  # of all frames in the files
-    packing: Packing  # of the grains alone, under what walls do to them in the inferred network
+    packing: Packing  # the grains alone, with wall forces of the inferred network as loads
     x: np.ndarray  # (N, 2) centres of the grains
     r: np.ndarray  # (N,) radii
-    ids: np.ndarray  # (N + walls,) their names
+    ids: np.ndarray  # (N + walls,) their ids
     ends: np.ndarray  # (N_c, 2) grains of each contact; N and above: a wall
-    lines: np.ndarray  # (N_c, 2, 2) where a contact is drawn from and to
-    measured: np.ndarray  # (N_c, 2) f_n, f_t; NaN where they were not
+    lines: np.ndarray  # (N_c, 2, 2) ends of the line for each contact
+    measured: np.ndarray  # (N_c, 2) f_n, f_t; NaN if not measured
     inferred: np.ndarray  # (N_c, 2)
     error: np.ndarray  # (N_c, 2) standard errors of the inferred forces
-    deviation: np.ndarray  # (N_c, 2) inferred less measured, in its σ
+    deviation: np.ndarray  # (N_c, 2) inferred minus measured, in σ
     added: np.ndarray  # (N_c,) bool, contacts that were not listed
     suspects: np.ndarray  # contacts beyond 3 σ, the farthest first
-    certain: np.ndarray  # contacts that were not measured and carry for certain, strongest first
+    certain: np.ndarray  # unmeasured contacts that certainly carry force, strongest first
     at_wall: np.ndarray  # (N,) bool, grains at walls
-    left_open: np.ndarray  # (N,) bool, other grains whose balance had to be left open
-    found: np.ndarray  # (k, 2) where something was mended
-    region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `regions`
+    left_open: np.ndarray  # (N,) bool, other grains with open balance
+    found: np.ndarray  # (k, 2) places of repairs
+    region: np.ndarray  # (N_c,) number of the contact's region, see `regions`
     stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
     stress_error: np.ndarray  # (9, 3)
 
 
 class Measured(NamedTuple):
-    """What was measured in a frame that was opened as a packing, for its contacts (N_c,)."""
+    """Measurements of a frame opened as a packing, for its contacts (N_c,)."""
 
-    packing: Parameters  # that name it
-    force: np.ndarray  # f_n in the packing's unit; NaN where it was not measured
-    off: np.ndarray  # inferred less measured f_n in σ, NaN likewise
+    packing: Parameters  # its parameters
+    force: np.ndarray  # f_n in the packing's unit; NaN if not measured
+    off: np.ndarray  # inferred minus measured f_n in σ, NaN likewise
 
 
 def measured(frame: Frame, packing: Parameters) -> Measured:
-    """What was measured of the contacts between the grains of a frame."""
+    """The measurements of the contacts between the grains of a frame."""
     between = (frame.ends < len(frame.r)).all(axis=1)
     unit = frame.report["mean_measured_normal_force"]
     return Measured(packing, unit * frame.measured[between, 0], frame.deviation[between, 0])
@@ -76,10 +76,9 @@ def infer(
     walls: Any = None,
     number: int | None = None,
 ) -> Callable[[Job], Frame]:
-    """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
+    """Work for jobs.Task that reads a frame and infers its forces with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse, walls: as for `read_pegs`; number: of
-    the frame.
+    files: {role: (name, content)}; mu, reverse, walls: as for `read_pegs`; number: of the frame.
     """
 
     def work(job: Job) -> Frame:
@@ -144,8 +143,11 @@ def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame
 
 
 def table(frame: Frame) -> bytes:
-    """All that was found as one CSV (bytes): a row for each contact, with names, measured and
-    inferred forces, errors, marks and region; above them the stress of each region."""
+    """All results as one CSV (bytes).
+
+    Above: the stress of each region. Then a row for each contact: ids, measured and inferred
+    forces, errors, marks and region.
+    """
     suspect, certain = np.zeros((2, len(frame.ends)), dtype=int)
     suspect[frame.suspects], certain[frame.certain] = 1, 1
     one, two = frame.ids[frame.ends].T
@@ -174,7 +176,7 @@ def table(frame: Frame) -> bytes:
 
 
 def account(report: dict[str, Any]) -> Iterator[str]:
-    """What was found, what was done, and what that leaves open: sentences with the numbers."""
+    """Findings, repairs and open questions as sentences with numbers."""
     count = report.get
     if "names" in report:
         yield f"Beware: {report['names']}."
@@ -231,8 +233,8 @@ DOUBTS = (
                                        "mean is used, and the difference counts as an error."),
     ("beyond_friction", "measured tangential forces exceed the friction limit at this μ."),
 )  # fmt: skip
-REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubted
-NAMED = 12  # disks that are named
+REVERSED = 0.05  # fraction of the unbalance from which the sign of f_t is in doubt
+NAMED = 12  # disks listed by name
 
 
 def _left(report: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Force space seen in a plane: where states of a Replay lie in it, and the outline of S there."""
+"""Force space in a plane: the positions of a Replay's states, and the outline of S."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from .library import Cell, Library
 from .replays import Replay
 from .selection import Selection
 
-# Two (position in the backbone, 0 for f_n or 1 for f_t), or none.
+# Two (position in the backbone, 0 for f_n or 1 for f_t), or empty.
 Components = tuple[tuple[int, int], ...]
 
 
 class Plane(NamedTuple):
-    """Two axes of force space, and where states lie in their plane. Forces are in ⟨f_n⟩."""
+    """Two axes of force space, and the positions of states in their plane. Forces are in ⟨f_n⟩."""
 
     components: Components  # two (position in the backbone, 0 or 1), or empty for principal axes
     axes: Floats  # (2, N_c, 2)
     origin: Floats  # (2,) of the plane's coordinates
     share: Floats  # (2,) of the variance of the states, NaN for components
     path: Any  # (F, 2) float32: the original network, then the states shown
-    kind: str = ""  # STRESS where the axes are those of stresses
+    kind: str = ""  # STRESS if the axes are those of stresses
 
     @property
     def pair(self) -> list[int]:
-        """Two contacts, of whose forces each axis is one; none for other planes."""
+        """The two contacts whose forces are the axes; empty for other planes."""
         contacts = [contact for contact, _ in self.components]
         return contacts if len(set(contacts)) == 2 else []
 
@@ -50,7 +50,7 @@ PAIR = "green", "violet"  # lines of the contacts whose forces are the axes, acr
 
 
 class Outlined(NamedTuple):
-    """The outline of S in a Plane, between polygons inside and outside."""
+    """The outline of S in a Plane, between inner and outer polygons."""
 
     plane: Plane
     inner: Floats  # (k, 2) corners
@@ -61,8 +61,9 @@ class Outlined(NamedTuple):
 
 
 def principal(replay: Replay, states: Any = None) -> Plane:
-    """The Plane of the two directions along which states (k, N_c, 2), by default those shown, vary
-    most.
+    """The Plane of the two directions of largest variance.
+
+    states (k, N_c, 2): by default those shown.
     """
     states = _frames(replay)[1:] if states is None else states.astype(np.float64)
     axes, share = measures.principal_axes(states)
@@ -72,7 +73,7 @@ def principal(replay: Replay, states: Any = None) -> Plane:
 def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> Plane:
     """The Plane of two components (position in the backbone, 0 for f_n or 1 for f_t).
 
-    InputError for a contact that is not there, or one component named twice.
+    InputError for a missing contact, or the same component twice.
     """
     (a, part), (b, other) = first, second
     chosen = (a, part), (b, other)
@@ -89,8 +90,10 @@ def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> P
 
 
 def strong_pair(replay: Replay) -> tuple[int, int]:
-    """Two contacts, positions in the backbone: the strongest as packed, and the strongest of those
-    that no disk has in common with it (where there are none, the second). InputError for fewer.
+    """Two contacts, positions in the backbone: the strongest as packed, and the next without a
+    disk in common.
+
+    If there is none, the second strongest. InputError for fewer than two.
     """
     if replay.normal.shape[1] < 2:
         raise InputError("there are not two contacts to compare")
@@ -122,8 +125,8 @@ def _plane(
 
 
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
-    """Titles of the two axes, in words."""
-    if plane.pair:  # whose lines have colours
+    """Labels of the two axes, in words."""
+    if plane.pair:  # its lines have colours
         return tuple(f"normal force at the {colour} line (mean force = 1)" for colour in PAIR)
     if plane.components:
         return tuple(
@@ -140,7 +143,7 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
 
 
 def name(plane: Plane) -> str:
-    """What a link calls a Plane."""
+    """The name of a Plane in a link."""
     if not plane.components:
         return "s" if plane.kind == STRESS else "p"
     return _spelled(plane.components)
@@ -151,13 +154,13 @@ def _spelled(components: Components) -> str:
 
 
 def renumbered(name: str, number: Callable[[int], int]) -> str:
-    """The name of a plane that calls each contact by another number."""
+    """The name of a plane with each contact renumbered."""
     found = read(name)
     return _spelled(tuple((number(contact), part) for contact, part in found)) if found else name
 
 
 def read(text: str) -> Components:
-    """The components () or ((contact, part), (contact, part)) of a name; ValueError for none."""
+    """The components () or ((contact, part), (contact, part)) of a name; ValueError if invalid."""
     if text in ("p", "s"):
         return ()
     first, second = ((int(part[:-1]), "nt".index(part[-1:] or "?")) for part in text.split("-"))
@@ -165,7 +168,7 @@ def read(text: str) -> Components:
 
 
 def named(library: Library, cell: Cell, replay: Replay, text: str) -> Plane:
-    """The Plane of a name, with the axes that are kept of it."""
+    """The Plane of a name, with its stored axes."""
     chosen = read(text)
     if chosen:
         return components(replay, *chosen)
@@ -177,9 +180,9 @@ def named(library: Library, cell: Cell, replay: Replay, text: str) -> Plane:
 
 
 def beside(cells: Sequence[Cell], cell: Cell) -> Cell | None:
-    """Of these the cell of the other kind of states of the same packing and μ with most, or None.
+    """The cell of the other kind of states with the same packing and μ and most states, or None.
 
-    States uniform in S beside a walk, a walk beside uniform ones.
+    Uniform states for a walk, and a walk for uniform states.
     """
     own = cell.selection
     others = [
@@ -193,14 +196,14 @@ def beside(cells: Sequence[Cell], cell: Cell) -> Cell | None:
 
 
 def points(plane: Plane, replay: Replay, other: Replay) -> Floats:
-    """Where the states (k, 2) of another Replay of the same contacts lie in a Plane."""
+    """Positions (k, 2) in a Plane of the states of another Replay on the same contacts."""
     if not np.array_equal(replay.backbone, other.backbone):
         return np.empty((0, 2))
     return np.tensordot(_frames(other)[1:], plane.axes, ((1, 2), (1, 2))) - plane.origin
 
 
 def inner_share(points: Floats, outline: npt.ArrayLike) -> float:
-    """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centroid."""
+    """Fraction of points (n, 2) in a convex polygon (k, 2) shrunk to half about its centroid."""
     corners = halfway(outline)
     edge, away = np.roll(corners, -1, axis=0) - corners, points[:, None] - corners
     turn = edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]
@@ -217,9 +220,9 @@ def halfway(outline: npt.ArrayLike) -> Floats:
 
 
 def area(points: npt.ArrayLike) -> float:
-    """Area of the convex hull of points (n, 2); 0 where they lie on a line."""
+    """Area of the convex hull of points (n, 2); 0 for points on a line."""
     try:
-        return float(ConvexHull(points).volume)  # as it is called in any dimension
+        return float(ConvexHull(points).volume)  # the name of the measure in any dimension
     except QhullError:
         return 0.0
 
@@ -227,7 +230,7 @@ def area(points: npt.ArrayLike) -> float:
 def outline(
     library: Library, cell: Cell, replay: Replay, plane: Plane
 ) -> Callable[[Job], Outlined]:
-    """Work, for jobs.Task, that finds or computes the outline of S in a Plane."""
+    """Work for jobs.Task that loads or computes the outline of S in a Plane."""
 
     def work(job: Job) -> Outlined:
         if plane.kind == STRESS:
@@ -251,7 +254,7 @@ def _stresses(library: Library, job: Job, cell: Cell, plane: Plane) -> Outlined:
 
 
 def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
-    """As a store names the outline in a Plane."""
+    """The parameters of the outline in a Plane."""
     selection = cell.selection
     chosen = [[int(replay.backbone[contact]), part] for contact, part in plane.components]
     return kinds.OUTLINE.parameters(
@@ -263,7 +266,7 @@ def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
 
 
 def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
-    """The Plane on the axes that its outline was made with."""
+    """The Plane on the axes with which its outline was computed."""
     axes = found["axes"].values
     if np.array_equal(axes, plane.axes):
         return plane
@@ -272,7 +275,7 @@ def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
 
 
 def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
-    """The outline as kept; its axes are those it was made with, and the path follows them."""
+    """The stored outline, on the axes of its computation, to which the path is converted."""
     plane = _as_kept(replay, plane, found)
     return Outlined(
         plane,

@@ -1,7 +1,7 @@
-"""What a computation shows of itself while it runs, for all pages that ask for the same.
+"""Intermediate results of a computation, for all pages that request the same one.
 
-The thread that computes adds to a Compaction or a Walking; each page reads them through a Following
-of its own, which keeps its place, and sends as much as its browser paints.
+The computing thread adds to a Compaction or a Walking; each page reads them through its own
+Following, which remembers its position and sends as much as its browser can paint.
 """
 
 import threading
@@ -24,21 +24,21 @@ Message = dict[str, Any]  # to the player
 Summary = Mapping[str, Any]  # of a Replay
 Kind = TypeVar("Kind")
 
-# A moving packing is kept each time its box has shrunk by this part, or so many seconds have gone:
-# the gas, which is compressed within a tenth of a second, is seen as well as the slow end.
+# A moving packing is recorded each time its box has shrunk by STRAIN, or after EVERY_S seconds:
+# this shows the gas, which is compressed within a tenth of a second, as well as the slow end.
 STRAIN, EVERY_S = 0.003, 0.04
-PICTURE_BYTES = 16e6  # of the pictures kept of one compaction
-BEHIND = 12  # pictures; for each so many that a page is behind it leaves one more out
+PICTURE_BYTES = 16e6  # of the recorded pictures of one compaction
+BEHIND = 12  # pictures; for each multiple of this that a page is behind, it skips one more
 BATCH = 64  # states sent at a time
-ENOUGH = 256  # states, from which axes of force space are found while a walk is under way
-BOUNDS_S = 0.25  # exact bounds are sent no more often: what stands still is drawn anew for them
+ENOUGH = 256  # states used to compute axes of force space during a walk
+BOUNDS_S = 0.25  # s between two messages with exact bounds, each of which redraws static parts
 
 _shared: WeakValueDictionary[tuple[str, str], Any] = WeakValueDictionary()
 _lock = threading.Lock()
 
 
 def shared(kind: type[Kind], params: Parameters) -> Kind:
-    """The Compaction, Walking or Bounding of these parameters: one for all who name them alike."""
+    """The shared Compaction, Walking or Bounding of these parameters."""
     with _lock:
         key = kind.__name__, repr(params)
         found = _shared.get(key)
@@ -48,23 +48,23 @@ def shared(kind: type[Kind], params: Parameters) -> Kind:
 
 
 class Compaction:
-    """Pictures of a packing that is being compressed, the last ones kept."""
+    """Pictures of a packing during compression; the last ones are kept."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self.run = 0  # how often it was begun
+        self.run = 0  # number of starts
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew: an earlier run was cancelled."""
+        """Start again: an earlier run was cancelled."""
         with self._lock:
             self.run += 1
             self._kept: deque[Message] = deque()
-            self.total = 0  # pictures kept since, those dropped included
+            self.total = 0  # number of recorded pictures, including dropped ones
             self._side, self._at = np.inf, -np.inf
 
     def add(self, glimpse: Any) -> None:
-        """Keep a Glimpse, if it differs enough from the last one."""
+        """Record a Glimpse if it differs enough from the last one."""
         now, side = time.perf_counter(), float(np.sqrt(np.prod(glimpse.box)))
         if side > (1 - STRAIN) * self._side and now < self._at + EVERY_S:
             return
@@ -78,7 +78,7 @@ class Compaction:
                 self._kept.popleft()
 
     def after(self, run: int, place: int) -> tuple[int, int, Message | None]:
-        """(run, place, picture or None): the next picture for who has seen `place` of a run."""
+        """(run, place, picture or None): the next picture for a page that has seen `place`."""
         with self._lock:
             if run != self.run:
                 run, place = self.run, 0
@@ -90,7 +90,7 @@ class Compaction:
 
 
 def _picture(glimpse: Any) -> Message:
-    """A Glimpse as the page draws it; forces in units of its own ⟨f_n⟩."""
+    """A Glimpse for the page to draw; forces in units of its own ⟨f_n⟩."""
     forces = glimpse.forces.astype(np.float32)
     mean = float(forces[:, 0].mean()) if len(forces) else 1.0
     return {
@@ -109,7 +109,7 @@ def _picture(glimpse: Any) -> Message:
 
 
 class Walking:
-    """The states of a walk as they are found, and the Replay that they go into."""
+    """The states of a walk in progress, and their Replay."""
 
     def __init__(self) -> None:
         self.run = 0
@@ -117,7 +117,7 @@ class Walking:
         self.parts: list[tuple[Any, tuple[float, ...]]] = []  # (state, NUMBERS)
 
     def restart(self, replay: Replay) -> None:
-        """Begin anew, on the `first_replay` of the ensemble."""
+        """Start again, on the `first_replay` of the ensemble."""
         self.parts = []
         self._every = every(replay.summary)
         self._growth = measures.Growth()
@@ -126,8 +126,8 @@ class Walking:
         self.run += 1
 
     def add(self, found: Any) -> None:
-        """Keep a Found state, or every so many where not all can be sent."""
-        assert self.replay is not None  # begun before
+        """Record a Found state, or only some if not all can be sent."""
+        assert self.replay is not None  # set by `restart`
         state = found.forces / self.replay.force_scale
         grown = self._growth.add(state)
         self._found += 1
@@ -139,25 +139,25 @@ class Walking:
 
 
 class Bounding:
-    """Exact bounds of f_n as they are found; NaN where one is still to come."""
+    """Exact bounds of f_n in progress; NaN for bounds still to come."""
 
     def __init__(self) -> None:
-        self.version = 0  # how often something has changed
+        self.version = 0  # number of changes
         self.forget()
 
     def forget(self) -> None:
-        """Keep nothing: whoever looks from now on is shown what is found by the next run."""
+        """Drop everything: pages then see the results of the next run."""
         self.low = self.high = np.zeros(0, np.float32)
 
     def restart(self, S: Any) -> None:
-        """Begin anew, on an ensemble."""
+        """Start again, on an ensemble."""
         self._place = {int(contact): k for k, contact in enumerate(S.index)}
         self._scale = S.force_scale
         self.low, self.high = np.full((2, len(S.index)), np.nan, dtype=np.float32)
         self.version += 1
 
     def add(self, bound: Any) -> None:
-        """Keep a Bound, if it is one of f_n."""
+        """Record a Bound if it is one of f_n."""
         if bound.component == 0:
             side = self.high if bound.side else self.low
             side[self._place[bound.contact]] = bound.value / self._scale
@@ -165,15 +165,15 @@ class Bounding:
 
 
 class Arriving:
-    """What one page has been sent of a Bounding."""
+    """The part of a Bounding that one page has received."""
 
     def __init__(self, params: Parameters) -> None:
-        """params: of the exact intervals, as a store names them."""
+        """params: the parameters of the exact intervals."""
         self._bounding = shared(Bounding, params)
         self._sent, self._at = 0, -np.inf
 
     def next(self) -> Message | None:
-        """What comes next, or None: {"bounds": {"low", "high": (N_c,)}}, in ⟨f_n⟩."""
+        """The next message, or None: {"bounds": {"low", "high": (N_c,)}}, in ⟨f_n⟩."""
         bounding, now = self._bounding, time.perf_counter()
         version = bounding.version
         if version == self._sent or now < self._at + BOUNDS_S or not len(bounding.low):
@@ -183,12 +183,12 @@ class Arriving:
 
 
 def every(summary: Summary) -> int:
-    """Of a walk under way every so many states are sent: all, if they fit in FRAME_BYTES."""
+    """The stride of states sent from a walk in progress: 1 if all fit in FRAME_BYTES."""
     return -(-summary["states"] // fitting(summary["contacts"], FRAME_BYTES))
 
 
 def numbers(summary: Summary) -> Integers:
-    """Numbers (F,) of the states that are sent of a walk under way, 0 for the original."""
+    """Numbers (F,) of the states sent from a walk in progress, 0 for the original."""
     return np.append(0, np.arange(1, summary["states"] + 1, every(summary)))
 
 
@@ -196,7 +196,7 @@ NUMBERS = ("number", "residual", "acceptance", "eta1", "eta2", "eta3")
 
 
 def _batch(parts: list[tuple[Any, tuple[float, ...]]]) -> Message:
-    """States as the player takes them: flat arrays, one state after the other."""
+    """States for the player: flat arrays, one state after the other."""
     forces = np.stack([state for state, _ in parts])
     rows = np.array([numbers for _, numbers in parts], dtype=np.float32).T
     return {
@@ -207,34 +207,34 @@ def _batch(parts: list[tuple[Any, tuple[float, ...]]]) -> Message:
 
 
 class Following:
-    """One page's place in what is computed for a Selection."""
+    """One page's position in the computation of a Selection."""
 
     def __init__(self, selection: Selection) -> None:
         self.selection = selection
         self._compaction = shared(Compaction, selection.packing)
         self._walking = shared(Walking, selection.parameters())
-        # Who joins later begins with the newest picture.
+        # A page that joins later begins with the newest picture.
         self._run, self._place = self._compaction.run, max(0, self._compaction.total - 1)
         self._walk_run = self._state = 0
 
     def rewind(self) -> None:
-        """The page has forgotten the states that it was sent."""
+        """The page has dropped the states that it received."""
         self._state = 0
 
     @property
     def fourfold(self) -> int:
-        """How often the states sent have grown fourfold since the first: 4 → 1, 16 → 2, …"""
+        """Number of fourfold increases of the states sent: 4 → 1, 16 → 2, …"""
         return max(0, self._state.bit_length() - 1) // 2
 
     def states(self) -> Floats | None:
-        """The states (k, N_c, 2) sent, in ⟨f_n⟩, of more than ENOUGH so many, evenly; or None."""
+        """The states (k, N_c, 2) sent, in ⟨f_n⟩, or ENOUGH evenly spaced ones of more; or None."""
         sent = self._walking.parts[: self._state]
         if not sent:
             return None
         return np.stack([state for state, _ in sent[:: -(-len(sent) // ENOUGH)]])
 
     def next(self) -> Message | None:
-        """What comes next, or None: {"picture": …}, {"replay": Replay} or {"states": …}."""
+        """The next message, or None: {"picture": …}, {"replay": Replay} or {"states": …}."""
         self._run, self._place, picture = self._compaction.after(self._run, self._place)
         if picture is not None:
             return {"picture": picture | {"mu": self.selection.packing["mu"]}}

@@ -1,4 +1,4 @@
-"""Replays: states to look at, as plain arrays, of a store or of a walk that is only beginning."""
+"""Replays: states to show, as plain arrays, from a store or from a walk that has just begun."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,37 +12,37 @@ from granforce.types import Floats, Integers
 
 from . import geometry
 
-FRAME_BYTES = 8e6  # of the frames that a page is sent
+FRAME_BYTES = 8e6  # of the frames sent to a page
 
 
 class Replay(NamedTuple):
-    """States to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
+    """States to show: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
 
     disks: geometry.Disks
     links: geometry.Links
-    box: Floats  # (2,) sides; inf where open
+    box: Floats  # (2,) sides; inf in open directions
     tilt: float  # of the cell
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
-    inviting: int  # row of links that a visitor is asked to drag first, or -1
-    typical: int  # the contact whose f_n scatters most nearly as that of all does on average, or -1
+    inviting: int  # row of links suggested for dragging, or -1
+    typical: int  # the contact whose f_n scatters most like the average, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     force_scale: float  # ⟨f_n⟩, force
-    normal: Any  # (F, N_c) float32 f_n: the original network, then the states kept
+    normal: Any  # (F, N_c) float32 f_n: the original network, then the stored states
     tangential: Any  # (F, N_c) float32 f_t
     number: Any  # (F,) number of the state, 0 for the original
     distance: Floats  # (F,) from the centre of the states
     residual: Floats  # (F,) NaN for the original
-    attempts: Floats  # (F,) spent on each state; NaN for the original and where none are made
-    growth: Mapping[str, Floats]  # {"eta1", "eta2", "eta3": (F,)} of the states shown so far
+    attempts: Floats  # (F,) for each state; NaN for the original and for samples without attempts
+    growth: Mapping[str, Floats]  # {"eta1", "eta2", "eta3": (F,)} of the states up to each
     low: Any  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
     high: Any  # (N_c, 2) float32 largest
     order: Integers  # (N_c,) contacts by original f_n, ascending
     sampling: measures.Sampling  # of the states shown
-    summary: dict[str, Any]  # plain numbers of the states, by their names in the schema
+    summary: dict[str, Any]  # plain numbers of the states, by schema name
 
     @property
     def invited(self) -> int | None:
-        """The contact of the row `inviting`; None without any."""
+        """The contact of the row `inviting`, or None."""
         return None if self.inviting < 0 else int(self.links.contact[self.inviting])
 
 
@@ -51,7 +51,7 @@ def make_replay(
 ) -> Replay:
     """The Replay of a dataset of states on its packing; μ is that of the ensemble.
 
-    most_bytes: of the frames; of more states so many are left out evenly.
+    most_bytes: of the frames; if there are more, states are left out evenly.
     """
     backbone = dataset["backbone"].values
     scale = float(dataset["force_scale"])
@@ -93,9 +93,9 @@ def make_replay(
 
 
 def first_replay(S: Any, states: int) -> Replay:
-    """The Replay of an ensemble before its walk: the original network alone; `states` will follow.
+    """The Replay of an ensemble before its walk: only the original network; `states` will follow.
 
-    S is of any kind that has packing, index, original, force_scale and mu.
+    S is any object with packing, index, original, force_scale and mu.
     """
     original = (S.original / S.force_scale).astype(np.float32)
     nothing = np.full(1, np.nan)
@@ -125,7 +125,7 @@ def first_replay(S: Any, states: int) -> Replay:
 
 
 def _typical(normal: Any) -> int:
-    """The contact of frames (F, N_c) that scatters as all do on average; -1 without any."""
+    """The contact of frames (F, N_c) with the most typical scatter; -1 without contacts."""
     spread = normal.std(axis=0)
     return int(np.argmin(np.abs(spread - spread.mean()))) if len(spread) else -1
 
@@ -154,12 +154,12 @@ def _replay(
 
 
 def fitting(contacts: int, most_bytes: float) -> int:
-    """How many states of so many contacts fit in so many bytes: two at least."""
+    """Number of states of this many contacts that fit in most_bytes, at least two."""
     return max(2, int(most_bytes / (8 * max(1, contacts))))
 
 
 def evenly(count: int, contacts: int, most_bytes: float) -> Integers:
-    """Which of `count` states fit in so many bytes, evenly spaced: all, where they do."""
+    """Evenly spaced indices of `count` states that fit in most_bytes; all, if they do."""
     most = fitting(contacts, most_bytes)
     if count <= most:
         return np.arange(count)

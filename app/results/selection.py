@@ -1,4 +1,4 @@
-"""What is asked for, and its three spellings: words on screen, a link, a command line."""
+"""A request for states, and its three forms: words on screen, a link, a command line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from granforce.study.keys import Parameters
 
 from ..background.limits import Limits
 
-# Names on screen of kinds.RELAXATIONS; the first is what a new walk takes unless told otherwise.
+# Names on screen of kinds.RELAXATIONS; the first is the default of a new walk.
 SOLVERS = {
     "accelerated": "nearest admissible state",
     "nearest": "nearest admissible state, by PIQP",
@@ -23,21 +23,21 @@ SOLVERS = {
 KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
 # Command-line options of a packing, apart from N, μ and seed.
 OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
-WORDS = {"accuracy": "step-accuracy"}  # those that are called otherwise on the command line
-# Stored states take at most about this much; measures are those of all states anyway.
+WORDS = {"accuracy": "step-accuracy"}  # those with other names on the command line
+# Approximate limit for stored states; measures always use all states.
 KEPT_BYTES = 64e6
-# Disks times (disks, for the packing, and states), up to which states are soon there, and what a
-# state costs beside one of the first kind.
+# Disks times (disks, for the packing, and states) up to which states appear quickly, and the
+# relative cost of a state of each kind.
 EASY = 500_000
 _WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
 _WEIGHTS["gauss_seidel_only"] = 10
-LONGEST_REASON = 200  # characters of a message about a link, which may hold anything
+LONGEST_REASON = 200  # characters of a message about a link, which may contain anything
 
 
 class Selection(NamedTuple):
-    """States asked for: of which packing, at which friction, from which source."""
+    """Requested states: packing, friction and source."""
 
-    packing: Parameters  # parameters of the packing, as kinds.PACKING names it
+    packing: Parameters  # parameters of kinds.PACKING
     mu: float  # friction coefficient of the ensemble
     kind: str = "walk"  # one of KINDS
     relax: str = "accelerated"  # of the walk
@@ -46,7 +46,7 @@ class Selection(NamedTuple):
 
     @property
     def imported(self) -> bool:
-        """Whether the packing comes from elsewhere, so that none can be made like it."""
+        """Whether the packing was imported, so that it cannot be made again with other options."""
         return "imported" in self.packing
 
     @property
@@ -55,7 +55,7 @@ class Selection(NamedTuple):
         return self.packing["mu"] == self.mu
 
     def at(self, mu: Any) -> Selection:
-        """The same at another μ; the packing's friction goes along if it was the same."""
+        """The same at another μ; the packing's friction also changes if it was the same."""
         mu = friction(mu)
         if self.imported or not self.same_mu:
             return self._replace(mu=mu)
@@ -66,11 +66,11 @@ class Selection(NamedTuple):
 
     @property
     def kept(self) -> int:
-        """How many of the states are stored."""
+        """Number of states to store."""
         return min(self.states, int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400))))
 
     def parameters(self) -> Parameters:
-        """Parameters of the walk or sample, as its kind names it."""
+        """Parameters of the walk or sample, for its kind."""
         common = {"mu": self.mu, "keep": None if self.states == self.kept else self.kept}
         if self.kind == "uniform":
             return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
@@ -84,27 +84,27 @@ class Selection(NamedTuple):
         return kinds.INTERVALS.parameters(self.packing, mu=self.mu)
 
     def check(self, limits: Limits) -> None:
-        """InputError if it asks for more than these Limits allow."""
+        """InputError if it exceeds these Limits."""
         limits.check(states=self.states, mu=self.mu, seed=self.seed)
         if not self.imported:
-            # The version of the algorithm names a packing, too, but nobody asks for it.
+            # The version of the algorithm is a parameter too, but nobody requests it.
             limits.check(**{name: self.packing[name] for name in self.packing if name != "version"})
 
     @property
     def dear(self) -> bool:
-        """Whether it takes more than some ten seconds, or how long is hard to tell."""
+        """Whether it takes more than about ten seconds, or an unknown time."""
         n = self.packing.get("n", 400)
         weight = _WEIGHTS[self.relax if self.kind == "walk" else self.kind]
         odd = set() if self.imported else set(unusual(self.packing)) - {"radii", "box"}
         return bool(odd) or n * (n + weight * self.states) > EASY
 
     def names(self, other: Selection) -> bool:
-        """Whether other is the same but for details that this kind of states does not have."""
+        """Whether other is the same, apart from options without effect for this kind of states."""
         return _plain(self) == _plain(other)
 
 
 def differing(asked: Selection, shown: Selection | None) -> str:
-    """What of a Selection is not as in another one (None: all of it), in words."""
+    """The differences of a Selection from another one (None: everything), in words."""
     if shown is None or asked.imported or shown.imported:
         return f"the packing at μ = {asked.mu:g}" if asked.imported else f"μ = {asked.mu:g}"
     words, other = [], shown.packing
@@ -130,7 +130,7 @@ def _plain(selection: Selection) -> Selection:
 
 
 def selected(kind: str, parameters: Parameters) -> Selection:
-    """The Selection that these parameters of a walk or sample belong to."""
+    """The Selection of these parameters of a walk or sample."""
     packing, mu = parameters["packing"], float(parameters["mu"])
     relax = parameters.get("relax", "accelerated")
     return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
@@ -144,7 +144,7 @@ def select(
     box: str = "square",
     **others: Any,
 ) -> Selection:
-    """A Selection of a packing made here; InputError for what cannot be.
+    """A Selection of a packing made here; InputError for invalid parameters.
 
     packed_mu: friction during compaction, by default that of the ensemble. box: as for `pack`.
     others: fields of Selection.
@@ -158,7 +158,7 @@ def select(
 
 
 def unusual(packing: Parameters) -> Parameters:
-    """What a packing is made with, where that is not what is usual at its μ."""
+    """Options of a packing that differ from the defaults at its μ."""
     usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
     return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
 
@@ -166,9 +166,9 @@ def unusual(packing: Parameters) -> Parameters:
 def series(
     selection: Selection, parameters: Parameters | None = None, called: str | None = None
 ) -> str:
-    """Everything but μ, in words: selections of one series form one η(μ).
+    """Everything except μ, in words: selections of one series form one η(μ).
 
-    parameters: those of the entry, where it is one; called: the files of an imported packing.
+    parameters: those of the entry, if there is one; called: the files of an imported packing.
     """
     packing = selection.packing
     if selection.imported:
@@ -190,14 +190,14 @@ def series(
 
 
 def brief(selection: Selection, series: str) -> str:
-    """A series in the few words that are read over its picture; the whole of an import's."""
+    """A short form of a series for display over its picture; unchanged for an import."""
     if selection.imported:
         return series
     return f"{selection.packing['n']} disks, {selection.states} networks"
 
 
 def command(selection: Selection) -> str:
-    """The command that makes the same states in a terminal."""
+    """The command that computes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
         typed = next(typed for typed, word in RELAXATIONS.items() if word == selection.relax)
@@ -208,7 +208,7 @@ def command(selection: Selection) -> str:
 
 
 def of_packing(selection: Selection) -> list[Any]:
-    """Words of a command that name a selection's packing and μ."""
+    """Words of a command that select a packing and μ."""
     packing = selection.packing
     if selection.imported:
         words = ["--packing", "PACKING.npz"]
@@ -222,7 +222,7 @@ def of_packing(selection: Selection) -> list[Any]:
 
 
 def link(selection: Selection, view: dict[str, Any]) -> str:
-    """The query of an address that reopens this selection, seen as `view` {name: plain value}."""
+    """The query of an address that reopens this selection with the view {name: plain value}."""
     packing = selection.packing
     if selection.imported:
         given = {"packing": packing["imported"]}
@@ -240,9 +240,9 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
 
 
 def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
-    """(Selection or None, {name: text} of everything else) of a link's query.
+    """(Selection or None, {name: text} of everything else) from a link's query.
 
-    InputError for a selection that cannot be; a link without "mu" selects nothing.
+    InputError for an invalid selection; a link without "mu" selects nothing.
     """
     given = dict(parse_qsl(query.lstrip("?")))
     if "mu" not in given:

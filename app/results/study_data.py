@@ -1,4 +1,4 @@
-"""The finished study that comes with the page: its numbers, and the paper's claims judged."""
+"""The finished study shipped with the app: its numbers, and the verdicts on the paper's claims."""
 
 import json
 import math
@@ -13,7 +13,7 @@ from granforce.paper.claims.groups import outside
 from granforce.records import InputError
 
 DATA = Path(__file__).resolve().parents[2] / "data"
-# What the claims of each statistic begin with; see data/claims.json.
+# Beginnings of the claims about each statistic; see data/claims.json.
 ABOUT = {
     "eta": ("η", "z "),
     "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "ΔF_n is", "S is more elongated"),
@@ -35,7 +35,7 @@ _reading = threading.Lock()
 
 
 def study() -> tables.StudyTable | None:
-    """The reduced study, or None where it was not brought along."""
+    """The reduced study, or None if it is not installed."""
     with _reading:
         return _study()
 
@@ -52,7 +52,7 @@ def _study() -> tables.StudyTable | None:
 def claims(about: str) -> list[dict[str, Any]]:
     """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict.
 
-    What could not be measured is NaN, null in the file.
+    Values that could not be measured are NaN, null in the file.
     """
     path = DATA / "claims.json"
     if not path.exists():
@@ -66,15 +66,15 @@ def claims(about: str) -> list[dict[str, Any]]:
 
 
 def rows(*parts: str) -> list[dict[str, Any]]:
-    """Rows of parts of the study at its usual number of disks; empty without a study."""
+    """Rows of parts of the study at its default number of disks; empty without a study."""
     table = study()
     return [] if table is None else table.part(*parts, n=table.plan["n"])
 
 
 def in_force_space(part: str) -> list[dict[str, Any]]:
-    """Rows of a part, but for the μ at which its states lie outside of S by more than its extent.
+    """Rows of a part, without the μ at which its states exceed S by more than its extent.
 
-    Sweeps that end early leave such networks: what they span is no indeterminacy.
+    Sweeps that end early leave such networks, whose spread is not indeterminacy.
     """
     table = study()
     beyond = [] if table is None else outside(table, part)
@@ -82,7 +82,7 @@ def in_force_space(part: str) -> list[dict[str, Any]]:
 
 
 def hill() -> list[tuple[float, float]]:
-    """How undetermined forces are over friction: [(μ, η2)], η2 the mean of the walks at each μ."""
+    """Indeterminacy against friction: [(μ, η2)], η2 averaged over the walks at each μ."""
     by_mu: dict[float, list[float]] = {}
     for row in rows("walk"):
         by_mu.setdefault(row["mu"], []).append(row["eta2"])

@@ -1,4 +1,4 @@
-"""Packings that a visitor brings, read in memory: no name of theirs becomes a path."""
+"""Packings uploaded by a visitor, read in memory: their file names never become paths."""
 
 import io
 import re
@@ -17,7 +17,7 @@ from .library import Library
 
 Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
 
-# What files together make a packing; those in brackets may be missing.
+# Files that together make a packing; those in brackets are optional.
 FAMILIES = {
     "npz": ("NPZ of granforce", ("npz",), ()),
     "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
@@ -35,22 +35,22 @@ WORDS = {
     "adjacency": "adjacency list with the forces",
     "solved": "frame solved by PeGS 2",
 }
-# An archive may unpack to this many times the bytes that may be sent.
+# Largest ratio of an archive's unpacked size to the upload limit.
 UNPACKED = 8
-# What of a file is looked at to see whether it is photoelastic.
+# Bytes and rows examined to recognise photoelastic files.
 LOOKED_AT, ROWS = 4000, 20
 
 
 class Brought(NamedTuple):
-    """A packing that was read and kept, and what it is."""
+    """A packing that was read and stored."""
 
-    params: Parameters  # that name it, as kinds.PACKING names it
-    report: dict[str, Any]  # of granforce.report
-    source: str  # which files it came from, in words
+    params: Parameters  # its parameters, of kinds.PACKING
+    report: dict[str, Any]  # report of granforce.report
+    source: str  # names of its files
 
 
 def role(name: str, content: bytes) -> str:
-    """What a file is, one of WORDS, told by its content; InputError for anything else."""
+    """The role of a file, one of WORDS, from its content; InputError for anything else."""
     if content[:4] == b"PK\x03\x04":
         return "npz"
     if content[:2] == b"\x1f\x8b" or content[:4] == b"\x28\xb5\x2f\xfd":
@@ -78,20 +78,20 @@ def role(name: str, content: bytes) -> str:
 
 
 def _columns(content: bytes) -> set[str]:
-    """The names in the first line of a table."""
+    """The names in the header of a table."""
     head = content.lstrip(b"\xef\xbb\xbf \t\r\n").split(b"\n", 1)[0][:2000]
     words = head.decode("utf-8", "replace").lower().replace(";", ",").replace("\t", ",")
     return {word.strip().strip('"') for word in words.split(",")}
 
 
 def needs_box(files: Files) -> bool:
-    """Whether these are tables that say nothing of what holds the disks: no load, no force."""
+    """Whether these are tables without anything that confines the disks: no load, no force."""
     named = [_columns(files[part][1]) for part in ("grains", "joined") if part in files]
     return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn"}
 
 
 def _photoelastic(content: bytes) -> str | None:
-    """Which file of a photoelastic frame it is, or None: rows of five or six plain numbers."""
+    """The role of a file of a photoelastic frame, or None: rows of five or six plain numbers."""
     rows: list[list[float]] = []
     lines = content[:LOOKED_AT].decode("utf-8", "replace").splitlines()
     whole = lines if len(content) <= LOOKED_AT else lines[:-1]
@@ -104,21 +104,21 @@ def _photoelastic(content: bytes) -> str | None:
     counts = {len(row) for row in rows}
     if counts == {6}:
         return "positions"
-    if counts == {5}:  # the ids of two grains, or a grain and where it is
+    if counts == {5}:  # the ids of two grains, or a grain and its position
         return "adjacency" if all(row[2].is_integer() for row in rows) else "positions"
     return None
 
 
 def family(roles: Iterable[str]) -> str:
-    """The one of FAMILIES that these roles belong to."""
+    """The one of FAMILIES that contains these roles."""
     return next(k for k, (_, needed, more) in FAMILIES.items() if set(roles) & {*needed, *more})
 
 
 def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMITS) -> Files:
-    """{role: (name, content)} of the files given before and new ones [(name, content), …].
+    """{role: (name, content)} of the previous files and new ones [(name, content), …].
 
-    A new file replaces the one with its role, and all that belong to another family.
-    Raises InputError for one that is none of WORDS, or where all together are too large.
+    A new file replaces the one with its role, and all files of another family. Raises InputError
+    for a file that is none of WORDS, or if all together are too large.
     """
     for name, content in new:
         found = role(name, content)
@@ -131,7 +131,7 @@ def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMIT
 
 
 def missing(files: Files) -> list[str]:
-    """Roles that are needed besides those of the files."""
+    """Roles that are needed in addition to those of the files."""
     needed: tuple[str, ...] = FAMILIES[family(files)][1] if files else ()
     return [part for part in needed if part not in files]
 
@@ -147,9 +147,8 @@ def read(
 ) -> Packing:
     """The Packing in files {role: (name, content)}.
 
-    mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, tilt and
-    pressure: of a table. Raises InputError, naming file and line, for what cannot be used, and
-    beyond the limits.
+    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt and pressure: for
+    a table. Raises InputError, naming file and line, for invalid files and beyond the limits.
     """
     limits.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
@@ -175,14 +174,14 @@ def read(
 
 
 def opened(name: str, content: bytes) -> io.BytesIO:
-    """A file of this content; its name is for messages only."""
+    """A file with this content; its name is for messages only."""
     file = io.BytesIO(content)
     file.name = name
     return file
 
 
 def bring(library: Library, files: Files, **options: Any) -> Callable[[Job], Brought]:
-    """Work, for jobs.Task, that reads a packing, reports on it and keeps it in the cache."""
+    """Work for jobs.Task that reads a packing, reports on it and saves it in the cache."""
 
     def work(job: Job) -> Brought:
         job.begin("reading")
@@ -194,9 +193,9 @@ def bring(library: Library, files: Files, **options: Any) -> Callable[[Job], Bro
 
 
 def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Brought]:
-    """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought.
+    """Work for jobs.Task that reports on a packing and saves it in the cache; a Brought.
 
-    source: what it is: the names of its files, by which it is listed from then on.
+    source: the names of its files, used as its name in lists.
     """
 
     def work(job: Job) -> Brought:

@@ -1,1 +1,1 @@
-"""What is selected and on screen, as parameters."""
+"""The selection and the view of a page, as parameters."""

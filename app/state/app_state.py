@@ -1,4 +1,4 @@
-"""Which states a page has selected and shows, as parameters: no widgets, no plots."""
+"""The states that a page has selected and shows, as parameters: no widgets, no plots."""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,9 +25,9 @@ from .page_tasks import Work
 from .pulls import Hand
 from .view_settings import Looks
 
-EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
-# What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see: nobody
-# goes back to the frame before, to the view of a moment ago, or to the other theme.
+EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed automatically
+# Parameters of Looks that change by playing or zooming, not by the visitor's choice of view: going
+# back does not restore the previous frame, zoom or theme.
 PASSING = ("frame", "paused", "opened", "zoom", "dark")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
@@ -35,9 +35,8 @@ PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 class AppState(param.Parameterized):
     """The states selected, and the catalogue to select from.
 
-    How they are looked at is `looks`, what is being computed is `work`; these know nothing of it.
-    What is known of them is `knowledge`, what was pulled is in the `hand`, and `besides` is what is
-    seen beside them.
+    `looks` is how they are shown, `work` what is being computed; these do not depend on it.
+    `knowledge` holds known forces, `hand` what was pulled, and `besides` the comparison.
     """
 
     catalogue = param.List(doc="all cells, by series and μ")
@@ -62,16 +61,16 @@ class AppState(param.Parameterized):
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
-        query: of the address that opened the page; None: nothing is to be shown yet.
+        query: of the address that opened the page; None: show nothing yet.
         """
-        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # param has no type hints
         self.library, self.work = library, Work(wake, visitor)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
-        # What was refused is told until something else is done; before those that may refuse it.
+        # A refusal is shown until the next action; watched before the parts that may refuse.
         chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
         self.looks.param.watch(self._forget, chosen)
         self.knowledge, self.besides = Knowledge(self), Beside(self)
-        self.hand = Hand(self)  # which keeps what is known
+        self.hand = Hand(self)  # uses what is known
         self.parts = self.looks, self.knowledge, self.hand  # which a link names
         self._viewed: dict[str, Any] = {
             name: part.param[name] for name in VIEW for part in self.parts if name in part.param
@@ -88,10 +87,10 @@ class AppState(param.Parameterized):
     def _forget(self, *events: Any) -> None:
         self.work.message = ""
 
-    # What is on screen
+    # The view
 
     def open(self, query: str = "") -> None:
-        """Show what a link selects, computing it if need be, or what is best to begin with."""
+        """Show the selection of a link, computing it if necessary, or a good one to begin with."""
         try:
             wanted, told = read_link(query)
             self.work.message = ""
@@ -99,46 +98,46 @@ class AppState(param.Parameterized):
             wanted, told = None, {}
             self.work.message = str(error)
         view = read_view(told, self._viewed)
-        self.looks.dark = view.get("dark", self.looks.dark)  # before there is anything to be seen
+        self.looks.dark = view.get("dark", self.looks.dark)  # before anything is visible
         self._look_up(
             wanted, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
         )
 
     def _as_new(self) -> View:
-        """What a new page shows, but for the theme: what a link does not name."""
+        """The view of a new page, except for the theme: what a link omits."""
         return {name: self._viewed[name].default for name in VIEW if name != "dark"}
 
     @property
     def view(self) -> View:
-        """What a link may name, as it is on screen."""
+        """The present view, as far as a link can store it."""
         return {name: getattr(parameter.owner, name) for name, parameter in self._viewed.items()}
 
     def _look(self, view: View) -> None:
-        """See this."""
+        """Apply a view."""
         for part in self.parts:
             part.param.update(**{name: view[name] for name in view if name in part.param})
 
     @property
     def growing(self) -> bool:
-        """Whether the Replay on screen is that of a walk under way."""
+        """Whether the Replay on screen is that of a walk in progress."""
         return self.seen is not self.replay
 
     @property
     def possible(self) -> Any:
-        """The exact intervals of the Replay on screen, under what is known; or None."""
+        """The exact intervals of the Replay on screen, given the known forces; or None."""
         if self.growing:
             return None
         narrowed = self.knowledge.narrowed
         return self.exact if narrowed is None else narrowed.after
 
     def refresh(self, shown: Shown | None = None) -> None:
-        """Read the catalogue anew; show what was just computed."""
+        """Read the catalogue again; show what was just computed."""
         if shown is not None:
             self._show(shown)
         self.work.reader.start(lambda job: self.library.cells(), self._list)
 
     def ask(self, selection: Selection, at_once: bool = False) -> None:
-        """Select states: shown if a store has them, else `missing`, or computed at_once."""
+        """Select states: shown if a store has them, otherwise `missing`, or computed at_once."""
         self.besides.keep(selection)
         self._ask(selection, at_once)
 
@@ -153,16 +152,16 @@ class AppState(param.Parameterized):
         except InputError as error:
             self.work.message = str(error)
             return
-        # Told as one: nobody sees what is computed at once as missing, which would move the page.
+        # Announced together: a short `missing` would move the page.
         with as_one(self.work, self):
             self.param.update(selection=selection, missing=True)
             if at_once:
                 self.compute()
 
     def choose(self, series: str | None = None, mu: float | None = None) -> None:
-        """Show a stored series at its μ nearest to that on screen; or the one on screen at this μ.
+        """Show a stored series at its μ nearest to that on screen; or the present one at this μ.
 
-        Where that has no states there, they are asked for, and can be computed.
+        If it has no states there, they are requested and can be computed.
         """
         if mu is not None:
             found = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
@@ -181,7 +180,7 @@ class AppState(param.Parameterized):
         return [c for c in self.catalogue if here is not None and c.series == here.series]
 
     def show(self, cell: Cell) -> None:
-        """Put a cell on screen: at once if it is in memory, else when it is read."""
+        """Show a cell: at once if it is in memory, otherwise after reading it."""
         shown = self.library.shown_in_memory(cell)
         if shown is not None:
             self._show_and_read_ahead(shown)
@@ -189,7 +188,7 @@ class AppState(param.Parameterized):
             self.work.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
 
     def read_ahead(self) -> None:
-        """Have the cells with the nearest μ read meanwhile: they are the likeliest next."""
+        """Read the cells with the nearest μ in advance: they are the likeliest next."""
         cells = self.cells()
         if self.cell in cells:
             here = cells.index(self.cell)
@@ -200,7 +199,7 @@ class AppState(param.Parameterized):
             )
 
     def _look_up(self, wanted: Selection | None, view: View, counted: bool) -> None:
-        """counted: whether so many states are wanted; else those that a store has will do."""
+        """counted: whether exactly this many states are required, not any stored number."""
         library = self.library
 
         def meant(cells: list[Cell]) -> Selection | None:
@@ -216,7 +215,7 @@ class AppState(param.Parameterized):
                 except InputError as error:
                     if cell in library.cells():
                         raise
-                    damage = str(error)  # the next best, then
+                    damage = str(error)  # use the next best
 
         def done(found: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = found
@@ -224,7 +223,7 @@ class AppState(param.Parameterized):
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
             there = shown is not None and (asked is None or shown.cell.selection.names(asked))
-            # What was on screen stays until the wanted states are there; Cancel goes back to it.
+            # The old view stays until the requested states exist; Cancel returns to it.
             if shown is not None and (there or self.cell is None):
                 self._show(shown, view)
             if asked is not None and not there:
@@ -256,7 +255,7 @@ class AppState(param.Parameterized):
     def _show(self, shown: Shown, view: View | None = None) -> None:
         cell, replay, exact = shown
         fresh = dict(UNSEEN)
-        # A walk that is wanted no more may have gone on to numbers that the replay does not have.
+        # A walk that was replaced may have reached numbers that the replay does not have.
         if (self.seen is replay and view is None) or self._is_grown(replay):
             fresh = {}
         with as_one(*self.parts, self.work, self):
@@ -276,7 +275,7 @@ class AppState(param.Parameterized):
             self._look(fresh | fitting(view or {}, replay))
 
     def _source(self, cell: Cell | None = None) -> str:
-        """Where the states of a cell, by default the one on screen, come from."""
+        """The source of a cell's states, by default of the cell on screen."""
         cell = cell or self.cell
         if cell is None:
             return ""
@@ -285,13 +284,13 @@ class AppState(param.Parameterized):
         return f"μ = {cell.mu:g}, {told} ({PRECOMPUTED if shipped else COMPUTED})"
 
     def _is_grown(self, replay: Replay) -> bool:
-        """Whether a Replay is what the walk on screen has grown into."""
+        """Whether a Replay is the final version of the growing walk on screen."""
         return self.growing and np.array_equal(self.seen.normal[0], replay.normal[0])
 
-    # What is computed
+    # Computations
 
     def compute(self) -> None:
-        """Compute the states selected, in the background, and show them as they are found."""
+        """Compute the selected states in the background, and show them as they are found."""
         asked = self.selection
         if asked is None or self.work.computes(asked):
             return
@@ -306,18 +305,18 @@ class AppState(param.Parameterized):
             self.work.compute(self.library, asked, self._computed)
 
     def _computed(self, shown: Shown) -> None:
-        """Show states that were just computed; their exact intervals follow, if that is soon."""
+        """Show states that were just computed, then their exact intervals if they are quick."""
         self.refresh(shown)
         if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
             self.compute_exact()
 
     @property
     def keepable(self) -> bool:
-        """Whether more networks of the walk on screen could be stored than are."""
+        """Whether more networks of the walk on screen could be stored."""
         return self.cell is not None and self.cell.kept < self.cell.selection.kept
 
     def keep_all(self) -> None:
-        """Compute the networks of the walk on screen that were not stored; the view stays."""
+        """Compute the networks of the walk on screen that were not stored, keeping the view."""
         cell = self.cell
         if not self.keepable or self.missing or self.work.computation.running:
             return
@@ -331,19 +330,19 @@ class AppState(param.Parameterized):
         self.work.computation.start(compute.all_states(self.library, cell), done)
 
     def _by_numbers(self) -> View:
-        """The view on screen, to be seen of other states of the same walk."""
+        """The view on screen by numbers, to be applied to other states of the same walk."""
         assert self.numbers is not None  # a Replay is on screen
         view = {name: value for name, value in self.view.items() if value is not None}
         here = self.numbers.of(view)
         return self.view | {name: Numbered(here[name]) for name in OF_A_REPLAY if name in here}
 
     def _bring_back(self, event: Any) -> None:
-        """What was on screen before something else was asked for, which is wanted no more."""
+        """Return to the view before a request that was cancelled."""
         if event.new and self.missing and self.cell is not None:
             self.show(self.cell)
 
     def grow(self, replay: Replay) -> None:
-        """Put the Replay of a walk that begins on screen."""
+        """Show the Replay of a walk that begins."""
         asked = self.work.live.selection
         told = brief(asked, self.library.series(asked))
         source = f"μ = {asked.mu:g}, {told} (as they are sampled)"
@@ -353,7 +352,7 @@ class AppState(param.Parameterized):
             self._look(UNSEEN)
 
     def follow(self) -> Following | Arriving | None:
-        """What is being computed, as `work` says; what was on screen is back where it ended."""
+        """The computation in progress, from `work`; if it failed, the previous view returns."""
         with as_one(*self.parts, self.work, self):
             if self.work.live is not None and not self.work.computation.running:
                 plane = None if self.growing else self.plane
@@ -363,7 +362,7 @@ class AppState(param.Parameterized):
 
     @property
     def asked(self) -> str:
-        """What was asked for and is not on screen, in words; empty where there is nothing."""
+        """The requested states that are not on screen yet, in words, or an empty string."""
         if not self.missing or self.cell is None:
             return ""
         words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
@@ -384,12 +383,12 @@ class AppState(param.Parameterized):
 
     @property
     def exact_wanted(self) -> bool:
-        """Whether exact intervals are neither there nor under way, nor anything before them."""
+        """Whether exact intervals are neither there nor in progress, and nothing precedes them."""
         under_way = self.work.computation.running or self.knowledge.task.running
         return self.exact is None and not self.growing and not under_way
 
     def _need_loads(self, *events: Any) -> None:
-        """Limit loads of all contacts are computed where colour or width show them."""
+        """Compute limit loads of all contacts if colour or width show them."""
         replay, cell = self.replay, self.cell
         if "load" not in (self.looks.colour, self.looks.thickness) or replay is None:
             self.work.loading.cancel()
@@ -401,11 +400,11 @@ class AppState(param.Parameterized):
 
             self.work.loading.start(perturbations.limit_loads(self.library, cell), done)
 
-    # What a link tells
+    # Links
 
     @property
     def command(self) -> str:
-        """The commands that make the states asked for, and the intervals under what is known."""
+        """The commands that compute the requested states, and intervals given the known forces."""
         made, told = command(self.selection), self.knowledge.known
         if told and self.replay is not None and not self.missing:
             made += "\n" + known.commands(self.selection, self.replay, told)
@@ -417,14 +416,14 @@ class AppState(param.Parameterized):
             return ""
         view = self.view
         if view["beside"] == self.selection.mu:
-            # Between the choice of another μ and its states, what is beside is still on screen.
+            # Between the choice of another μ and its states, the old comparison is still on screen.
             view["beside"] = None
         told = {name: value for name, value in view.items() if value != self._viewed[name].default}
         return link(self.selection, spelled(told, self.numbers))
 
     @property
     def numbers(self) -> Numbers | None:
-        """Numbers of the contacts and networks on screen, if they are those of the selection."""
+        """Numbers of the contacts and networks on screen, if they belong to the selection."""
         seen = self.seen
         if seen is None or (self.missing and not self.growing):
             return None

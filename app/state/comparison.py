@@ -1,4 +1,4 @@
-"""Two frictions side by side: the packing of the states on screen, made or held at another μ."""
+"""Two frictions side by side: the same packing, made at another μ or with its friction changed."""
 
 from typing import Any
 
@@ -13,23 +13,23 @@ from ..results.selection import Selection
 
 
 class Beside(param.Parameterized):
-    """What is seen beside the states on screen where `looks.beside` names another μ.
+    """The packing next to the states on screen if `looks.beside` names another μ.
 
     It is the same selection at that μ, with its own packing: `twin`. While the view is split,
-    who chooses another μ leaves there what was on screen; who pins a state or ends the split view
-    gives it up.
+    choosing another μ moves the present packing there; pinning a state or ending the split view
+    removes it.
     """
 
     twin = param.Parameter(doc="the Shown of that μ, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # param has no type hints
         self.state, self.looks, self.task = state, state.looks, state.work.task()
         state.param.watch(self._follow, ["cell", "missing"])
         self.looks.param.watch(self._follow, ["split", "beside"])
 
     def keep(self, wanted: Selection) -> None:
-        """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
+        """React to a new Selection: if only μ differs, the present states become the comparison."""
         state, looks = self.state, self.looks
         if not looks.split or looks.beside is not None or state.cell is None:
             return
@@ -38,11 +38,11 @@ class Beside(param.Parameterized):
             looks.beside = shown.mu
 
     def _follow(self, *events: Any) -> None:
-        """Have the other packing found, or computed if no store has it."""
+        """Load the other packing, or compute it if no store has it."""
         state, looks = self.state, self.looks
         came = any(event.name in ("cell", "missing") for event in events) and not state.missing
         if not looks.split or (came and state.cell is not None and looks.beside == state.cell.mu):
-            looks.beside = None  # nothing stands beside itself
+            looks.beside = None  # the same μ twice
         if looks.beside is None or state.cell is None:
             self.task.cancel()
             self.twin = None

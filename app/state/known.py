@@ -1,4 +1,4 @@
-"""What a visitor takes for known: forces held, or within error bars; what they leave open."""
+"""Forces that a visitor declares known, exactly or within error bars, and their consequences."""
 
 import math
 import shlex
@@ -20,38 +20,40 @@ from ..results.library import Cell, Library, Shown
 from ..results.replays import Replay
 from ..results.selection import Selection, of_packing
 
-Row = list[Any]  # contact, f_n from and to, f_t from and to, as `conditions` takes them
+Row = list[Any]  # contact, f_n from and to, f_t from and to, as for `conditions`
 
-MOST_KNOWN = 32  # statements that a page, or a link, may hold
+MOST_KNOWN = 32  # statements per page or link
 LARGEST = 1e6  # ⟨fₙ⟩
-# A force whose interval is shorter than this, in ⟨fₙ⟩, is known already.
+# A force whose interval is shorter than this, in ⟨fₙ⟩, is determined already.
 DETERMINED = 1e-6
-# Held forces stay so much of their interval away from its ends: at the very ends rounding decides.
+# Distance of held forces from the ends of their interval, as a fraction: at the ends rounding
+# decides.
 INWARD = 1e-4
-# Contacts to measure next that are listed; checked by exact bounds where there are many contacts.
+# Length of the list of contacts to measure next; of many contacts, how many are checked by exact
+# bounds.
 LISTED, CHECKED, FEW = 10, 3, 200
 
 
 class Statement(NamedTuple):
-    """That f_n of a contact is `value`, up to `error` either way; both in ⟨f_n⟩."""
+    """The statement that f_n of a contact is `value` ± `error`; both in ⟨f_n⟩."""
 
     contact: int  # position in the backbone
     value: float
     error: float = 0.0
 
     def words(self, number: int) -> str:
-        """It in words, with the contact's number in the packing."""
+        """The statement in words, with the contact's number in the packing."""
         bar = f" ± {self.error:.3g}" if self.error else ""
         return f"contact {number}: fₙ = {self.value:.3f}{bar} × the mean force"
 
 
 class Narrowed(NamedTuple):
-    """Exact intervals of all contacts under what is known, beside those without."""
+    """Exact intervals of all contacts with the known forces, and without."""
 
     known: tuple[Statement, ...]
-    before: xr.Dataset  # of intervals
+    before: xr.Dataset  # intervals dataset
     after: xr.Dataset
-    left: float = 0.0  # part of the bounds that `after` still has as before
+    left: float = 0.0  # fraction of the bounds in `after` that are not yet updated
 
     @property
     def dimension(self) -> tuple[int, int]:
@@ -71,20 +73,20 @@ class Narrowed(NamedTuple):
 
     @property
     def gone(self) -> Floats:
-        """(N_c,) by how much the intervals of f_n are shorter, in ⟨f_n⟩."""
+        """(N_c,) reduction of the intervals of f_n, in ⟨f_n⟩."""
         before, after = self.extents
         return np.maximum(before - after, 0.0)
 
     @property
     def shortened(self) -> Floats:
-        """The same of the contacts that are not known themselves: of those that are, 0."""
+        """The same for contacts that are not known themselves; 0 for known ones."""
         change = self.gone
         change[[one.contact for one in self.known]] = 0.0
         return change
 
     @property
     def carrying(self) -> int:
-        """How many contacts carry in every network that is left, by certified bounds."""
+        """Number of contacts that carry force in every remaining network, by certified bounds."""
         low, gap = (self.after[name].values for name in ("low", "interval_gap"))
         least = low[:, 0] / self.after["force_scale"].item() - gap[:, 0, 0]
         return int(np.sum(least > CARRYING))
@@ -99,7 +101,7 @@ def _extent(dataset: xr.Dataset) -> Floats:
 
 
 class Underway:
-    """Intervals under what is known as their bounds are found: a Narrowed at any time."""
+    """Intervals with known forces during their computation, available as a Narrowed at any time."""
 
     def __init__(
         self, known: tuple[Statement, ...], before: xr.Dataset, backbone: Integers
@@ -108,7 +110,7 @@ class Underway:
         self._after, self._count = before.copy(deep=True), 0
 
     def add(self, bound: Any) -> None:
-        """Keep a Bound."""
+        """Record a Bound."""
         place = np.searchsorted(self._backbone, bound.contact)
         name = "high" if bound.side else "low"
         self._after[name].values[place, bound.component] = bound.value
@@ -116,31 +118,31 @@ class Underway:
 
     @property
     def narrowed(self) -> Narrowed:
-        """What is known by now."""
+        """The intervals so far."""
         left = 1 - self._count / (4 * len(self._backbone))
         return Narrowed(self.known, self._before, self._after.copy(deep=True), max(left, 1e-3))
 
 
 class Ranked(NamedTuple):
-    """Contacts whose f_n would be worth measuring next, the best first."""
+    """Contacts whose f_n is most worth measuring next, the best first."""
 
-    replay: Replay  # of whose packing
-    known: tuple[Statement, ...]  # that hold already
+    replay: Replay  # of this packing
+    known: tuple[Statement, ...]  # known forces
     contacts: Integers  # (k,) positions in the backbone
     before: float  # mean interval of f_n now, in ⟨f_n⟩
-    after: Floats  # (k,) the same once this one is known as well; NaN where not computed
-    expected: Floats  # (k,) part by which errors fall, as forces go together over the states
+    after: Floats  # (k,) the same with this one also known; NaN if not computed
+    expected: Floats  # (k,) fraction by which errors fall, from correlations over the states
 
 
 class Knowledge(param.Parameterized):
-    """The statements of one page; exact intervals under them are computed in the background."""
+    """The statements of one page; exact intervals with them are computed in the background."""
 
     known = param.List(doc="Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="the Narrowed that they leave open, or None")
     ranked = param.Parameter(doc="the Ranked contacts to measure next, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # param has no type hints
         self.state, self.work = state, state.work
         self.task, self.ranking = self.work.task(told=False), self.work.task()
         self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
@@ -151,7 +153,7 @@ class Knowledge(param.Parameterized):
         self.ranking.param.watch(lambda event: self._rank(_so_far(self.ranking)), "fraction")
 
     def hold(self, contact: int, value: float, error: float = 0.0) -> None:
-        """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
+        """Declare f_n of a contact known, in ⟨f_n⟩; shows a message if that is impossible."""
         state = self.state
         others = [one for one in self.known if one.contact != contact]
         if state.replay is None or state.growing:
@@ -165,11 +167,11 @@ class Knowledge(param.Parameterized):
             self.work.message = str(refusal)
 
     def release(self, contact: int) -> None:
-        """Take f_n of a contact for unknown again."""
+        """Declare f_n of a contact unknown again."""
         self.known = [one for one in self.known if one.contact != contact]
 
     def heard(self, message: dict[str, Any]) -> None:
-        """What a browser tells of the selected contact."""
+        """Handle a browser message about the selected contact."""
         count = 0 if self.state.replay is None else len(self.state.replay.backbone)
         match message:
             case {"hold": [int(contact), int() | float() as value, int() | float() as error]}:
@@ -191,7 +193,7 @@ class Knowledge(param.Parameterized):
         self.task.start(narrowing(state.library, shown, known), done)
 
     def rank(self) -> None:
-        """Find which contact to measure next, in the background."""
+        """Find the contact to measure next, in the background."""
         state = self.state
         replay, known = state.replay, tuple(self.known)
         if replay is None or state.growing:
@@ -200,12 +202,12 @@ class Knowledge(param.Parameterized):
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
     def _rank(self, found: Ranked | None) -> None:
-        """Show contacts to measure next, if it is still this that is known."""
+        """counted: whether exactly this many states are required, not any stored number."""
         if found is not None and found.replay is self.state.replay:
             self.ranked = found if found.known == tuple(self.known) else None
 
     def _stated(self, contact: int, value: float, error: float) -> Statement:
-        """The Statement of a force, refused where what is known leaves no room for it."""
+        """The Statement of a force, refused if the known forces exclude it."""
         state = self.state
         value, error = _number(value, "a known force"), _number(error, "an error bar")
         number = state.replay.backbone[contact]
@@ -231,21 +233,21 @@ class Knowledge(param.Parameterized):
 
     @property
     def whole(self) -> Narrowed | None:
-        """The Narrowed of all that is known now, once all its bounds are there; or None."""
+        """The Narrowed of all known forces, once all its bounds exist; otherwise None."""
         found: Narrowed | None = self.narrowed
         return found if self._settled and found and found.known == tuple(self.known) else None
 
     @property
     def _settled(self) -> bool:
-        """Whether intervals under some known forces are there, all of them."""
+        """Whether all intervals for some known forces exist."""
         return self.narrowed is not None and not self.narrowed.left
 
     def _follow(self, *events: Any) -> None:
-        """Intervals under what is known now; statements belong to one packing."""
+        """Update intervals for the known forces; statements belong to one packing."""
         (before, told), replay = self._followed, self.state.replay
         self._followed = replay, tuple(self.known)
         if before is replay and told == tuple(self.known):
-            return  # both came at once
+            return  # both changed at once
         self.ranked = None
         self.ranking.cancel()
         if before is not replay or not self.known:
@@ -257,7 +259,7 @@ class Knowledge(param.Parameterized):
             self.task.cancel()
 
     def _arrive(self, event: Any) -> None:
-        """Show the intervals that are there by now."""
+        """Show the intervals computed so far."""
         arriving = _so_far(self.task)
         if event.new and arriving is not None and arriving.known == tuple(self.known):
             self._narrow(arriving.narrowed)
@@ -269,7 +271,7 @@ class Knowledge(param.Parameterized):
                 self.state.exact = narrowed.before
 
     def _failed(self, event: Any) -> None:
-        """What contradicts itself is taken back; the message says what it was."""
+        """Undo conflicting statements; the message names them."""
         if event.new:
             state = self.state
             self.known = list(self.narrowed.known) if self._settled else []
@@ -281,17 +283,17 @@ def _so_far(task: Task) -> Any:
 
 
 def _number(value: float, what: str) -> float:
-    if not 0 <= value < LARGEST:  # nor if it is NaN
+    if not 0 <= value < LARGEST:  # also refuses NaN
         raise InputError(f"{what} must lie between 0 and {LARGEST:g} ⟨fₙ⟩, got {value:g}")
     return float(value)
 
 
 def _rounded(value: float) -> float:
-    return float(f"{value:.9g}")  # as links hold it
+    return float(f"{value:.9g}")  # as stored in links
 
 
 def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
-    """Statements as `conditions` takes them: contacts of the packing, forces."""
+    """Statements as arguments of `conditions`: contacts of the packing, forces."""
     scale, number = replay.force_scale, replay.backbone
     return [
         [int(number[c]), (value - error) * scale, (value + error) * scale, None, None]
@@ -300,7 +302,7 @@ def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
 
 
 def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> str:
-    """Two lines for a terminal: what is known as a file, and the intervals under it."""
+    """Two lines for a terminal: a file of the known forces, and the intervals with them."""
     lines = ["contact,f_n_low,f_n_high"]
     lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
     words = ["granforce", "intervals", *of_packing(selection), "--known", "known.csv"]
@@ -312,14 +314,14 @@ def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -
 def narrowing(
     library: Library, shown: Shown, known: tuple[Statement, ...]
 ) -> Callable[[Job], Narrowed]:
-    """Work, for jobs.Task, that finds the intervals under what is known; a Narrowed.
+    """Work for jobs.Task that computes the intervals with known forces; a Narrowed.
 
-    So far it is an Underway, the contacts first that may change most.
+    Its partial result is an Underway, with the contacts that may change most first.
     """
 
     def work(job: Job) -> Narrowed:
         whole = (shown if shown.exact is not None else compute.exact(library, shown)(job)).exact
-        assert whole is not None  # found or made
+        assert whole is not None  # loaded or computed
         bounds = Underway(known, whole, shown.replay.backbone)
         job.so_far = bounds
         selection = shown.cell.selection
@@ -334,7 +336,7 @@ def narrowing(
 
 
 def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
-    """(N_c,) how much f_n goes with what is known over the states shown; most for what is known."""
+    """(N_c,) correlation of f_n with known forces over the states shown; largest for known ones."""
     off = replay.normal[1:] - replay.normal[1:].mean(axis=0)
     spread = np.maximum(off.std(axis=0), DETERMINED)
     chosen = [one.contact for one in known]
@@ -346,9 +348,9 @@ def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
 def ranking(
     library: Library, cell: Cell, replay: Replay, known: tuple[Statement, ...]
 ) -> Callable[[Job], Ranked]:
-    """Work, for jobs.Task, that finds which contact to measure next; a Ranked.
+    """Work for jobs.Task that finds the contacts to measure next; a Ranked.
 
-    So far it is their order before it is checked by exact bounds.
+    Its partial result is their order before the check by exact bounds.
     """
 
     def ranked(contacts: Integers, expected: Floats, before: Any, after: Floats) -> Ranked:
@@ -375,18 +377,18 @@ def ranking(
 
 
 def spelled(known: Iterable[Statement]) -> str:
-    """Statements as a link holds them."""
+    """Statements as text for a link."""
     rows = (one if one.error else one[:2] for one in known)
     return "~".join(":".join(f"{part:.9g}" for part in row) for row in rows)
 
 
 def renumbered(known: Iterable[Statement], number: Callable[[int], int]) -> list[Statement]:
-    """Statements that call each contact by another number."""
+    """Statements with renumbered contacts."""
     return [one._replace(contact=number(one.contact)) for one in known]
 
 
 def read(text: str) -> list[Statement]:
-    """Statements of a link's text; ValueError for what is none."""
+    """Statements from a link's text; ValueError if invalid."""
     parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]
     pairs = [(contact, rest) for contact, *rest in parts if 1 <= len(rest) <= 2]
     known = [Statement(int(contact), *map(float, rest)) for contact, rest in pairs]

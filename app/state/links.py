@@ -1,4 +1,4 @@
-"""What a link holds of the view, beside the states that it selects: how it is spelled and read."""
+"""The parameters of the view in a link, besides the selection: formatting and parsing."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -11,7 +11,7 @@ from granforce.types import Integers
 from ..results.replays import Replay
 from . import known, pulls
 
-View = dict[str, Any]  # parameters that a link may name
+View = dict[str, Any]  # parameters stored in links
 
 
 def _pair(text: str) -> tuple[int, int]:
@@ -27,14 +27,14 @@ def _place(text: str) -> tuple[float, ...]:
 
 
 def _tab(text: str) -> str:
-    return {"projection": "plane"}.get(text, text)  # as older links call it
+    return {"projection": "plane"}.get(text, text)  # former name in links
 
 
 def _flag(text: str) -> bool:
     return {"0": False, "1": True}[text]
 
 
-# Parameters that a link holds where they are not as in a new page, and how they are read.
+# Parameters stored in a link if they differ from a new page, and their parsers.
 VIEW: dict[str, Callable[[str], Any]] = {
     "tab": _tab,
     "contact": int,
@@ -63,7 +63,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
 SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": pulls.spelled, "known": known.spelled}
 SPELLED["opened"] = ".".join
 SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
-# What belongs to the states on screen, as it is where others come.
+# Parameters that belong to the states on screen, with their values for new states.
 UNSEEN: View = {"contact": None, "pair": None, "frame": 0, "reference": 0, "between": None}
 UNSEEN |= {"pulls": [], "known": []}
 OF_A_REPLAY = tuple(UNSEEN)
@@ -72,12 +72,12 @@ Number = Callable[[int], int]
 
 
 class Numbered(NamedTuple):
-    """A value of a link that names contacts and networks by their numbers."""
+    """A value of a link in which contacts and networks are given by number."""
 
     value: Any
 
 
-# What a link calls parameters. Those of UNSEEN have contacts by their numbers in the packing and
+# Names of parameters in links. Those of UNSEEN give contacts by their numbers in the packing and
 # networks by their numbers in the walk; under the parameters' own names, as in older links, they
 # are positions in the arrays of a Replay.
 KEYS = {
@@ -90,7 +90,7 @@ KEYS = {
     "between": "swing",
     "opened": "open",
 }
-# value, contact, network → the value with each contact and each network translated.
+# (value, contact, network) → the value with each contact and each network translated.
 TRANSLATED: dict[str, Callable[[Any, Number, Number], Any]] = {
     "contact": lambda value, contact, network: contact(value),
     "pair": lambda value, contact, network: tuple(map(contact, value)),
@@ -103,18 +103,18 @@ TRANSLATED: dict[str, Callable[[Any, Number, Number], Any]] = {
 
 
 def key(name: str) -> str:
-    """What a link calls a parameter."""
+    """The name of a parameter in links."""
     return KEYS.get(name, name)
 
 
 class Numbers(NamedTuple):
-    """The numbers of what is on screen, by position."""
+    """The numbers of contacts and networks on screen, by position."""
 
     contacts: Integers  # (N_c,) in the packing
     networks: Any  # (F,) in the walk
 
     def of(self, view: View) -> View:
-        """A view whose contacts and networks have their numbers in place of positions."""
+        """A view with contacts and networks given by number instead of position."""
         contacts, networks = self
         return {
             name: value
@@ -124,9 +124,9 @@ class Numbers(NamedTuple):
         }
 
     def positions(self, name: str, value: Any) -> Any:
-        """A parameter's value by positions; KeyError for numbers that there are not.
+        """A parameter's value by positions; KeyError for unknown numbers.
 
-        A network that was not kept is the nearest one that was.
+        A network that was not stored is replaced by the nearest stored one.
         """
         contacts = {int(number): k for k, number in enumerate(self.contacts)}
 
@@ -139,9 +139,10 @@ class Numbers(NamedTuple):
 
 
 def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
-    """These parameters as a link holds them: {key: plain value}.
+    """Parameters as text for a link: {key: plain value}.
 
-    numbers: of what is on screen; without them what belongs to it is left out.
+    numbers: of the states on screen; without them parameters that belong to the states are left
+    out.
     """
     if numbers is None:
         view = {name: value for name, value in view.items() if name not in OF_A_REPLAY}
@@ -159,9 +160,9 @@ def _plain(name: str, value: Any) -> Any:
 
 
 def read_view(given: Mapping[str, str], parameters: Any) -> View:
-    """Those of `parameters` that a link names by its texts; what makes no sense is left out.
+    """Those of `parameters` that are in a link, parsed; invalid values are left out.
 
-    What is named by numbers comes as a Numbered, to be read by `fitting`.
+    Values given by number become Numbered, for `fitting`.
     """
     view: View = {}
     for name, cast in VIEW.items():
@@ -173,12 +174,12 @@ def read_view(given: Mapping[str, str], parameters: Any) -> View:
             continue
         view[name] = Numbered(value) if numbers else value
     if "frame" in given and "frame" in view:
-        view.setdefault("paused", True)  # as older links to one network meant it
+        view.setdefault("paused", True)  # the meaning of older links to a network
     return view
 
 
 def fitting(view: View, replay: Replay) -> View:
-    """Of these rows and contacts those that a Replay has, as positions."""
+    """The rows and contacts that exist in a Replay, as positions."""
     numbers, found = Numbers(replay.backbone, replay.number), {}
     for name in OF_A_REPLAY:
         with suppress(KeyError):

@@ -1,4 +1,4 @@
-"""What is being computed for one page: its tasks, and what is seen of them while they run."""
+"""The computations of one page: its tasks, and their intermediate results."""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -14,7 +14,7 @@ from ..results.selection import Selection
 
 
 class Work(param.Parameterized):
-    """The tasks of one page, which end with it; what is on screen it does not know."""
+    """The tasks of one page, which end with it, independent of the view."""
 
     busy = param.Boolean(doc="whether any task is running")
     message = param.String(doc="one line about what went wrong, or empty")
@@ -29,7 +29,7 @@ class Work(param.Parameterized):
         visitor: Visitor | None = None,
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task."""
-        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # param has no type hints
         self._wake, self._visitor = wake, visitor
         self.tasks: list[Task] = []
         self._ahead: list[Job] = []
@@ -41,7 +41,7 @@ class Work(param.Parameterized):
     # Tasks
 
     def piecewise(self, pieces: Iterator[Any]) -> None:
-        """Have a generator run to its end; other pages are served between its pieces."""
+        """Run a generator to its end; other pages are served between its steps."""
         if self._wake is None:
             for _ in pieces:
                 pass
@@ -51,7 +51,7 @@ class Work(param.Parameterized):
     def task(self, pool: Pool = computing, *, told: bool = True) -> Task:
         """A new Task of this page: work off the event loop, ended when the page is closed.
 
-        told: whether the page tells what goes wrong in it; else whoever asks for it does.
+        told: whether the page reports its errors; otherwise the caller does.
         """
         task = Task(pool, self._wake, self._visitor)
         if told:
@@ -63,18 +63,18 @@ class Work(param.Parameterized):
         return task
 
     def read_ahead(self, works: Iterable[Callable[[Job], Any]]) -> None:
-        """Have this read meanwhile, instead of what was to be read before."""
+        """Read these in advance, instead of earlier ones."""
         for job in self._ahead:
             job.cancel()
         self._ahead = [Job(work, reading) for work in works]
 
     def poll(self) -> None:
-        """Take over the progress of all tasks."""
+        """Update the progress of all tasks."""
         for task in self.tasks:
             task.poll()
 
     def cancel(self) -> None:
-        """End all work of the page that is under way."""
+        """End all running work of the page."""
         for task in self.tasks:
             task.cancel()
         for job in self._ahead:
@@ -94,35 +94,35 @@ class Work(param.Parameterized):
     def _count(self, event: Any) -> None:
         self.busy = any(task.running for task in self.tasks)
 
-    # What is seen while it is computed
+    # Intermediate results
 
     def compute(
         self, library: Library, selection: Selection, done: Callable[[Shown], object]
     ) -> None:
-        """Compute states in the background; `live` has them as they are found."""
+        """Compute states in the background; `live` follows them as they are found."""
         self.param.update(live=Following(selection), arriving=None)
         self.computation.start(compute.states(library, selection), done)
 
     def computes(self, selection: Selection) -> bool:
-        """Whether this is what is being computed."""
+        """Whether this selection is being computed."""
         return self.computation.running and self.live and self.live.selection == selection
 
     def compute_exact(
         self, library: Library, shown: Shown, done: Callable[[Shown], object]
     ) -> None:
-        """Compute exact intervals in the background; `arriving` has them as they are found."""
+        """Compute exact intervals in the background; `arriving` follows them as they are found."""
         self.message = ""
         self.computation.start(compute.exact(library, shown), done)
         self.arriving = Arriving(shown.cell.selection.intervals)
 
     def shown(self, selection: Selection) -> None:
-        """These states are on screen: what is computed for others is waited for no more."""
+        """These states are on screen: computations of others are no longer awaited."""
         if self.live is not None and not self.live.selection.names(selection):
             self.computation.cancel()
         self.param.update(live=None, moving=False, arriving=None)
 
     def follow(self) -> Following | Arriving | None:
-        """The Following or Arriving of what is computed, or None; what has ended is dropped."""
+        """The Following or Arriving of the current computation, or None; ended ones are dropped."""
         if not self.computation.running:
             self.param.update(live=None, moving=False, arriving=None)
         return self.live or self.arriving

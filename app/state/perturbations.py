@@ -1,4 +1,4 @@
-"""Local perturbations of the packing on screen, and what the stores know about those of others."""
+"""Local perturbations of the packing on screen, and stored ones of other packings."""
 
 import json
 from collections.abc import Callable, Iterable
@@ -21,7 +21,7 @@ from ..results.library import Cell, Library, readable
 from ..results.replays import Replay
 from .pulls import puller_of
 
-# Fewer contacts than this say little about the mean over all.
+# With fewer contacts the mean is not meaningful.
 ENOUGH_CONTACTS = 10
 
 
@@ -34,19 +34,19 @@ class Loads(NamedTuple):
 
 
 class Pushed(NamedTuple):
-    """What a force pair does that pushes the grains of one contact apart. Forces in ⟨f_n⟩."""
+    """The effect of a force pair that pushes the grains of one contact apart. Forces in ⟨f_n⟩."""
 
     contact: int  # position in the backbone
     limit: float  # limit load
     low: float  # F_crit: largest load at rest
-    high: float  # least load that was not carried
+    high: float  # least load that did not end at rest
     opened: int  # contacts that the first motion opens,
-    slid: int  # at which grains slide
-    kept: int  # and which stick
-    breach: float  # of Coulomb's law by the motion
+    slid: int  # contacts that slide
+    kept: int  # contacts that stick
+    breach: float  # violation of Coulomb's law by the motion
     loads: Floats  # (k,) from 0 to `low`
-    states: Floats  # (k, N_c, 2) networks under them, nearest to that as packed
-    residual: Floats  # (k,) of these
+    states: Floats  # (k, N_c, 2) networks under them, nearest to the original
+    residual: Floats  # (k,) residuals of these
     displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
     distance: Floats  # (k,) of the backbone's grains from the contact, length
     size: Floats  # (k,) |u| of those grains
@@ -61,7 +61,7 @@ class Pushed(NamedTuple):
 
 
 def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
-    """Work, for jobs.Task, that finds or computes the failure load of every contact."""
+    """Work for jobs.Task that loads or computes the limit load of every contact."""
 
     def work(job: Job) -> Loads:
         params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
@@ -78,7 +78,7 @@ def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
 
 
 def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable[[Job], Pushed]:
-    """Work that finds or computes what a growing force pair on one contact does."""
+    """Work that loads or computes the effect of a growing force pair on one contact."""
 
     def work(job: Job) -> Pushed:
         params = kinds.PERTURBATION.parameters(
@@ -138,9 +138,9 @@ def _range(values: Floats) -> tuple[float, float]:
 
 
 def over_store(library: Library, cells: Iterable[Cell], cell: Cell) -> list[Row]:
-    """One dict for each packing perturbed at enough contacts: as `figures.perturbation` takes them.
+    """A dict per packing perturbed at enough contacts, as for `figures.perturbation`.
 
-    η2 is that of the packing's states among the cells; those of the same kind as `cell` come first.
+    η2 is that of the packing's states among the cells, preferably of the same kind as `cell`.
     """
     measured = {}
     for other in [*cells, *alike(cells, cell)]:

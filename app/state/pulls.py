@@ -1,6 +1,6 @@
-"""Forces in the visitor's hand: what was pulled where, and the networks that follow.
+"""Forces pulled by the visitor: the pulls, and the networks that follow.
 
-A pull is a pair (position of a contact, its f_n in ⟨f_n⟩), or three, (name of a plane, x, y), where
+A pull is a pair (position of a contact, its f_n in ⟨f_n⟩), or a triple (name of a plane, x, y) if
 the point in force space was pulled.
 """
 
@@ -26,7 +26,7 @@ from . import known
 Pull = tuple[Any, ...]  # see above
 Message = dict[str, Any]  # to or from the player
 
-MOST_PULLS = 32  # that a page, or a link, may hold
+MOST_PULLS = 32  # pulls per page or link
 PULLERS_KEPT = 4  # for all visitors
 
 _pullers: OrderedDict[tuple[str, str], Puller] = OrderedDict()
@@ -34,7 +34,7 @@ _lock = threading.Lock()
 
 
 class Held(NamedTuple):
-    """A network that the visitor's pulls have led to; forces in ⟨f_n⟩."""
+    """A network reached by the visitor's pulls; forces in ⟨f_n⟩."""
 
     forces: Floats  # (N_c, 2)
     residual: float
@@ -55,21 +55,21 @@ def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
 
 
 class Hand(param.Parameterized):
-    """The pulls of one page, as a stack; networks are made in the background.
+    """The pulls of one page, as a stack; networks are computed in the background.
 
-    What is known stays in all of them. `tell(message)`, once it is set, gets what the player shows:
-    {"held": …}, {"rail": …} of a contact and {"fan": …} of a plane.
+    Known forces are kept in all of them. `tell(message)`, once set, is called with messages for the
+    player: {"held": …}, {"rail": …} for a contact and {"fan": …} for a plane.
     """
 
     pulls = param.List(doc="the pulls, in order, starting from the state on screen")
     held = param.Parameter(doc="the Held that pulls have led to, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # param has no type hints
         self.state, self.work, self._task = state, state.work, state.work.task(reading)
         self.tell: Callable[[Message], object] = lambda message: None
-        self._made: list[tuple[Pull, Held]] = []  # of the pulls made
-        self._base: tuple[Any, ...] | None = None  # and where from
+        self._made: list[tuple[Pull, Held]] = []  # one for each pull
+        self._base: tuple[Any, ...] | None = None  # and their origin
         self._followed: tuple[Any, ...] = self._all
         self._task.param.watch(self._failed, "message")
         self.param.watch(self._follow, "pulls")
@@ -78,7 +78,7 @@ class Hand(param.Parameterized):
         state.knowledge.param.watch(self._follow, "known")
 
     def grab(self, contact: int) -> None:
-        """Select a contact and have its rail made, from the network on screen."""
+        """Select a contact and compute its rail, from the network on screen."""
         state = self.state
         if state.replay is None or state.growing:
             return
@@ -92,27 +92,27 @@ class Hand(param.Parameterized):
             self._work(contact)
 
     def grab_point(self) -> None:
-        """Have the fan of the plane on screen made."""
+        """Compute the fan of the plane on screen."""
         if self.state.plane is not None and not self.state.growing:
             self._work(self.state.plane)
 
     def hold(self, pull: Pull) -> None:
-        """Let go: the pull stays."""
+        """Release: the pull stays."""
         if len(self.pulls) >= MOST_PULLS:
             self.work.message = f"{MOST_PULLS} pulls are the maximum; undo some (Z)"
             return
         self.pulls = [*self.pulls, pull]
 
     def undo(self) -> None:
-        """Step back before the last pull."""
+        """Undo the last pull."""
         self.pulls = self.pulls[:-1]
 
     def heard(self, message: Message) -> None:
-        """What the browser tells of the hand."""
+        """Handle a message from the browser."""
         count = 0 if self.state.replay is None else len(self.state.replay.backbone)
         match message:
             case {"grab": int(contact)} if 0 <= contact < count:
-                self.grab(int(contact))  # which may be a flag
+                self.grab(int(contact))  # it may be a flag
             case {"hold": [int(contact), int() | float() as value]}:
                 if 0 <= contact < count and np.isfinite(value):
                     self.hold((int(contact), float(value)))
@@ -130,12 +130,12 @@ class Hand(param.Parameterized):
 
     @property
     def _all(self) -> tuple[Any, ...]:
-        """What is followed: pulls, the Replay and its row on screen, what is known."""
+        """The dependencies: pulls, the Replay and its row on screen, known forces."""
         state = self.state
         return self.pulls, state.replay, state.looks.frame, tuple(state.knowledge.known)
 
     def _follow(self, *events: Any) -> None:
-        """Pulls belong to one state: with another one on screen they are gone."""
+        """Pulls belong to one state and are removed when another one is shown."""
         pulls, replay, frame, known = self._followed
         self._followed = now = self._all
         if pulls != now[0]:
@@ -143,10 +143,10 @@ class Hand(param.Parameterized):
         elif pulls and (replay is not now[1] or frame != now[2]):
             self.pulls = []
         elif pulls and known != now[3]:
-            self._work()  # the networks that keep what is known now
+            self._work()  # networks with the new known forces
 
     def _work(self, grabbed: int | planes.Plane | None = None) -> None:
-        """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
+        """Compute the networks of all pulls, and the rail of a contact or the fan of a Plane."""
         state, pulls = self.state, list(self.pulls)
         replay, cell, frame = state.replay, state.cell, state.looks.frame
         if replay is None or cell is None:
@@ -180,7 +180,7 @@ class Hand(param.Parameterized):
         self.held = made[-1][1] if made else None
         if refusal:
             self.pulls = [pull for pull, _ in made]
-            self.work.message = refusal  # which those who see the pulls go would take away
+            self.work.message = refusal  # set last, because observers of the pulls would clear it
             return
         if ready is not None:
             self.tell(ready)
@@ -204,7 +204,7 @@ def _forces(replay: Replay, frame: int) -> Floats:
 
 
 def _held(told: Iterable[known.Statement]) -> dict[int, float]:
-    """{contact: f_n} of those that are held exactly."""
+    """{contact: f_n} of exactly held forces."""
     return {one.contact: one.value for one in told if not one.error}
 
 
@@ -215,9 +215,9 @@ def _networks(
     pulls: Sequence[Pull],
     first: Held,
 ) -> tuple[list[tuple[Pull, Held]], str]:
-    """The networks of all pulls, those made before included; a refusal.
+    """The networks of all pulls, including existing ones, and a refusal.
 
-    pulled(network, pull): what a pull makes of it; held: {contact: f_n} in all of them.
+    pulled(network, pull): the network after a pull; held: {contact: f_n} fixed in all of them.
     """
     kept = 0
     while kept < min(len(made), len(pulls)) and made[kept][0] == pulls[kept]:
@@ -226,7 +226,7 @@ def _networks(
     for pull in pulls[kept:]:
         last = made[-1][1] if made else first
         try:
-            # A pull to where the contact was held afterwards.
+            # A pull on a contact that was held later.
             to = (pull[0], held[pull[0]]) if pull[0] in held else pull
             made.append((pull, pulled(last, to)))
         except InputError as error:
@@ -237,7 +237,7 @@ def _networks(
 def _pulled(
     library: Library, cell: Cell, replay: Replay, puller: Puller, last: Held, pull: Pull
 ) -> Held:
-    """What one pull makes of the network before."""
+    """The network after one pull."""
     scale = replay.force_scale
     if isinstance(pull[0], str):
         plane = planes.named(library, cell, replay, pull[0])
@@ -251,7 +251,7 @@ def _pulled(
 def _to_pull(
     puller: Puller, replay: Replay, last: Held, grabbed: int | planes.Plane
 ) -> Iterator[Message]:
-    """What the page needs to pull a contact, or the point in a Plane: a part may come first."""
+    """The data that the page needs to pull a contact or the point in a Plane, possibly in parts."""
     scale = replay.force_scale
     if isinstance(grabbed, planes.Plane):
         yield {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
@@ -269,7 +269,7 @@ def _spelled(held: Held) -> Message:
 
 
 def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
-    """A Fan as the player takes it, in the coordinates of the plane on screen."""
+    """A Fan for the player, in the coordinates of the plane on screen."""
     points = fan.points - plane.origin
     return {
         "x": points[:, 0].copy(),
@@ -281,7 +281,7 @@ def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
 
 
 def _rail(rail: Any, scale: float) -> Message:
-    """A Rail as the player takes it: flat arrays, forces in ⟨f_n⟩."""
+    """A Rail for the player: flat arrays, forces in ⟨f_n⟩."""
     return {
         "lower": rail.low / scale,
         "upper": rail.high / scale,
@@ -296,12 +296,12 @@ def _rail(rail: Any, scale: float) -> Message:
 
 
 def spelled(pulls: Iterable[Pull]) -> str:
-    """Pulls as a link holds them, to all digits: an end of an interval must not round beyond it."""
+    """Pulls as text for a link, with all digits, as rounding could pass the end of an interval."""
     return "~".join(":".join([str(name), *map(str, at)]) for name, *at in pulls)
 
 
 def read(text: str) -> list[Pull]:
-    """Pulls of a link's text; ValueError for what is none."""
+    """Pulls from a link's text; ValueError if invalid."""
     pulls = [_read(*part.split(":")) for part in text.split("~")[: MOST_PULLS + 1]]
     if len(pulls) > MOST_PULLS:
         raise ValueError("too many pulls")
@@ -322,7 +322,7 @@ def _read(name: str, *at: str) -> Pull:
 
 
 def renumbered(pulls: Iterable[Pull], number: Callable[[int], int]) -> list[Pull]:
-    """Pulls that call each contact by another number."""
+    """Pulls with renumbered contacts."""
     return [
         (planes.renumbered(name, number) if isinstance(name, str) else number(name), *at)
         for name, *at in pulls
@@ -330,6 +330,6 @@ def renumbered(pulls: Iterable[Pull], number: Callable[[int], int]) -> list[Pull
 
 
 def contacts(pulls: Iterable[Pull]) -> Iterator[int]:
-    """Positions of the contacts that pulls name."""
+    """Positions of the contacts in pulls."""
     for name, *_ in pulls:
         yield from (c for c, _ in planes.read(name)) if isinstance(name, str) else (name,)

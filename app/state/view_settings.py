@@ -1,11 +1,11 @@
-"""What of the states on screen is looked at, and how, as parameters: no widgets, no plots."""
+"""The view of the states on screen, as parameters: no widgets, no plots."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import param
 
-# What colour, width and order can show: word in links → words on screen.
+# Quantities for colour, width and order: name in links → words on screen.
 COLOURS = {
     "change": "change from the forces as packed",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
@@ -23,7 +23,7 @@ WIDTHS = {
     "known": "known forces: length of the interval removed",
     "measured": "measured fₙ",
 }
-# What colours and widths show → key of the glossary.
+# Glossary key of each quantity shown by colour or width.
 EXPLAINED = {
     "mobilised": "mobilisation",
     "extent": "extent",
@@ -44,7 +44,7 @@ SORTS = {
     "shortened": "how much the known forces shortened it",
 }
 DRAWN = {"all": "all", "some": "a few"}
-# What single tabs can show.
+# Options of single tabs.
 PUSHES = {
     "one": "one contact",
     "all": "every contact",
@@ -60,7 +60,7 @@ SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
 
 
 class Seen(param.Parameterized):
-    """Of how a page looks at what is on screen what its player knows, too; see Looks."""
+    """The part of a page's view that its player also knows; see Looks."""
 
     tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
     wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
@@ -86,7 +86,7 @@ class Seen(param.Parameterized):
 
 
 class Looks(Seen):
-    """How a page looks at what is on screen; rows and contacts are those of its Replay."""
+    """The view of a page; rows and contacts are those of its Replay."""
 
     pair = param.Tuple(
         default=None, length=2, allow_None=True,
@@ -109,11 +109,11 @@ class Looks(Seen):
     dark = param.Boolean(doc="theme")
 
     def keep_open(self, panel: Any, name: str) -> None:
-        """Keep the parameter `open` of a panel and `opened` alike."""
+        """Keep the parameter `open` of a panel and `opened` in sync."""
         self._keep(panel, "open", lambda: name in self.opened, lambda on: [name] * on, [name])
 
     def keep_active(self, folds: Any, *names: str) -> None:
-        """Keep the parameter `active` of panels under each other, and `opened`, alike."""
+        """Keep the parameter `active` of stacked panels and `opened` in sync."""
 
         def active() -> list[int]:
             return [k for k, name in enumerate(names) if name in self.opened]
@@ -142,5 +142,5 @@ class Looks(Seen):
         follow()
 
     def shows(self, name: str) -> bool:
-        """Whether what has this tab is on screen."""
+        """Whether the tab with this name is on screen."""
         return name == self.tab or (self.wide and name == "plane")

@@ -1,4 +1,4 @@
-"""One visitor's page from its start to its end: its thread, who it is of, and what it waits for."""
+"""One visitor's page from start to end: its thread, its visitor, and its work."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,8 +14,8 @@ from ..browser.panel_patches import in_transit, together, unseen_ms
 from ..results.library import Library
 from .page_tasks import Work
 
-POLL_MS = 200  # how often the page asks running work how far it is
-# Without a browser, after which a page's work is ended; the page itself stays longer.
+POLL_MS = 200  # interval at which the page polls running work
+# Time without a browser after which a page's work is ended; the page itself stays longer.
 GONE_MS = 3000
 
 
@@ -30,7 +30,7 @@ def _open_library() -> Library:
 
 
 def at_end(close: Callable[[], object]) -> None:
-    """Count the page as open, and call this when it is closed."""
+    """Count the page as open, and call this function when it is closed."""
     closed = gc_pauses.opened()
 
     def end(context: object) -> None:
@@ -41,7 +41,7 @@ def at_end(close: Callable[[], object]) -> None:
 
 
 def turns(document: Document) -> Callable[[Callable[[], object]], None]:
-    """wake(function): call it on the page's thread, soon, when what it changes will be seen."""
+    """wake(function): call it soon on the page's thread, when its changes can be sent."""
     waiting: list[Callable[[], object]] = []
     loop = IOLoop.current()
 
@@ -52,11 +52,11 @@ def turns(document: Document) -> Callable[[Callable[[], object]], None]:
             together(function)
 
     def come(function: Callable[[], object]) -> None:
-        if document.session_context is not None:  # else the page has ended
+        if document.session_context is not None:  # otherwise the page has ended
             document.add_next_tick_callback(partial(run, function))
 
     def wake(function: Callable[[], object]) -> None:
-        # From any thread; the page can end at any moment but within a turn of the loop.
+        # From any thread; the page can end at any time except within a turn of the loop.
         loop.add_callback(come, function)
 
     def arrived() -> None:
@@ -68,16 +68,16 @@ def turns(document: Document) -> Callable[[Callable[[], object]], None]:
 
 
 def visitor(document: Document) -> Visitor | None:
-    """Who opened a page: from where, and which page it is."""
+    """The visitor of a page: network address and page id."""
     context: Any = document.session_context
     if context is None:
         return None
-    # Behind a proxy it is the proxy's, unless panel serve is told --use-xheaders.
+    # Behind a proxy it is the proxy's address, unless panel serve runs with --use-xheaders.
     return Visitor(getattr(context.request, "remote_ip", None) or "", context.id)
 
 
 def poll_while_running(work: Work, document: Document) -> None:
-    """Take over the progress of tasks while there are any; end them where nobody looks any more."""
+    """Poll tasks while there are any; end them when no browser is connected any more."""
     polling: list[Any] = []
     loaded: list[bool] = []
 

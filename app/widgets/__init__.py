@@ -1,1 +1,1 @@
-"""Controls and plots that Panel does not have."""
+"""Controls and plots that Panel does not provide."""

@@ -1,4 +1,4 @@
-// A button that copies a text, or the address of the page, and says so for a moment.
+// A button that copies a text, or the address of the page, and confirms it briefly.
 
 import { button } from "../browser/dom.js"
 import { copy } from "../browser/clipboard.js"

@@ -6,9 +6,9 @@ from ..browser.bundle import Scripted
 
 
 class CopyButton(Scripted):
-    """Copies `text`, or the page's address where it is empty, and says so for a moment.
+    """Copies `text`, or the page's address if it is empty, and confirms it briefly.
 
-    Not Panel's Button with js_on_click: one keeps the page's thread for 13 ms, this for 5 ms.
+    Not Panel's Button with js_on_click, which blocks the page's thread for 13 ms; this takes 5 ms.
     """
 
     label = param.String()

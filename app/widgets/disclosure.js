@@ -1,4 +1,4 @@
-// A button that opens and closes something below it.
+// A button that opens and closes the content below it.
 
 import { button } from "../browser/dom.js"
 

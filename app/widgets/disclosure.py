@@ -1,4 +1,4 @@
-"""A button that opens and closes something below it."""
+"""A button that opens and closes the content below it."""
 
 import param
 
@@ -6,7 +6,7 @@ from ..browser.bundle import Scripted
 
 
 class Disclosure(Scripted):
-    """`line` with a triangle; whoever shows what it opens watches `open`; see disclosure.js."""
+    """`line` with a triangle; the owner of the content watches `open`; see disclosure.js."""
 
     line = param.String()
     open = param.Boolean()

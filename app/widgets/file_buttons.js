@@ -1,4 +1,4 @@
-// Buttons that ask the server for a file and save what comes.
+// Buttons that request a file from the server and save it.
 
 import { ask } from "../browser/send.js"
 import { composed, plotsSeen, printFigure } from "../explore/tabs/export/figure.js"
@@ -6,10 +6,10 @@ import { button, made } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 import { save } from "../browser/download.js"
 
-const RATE = 6e6 // bits a second of a movie
+const RATE = 6e6 // bits per second of a movie
 const LONGEST_MS = 60000 // of a movie
-const HELD_MS = 500 // for which a movie ends with the last network; a shorter one would have no picture
-const SIDE = 900 // pixels of a movie, as of the picture whose caption it has
+const HELD_MS = 500 // hold on the last network at the end of a movie; a shorter one would be lost
+const SIDE = 900 // pixels of a movie, equal to the picture whose caption it has
 const WHERE = [888, 60] // pixels in its caption, where the number of the network ends
 const SCALE = 2 // pixels of a PNG per pixel of its SVG
 
@@ -38,12 +38,12 @@ export function render({ model, view }) {
 
   const player = () => view.model.document.get_model_by_name("player").player
 
-  /** The packing as on screen, drawn by the player: the one place that knows how. */
+  /** The packing as on screen, drawn by the player, the only place that can do it. */
   function drawn(caption) {
     return new Blob([player().scene.picture(caption)], { type: "image/svg+xml" })
   }
 
-  /** A movie of what plays, from the first state to the last, or once to and fro. */
+  /** A movie of the animation, from the first state to the last, or once to and fro. */
   async function recorded(caption, button) {
     const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
     const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
@@ -54,13 +54,13 @@ export function render({ model, view }) {
     recorder.ondataavailable = (event) => pieces.push(event.data)
     const ended = new Promise((resolve) => { recorder.onstop = resolve })
     const { view } = scene
-    scene.reset(false) // whole, as the scale in its caption is
+    scene.reset(false) // whole, like the scale in its caption
     scene.finer(SIDE)
     it.show(0, false)
     it.play(true)
     recorder.start(250)
     const begun = performance.now(), words = button?.textContent
-    let over // since when the last network is seen
+    let over // time at which the last network was shown
     const frame = (now) => {
       context.fillStyle = caption.background
       context.fillRect(0, 0, canvas.width, canvas.height)
@@ -104,7 +104,7 @@ export function render({ model, view }) {
   }
 
   async function take(message) {
-    if (!root.isConnected) return // of an earlier rendering
+    if (!root.isConnected) return // from an earlier rendering
     const file = plain(message)
     if (file.rest) return rest()
     const caption = file.caption && deep(file.caption)
@@ -119,7 +119,7 @@ export function render({ model, view }) {
     rest()
   }
 
-  /** Packing and plots as one figure, to be saved or printed. */
+  /** Packing and plots as one figure, to save or print. */
   async function together({ name, width }, caption) {
     const plots = await plotsSeen(view.model.document), packing = player().scene.picture(caption)
     const figure = composed(packing, plots, width, caption.background)
@@ -138,15 +138,15 @@ export function render({ model, view }) {
   return root
 }
 
-// What a recorder writes does not say how long it is, so that players cannot wind.
+// Recorders do not write the duration, without which players cannot seek.
 
-const INFO = [0x15, 0x49, 0xa9, 0x66], DURATION = [0x44, 0x89, 0x88] // EBML: names, and 8 bytes to come
+const INFO = [0x15, 0x49, 0xa9, 0x66], DURATION = [0x44, 0x89, 0x88] // EBML: ids, and 8 bytes that follow
 
-/** A WebM with its duration (ms) written into its Info; as it is where that is not found. */
+/** A WebM with its duration (ms) in its Info element; unchanged if that is not found. */
 async function timed(movie, duration) {
   const bytes = new Uint8Array(await movie.arrayBuffer())
   const at = bytes.subarray(0, 1000).findIndex((_, k) => INFO.every((byte, n) => bytes[k + n] === byte))
-  const size = bytes[at + 4] & 0x7f // of one byte, whose highest bit says so
+  const size = bytes[at + 4] & 0x7f // one byte long, marked by its highest bit
   if (at < 0 || !(bytes[at + 4] & 0x80) || size === 0x7f) return movie
   const told = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
   told.setFloat64(0, duration)

@@ -1,4 +1,4 @@
-"""Buttons that hand files over: made when asked for, saved by the browser."""
+"""Buttons for files that are made on request and saved by the browser."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,9 +11,9 @@ from ..explore.tabs.export.files import File
 
 
 class Handover(Scripted):
-    """A button for each of `files`; `on_ask(key)` has `hand_over` called in time.
+    """A button for each of `files`; `on_ask(key)` later leads to a call of `hand_over`.
 
-    Not Panel's FileDownload: it makes files on the page's thread, and seven take 107 ms, this 5 ms.
+    Not Panel's FileDownload, which makes files on the page's thread: seven take 107 ms, here 5 ms.
     """
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
@@ -23,21 +23,21 @@ class Handover(Scripted):
         self._on_ask = on_ask
 
     def hand_over(self, file: File) -> None:
-        """Have the browser save an exports.File."""
+        """Make the browser save a files.File."""
         self.tell(file._asdict())
 
     def hand_over_picture(
         self, name: str, caption: dict[str, Any], width: int | None = None
     ) -> None:
-        """Have the browser draw the packing as on screen (SVG, PNG), or record it (WebM), and save.
+        """Make the browser draw the packing (SVG, PNG) or record it (WebM), and save it.
 
-        caption: background, ink, bar {low, high, stops} and lines of words; width: in mm, of one
-        figure with the plots that are seen (SVG, or PDF by printing).
+        caption: background, ink, bar {low, high, stops} and lines of text; width: in mm, for one
+        figure with the visible plots (SVG, or PDF by printing).
         """
         self.tell({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
     def rest(self) -> None:
-        """No file comes for what was asked."""
+        """Cancel the request: no file follows."""
         self.tell({"rest": True})
 
     def _heard(self, message: Message) -> None:

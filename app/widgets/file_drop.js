@@ -1,5 +1,5 @@
-// A place to drop files on, or to choose them by clicking. They are sent in pieces, which keeps each
-// message below the server's limit; the server keeps count of the bytes itself.
+// A place to drop files, or to choose them by clicking. They are sent in pieces, which keeps each
+// message below the server's limit; the server counts the bytes itself.
 
 import { ask } from "../browser/send.js"
 

@@ -1,4 +1,4 @@
-"""A place to drop files on; their content stays in memory and is handed over when all are there."""
+"""A place to drop files; their content stays in memory and is passed on when all have arrived."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,20 +8,20 @@ import param
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 
-NAME_LENGTH = 120  # of a file's name, as shown in messages
-MOST_FILES = 16  # of one drop; a packing has two at most
+NAME_LENGTH = 120  # characters of a file name in messages
+MOST_FILES = 16  # per drop; a packing has at most two
 
 
 class Dropper(Scripted):
     """Collects files, up to `most` bytes a drop, for `on_files([(name, content), …])`.
 
-    Not Panel's FileInput: told to take 1 kB, it held 100 MB of unfinished files sent to it.
+    Not Panel's FileInput, which kept 100 MB of unfinished files when limited to 1 kB.
     """
 
     label = param.String()
     most = param.Integer(doc="bytes of all files of one drop together")
 
-    _files: Any  # {name: content}; None once the drop was refused
+    _files: Any  # {name: content}; None after the drop was refused
 
     def __init__(
         self,
@@ -29,14 +29,14 @@ class Dropper(Scripted):
         on_refusal: Callable[[str], object],
         **params: Any,
     ) -> None:
-        """on_refusal(line): told why a drop was refused."""
+        """on_refusal(line): called with the reason if a drop is refused."""
         super().__init__(**params)
         self._on_files, self._on_refusal = on_files, on_refusal
         self._files, self._size = {}, 0
 
     def _heard(self, message: Message) -> None:
-        """One message of the page: a beginning, a piece of a file, or the end."""
-        # A page may have been altered: the limits hold here, whatever it sends.
+        """Handle a message from the page: a beginning, a piece of a file, or the end."""
+        # A page may have been altered, so the limits are enforced here.
         if "begin" in message:
             self._files, self._size = {}, 0
         elif "end" in message:
@@ -58,6 +58,6 @@ class Dropper(Scripted):
             self._refuse(f"more than {MOST_FILES} files were sent")
 
     def _refuse(self, why: str) -> None:
-        """Forget the drop, and whatever else of it is to come."""
+        """Discard the drop and the rest of its pieces."""
         self._files = None
         self._on_refusal(f"{why}; nothing was read")

@@ -1,4 +1,4 @@
-// The header of every page: two doors as links, and tools that need no server.
+// The header of every page: links to both entry pages, and tools that need no server.
 
 import { button, made } from "../browser/dom.js"
 import { copy } from "../browser/clipboard.js"
@@ -12,7 +12,7 @@ export function render({ model }) {
   const nav = made("nav", { ariaLabel: "granforce" }), tools = made("div", { className: "tools" })
   header.append(made("b", { textContent: "granforce" }), nav, tools)
 
-  /** The address of a door, in the theme of this page. */
+  /** The address of an entry page, in the theme of this page. */
   const address = (query) => {
     const asked = [query, model.dark ? "dark=1" : ""].filter(Boolean).join("&")
     return window.location.pathname + (asked && `?${asked}`)
@@ -37,7 +37,7 @@ export function render({ model }) {
   const asked = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })
   tools.append(link, asked, theme)
 
-  /** The key "?" lists the keys, but where it is typed into a field. */
+  /** The key "?" opens the list of keys, unless it is typed into a field. */
   function key(event) {
     const at = event.composedPath()[0]
     if (event.key !== "?" || /^(INPUT|TEXTAREA|SELECT)$/.test(at.tagName) || help.open) return
@@ -51,13 +51,13 @@ export function render({ model }) {
   return root
 }
 
-/** The dialog of "?": what is seen, and the keys. */
+/** The dialog of "?": an explanation, and the keys. */
 function helpOf(model, root) {
   const dialog = root.appendChild(document.createElement("dialog"))
   const keys = document.createElement("dl"), words = document.createElement("div")
   dialog.append(made("h2", { textContent: "Keys" }), keys, words, button("Close", () => dialog.close(), { className: "soft" }))
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close() })
-  dialog.addEventListener("keydown", (event) => event.stopPropagation()) // keys mean nothing else meanwhile
+  dialog.addEventListener("keydown", (event) => event.stopPropagation()) // keys have no other effect meanwhile
   const show = () => {
     words.innerHTML = model.help
     dialog.firstChild.hidden = !model.keys.length

@@ -1,4 +1,4 @@
-"""The thin header of every page: both doors, a copy of the link, help, and the theme."""
+"""The thin header of every page: entry pages, a copy of the link, help, and the theme."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from ..browser.bundle import Scripted
 class Header(Scripted):
     """granforce, Explore and Learn, Copy link, ? and the theme; see header.js.
 
-    `middle` of a narrow page goes below the doors: nothing is ever covered.
+    On a narrow page `middle` is placed below the links, so that nothing is covered.
     """
 
     door: Any = param.Selector(default="explore", objects=["explore", "learn"])

@@ -1,5 +1,5 @@
-// The glossary where its words stand. Marked are elements with data-term; of widgets the words of
-// their label and of the option chosen are looked up.
+// The glossary at the words on the page: elements with data-term, and the words in the label and
+// the chosen option of widgets.
 
 import { made } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
@@ -7,7 +7,7 @@ import { plain } from "../browser/to_object.js"
 const WAIT_MS = 250 // before a hint opens under a resting pointer
 const WIDGETS = "[role=tab], button, .number, .friction, " +
   ".choice, .MuiFormControl-root, .MuiFormControlLabel-root"
-const DEEP = 14 // levels above the pointer that may hold the word
+const DEEP = 14 // levels above the pointer to search for the word
 
 export function render({ model }) {
   const terms = plain(model.terms), labels = plain(model.labels)
@@ -16,21 +16,21 @@ export function render({ model }) {
 
   const words = (node, part) => node?.querySelector(part)?.textContent.trim()
 
-  /** Keys of the glossary that a widget's words stand for: its value's first, then its label's. */
+  /** Glossary keys for a widget's words: first its value's, then its label's. */
   function keysOf(node) {
     const value = words(node, "option:checked"), label = words(node, "label, legend, .name")
     const found = [value, label, node.textContent.trim()].map((text) => labels[text])
     return [...new Set(found.filter(Boolean))].slice(0, 2)
   }
 
-  /** The element that has the focus, within whatever shadow. */
+  /** The element with the focus, inside any shadow root. */
   function focused() {
     let node = document.activeElement
     while (node?.shadowRoot?.activeElement) node = node.shadowRoot.activeElement
     return node
   }
 
-  /** From an element outwards, through shadows. */
+  /** From an element outwards, through shadow roots. */
   function outwards(node) {
     const path = []
     for (let k = 0; node && k < DEEP; k++) {
@@ -74,7 +74,7 @@ export function render({ model }) {
     at = null
   }
 
-  // Not pointerover and focusin: from one element to another of the same shadow they are not told here.
+  // Not pointerover and focusin, which are not dispatched here for moves within one shadow root.
 
   let under = null
   function move(event) {

@@ -1,4 +1,4 @@
-"""What a word on the page means: told where it stands, on hover, focus and touch."""
+"""Explanations of words on the page, shown on hover, focus and touch."""
 
 from html import escape
 
@@ -9,7 +9,7 @@ from granforce.glossary import TERMS, title
 from ..browser.bundle import Scripted
 from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS
 
-# Words on the page that are not the glossary's own: what stands there → key of the glossary.
+# Other words on the page → key of the glossary.
 LABELS = {
     "Friction μ": "mu",
     "Disks N": "n",
@@ -47,13 +47,13 @@ def labels() -> dict[str, str]:
 
 
 def term(key: str, words: str | None = None) -> str:
-    """A word of the glossary as HTML, explained where it stands; words: how it is called there."""
+    """A glossary word as HTML with its explanation; words: the text to display."""
     shown = escape(title(key) if words is None else words)
     return f'<span class="term" tabindex="0" data-term="{key}">{shown}</span>'
 
 
 class Hints(Scripted):
-    """Shows a sentence beside the word pointed at, focused or touched; see hints.js."""
+    """Shows a sentence next to the word that is hovered, focused or touched; see hints.js."""
 
     terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
     labels = param.Dict(default=labels())

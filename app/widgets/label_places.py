@@ -1,4 +1,4 @@
-"""Places for labels beside the points of a plot, such that all of them can be read."""
+"""Places for labels next to the points of a plot, such that all labels are legible."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,11 +7,11 @@ import numpy as np
 
 from granforce.types import Floats
 
-# Pixels between the axes of the smallest plot that has labels, and of a letter and a point.
+# Pixels of the smallest plot with labels (between its axes), of a letter, and of a point.
 SMALLEST, LETTER, POINT = (270.0, 190.0), (6.0, 11.0), 4.0
 Pair = tuple[float, float]
 Box = tuple[float, float, float, float]  # left, top, right, bottom, in pixels
-# Where a label may stand beside its point.
+# Possible places of a label around its point.
 CORNERS = (
     (5, -4, "left", "bottom"),
     (-5, -4, "right", "bottom"),
@@ -21,10 +21,10 @@ CORNERS = (
 
 
 def labels(x: Floats, y: Floats, words: Sequence[str], span: Pair) -> dict[str, list[Any]]:
-    """Where labels stand beside points such that none collide, as columns of a text glyph.
+    """Places of labels next to points, without collisions, as columns of a text glyph.
 
-    span: of what the axes show. In plots larger than the SMALLEST there is more room between them.
-    Those that find no place are left out.
+    span: range of the axes. Plots larger than SMALLEST have more room between labels. Labels
+    without a place are left out.
     """
     scale = [0.9 * room / (part or 1.0) for room, part in zip(SMALLEST, span, strict=True)]
     places = np.column_stack([x * scale[0], -y * scale[1]])
@@ -51,7 +51,7 @@ def labels(x: Floats, y: Floats, words: Sequence[str], span: Pair) -> dict[str, 
 
 
 def _box(place: Pair, corner: tuple[float, float, str, str], size: Pair) -> Box:
-    """Pixels (left, top, right, bottom) of a label of a size at a corner of a point."""
+    """Pixels (left, top, right, bottom) of a label of this size at a corner of a point."""
     (px, py), (right, down, align, baseline), (width, height) = place, corner, size
     left = px + right - (width if align == "right" else 0)
     top = py + down - (height if baseline == "bottom" else 0)
@@ -59,7 +59,7 @@ def _box(place: Pair, corner: tuple[float, float, str, str], size: Pair) -> Box:
 
 
 def _along(places: Floats) -> Floats:
-    """Pixels of the line that joins points, close to each other."""
+    """Pixels of the line that joins points, closely spaced."""
     if len(places) < 2:
         return places
     part = np.linspace(0, 1, 24)[:, None, None]
@@ -67,7 +67,7 @@ def _along(places: Floats) -> Floats:
 
 
 def _ends(places: Floats) -> Box:
-    """The frame of a plot, whose axes go a twentieth beyond what they show."""
+    """The frame of a plot, whose axes extend a twentieth beyond the data."""
     room = 0.05 * np.array(SMALLEST)
     return (*(places.min(axis=0) - room), *(places.max(axis=0) + room))
 

@@ -10,10 +10,10 @@ from ..browser.messages import Message
 
 
 class NumberField(Scripted):
-    """A whole number, taken over by Enter or on leaving the field; see number.js.
+    """A whole number, applied by Enter or on leaving the field; see number.js.
 
-    Not panel-material-ui's IntInput: after Enter it took no more typing until it lost focus, and
-    what did not fit beside its buttons was cut.
+    Not panel-material-ui's IntInput: after Enter it accepted no input until it lost focus, and
+    numbers too wide for the space next to its buttons were cut off.
     """
 
     label = param.String()
@@ -24,11 +24,11 @@ class NumberField(Scripted):
     disabled = param.Boolean()
 
     def __init__(self, on_wrong: Callable[[str], object], **params: Any) -> None:
-        """on_wrong(line): told what is wrong with what was typed, if anything."""
+        """on_wrong(line): called with the reason if the input is invalid, or an empty line."""
         super().__init__(**params)
         self._on_wrong = on_wrong
 
     def _heard(self, message: Message) -> None:
-        """Something was typed that is no whole number."""
+        """Handle input that is not a whole number."""
         typed, within = message["typed"][:30], f"{self.start} to {self.end}"
         self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")

@@ -1,4 +1,4 @@
-"""The page around what a door shows: its colours and fonts, and the header on top."""
+"""The frame of every page: its colours and fonts, and the header."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from ..browser.panel_patches import early_template, without_busy_watch
 from .header import Header
 
 TITLE = "granforce"
-# Colours of the page by day and by night: names in the styles of all components.
+# Colours of the page by day and by night, by name in the styles of all components.
 LIGHT = {
     "--paper": "#ffffff", "--ink": "#1d252d", "--quiet": "#5a636e", "--line": "#e4e8ec",
     "--field": "#c3cbd5", "--hover": "#f0f3f6", "--accent": "#1464c8", "--pale": "#dbe8f7",
@@ -20,7 +20,7 @@ DARK = {
     "--on-accent": "#0b1a2c", "--warn": "#ffcf87", "--warn-paper": "#33260d", "--hand": "#ff5ca8",
 }  # fmt: skip
 HIDDEN = {"display": "none"}
-# Material UI's own bar and the room for it: the header is ours.
+# Remove Material UI's own bar and the room for it, as the page has its own header.
 FRAME = {
     **LIGHT,
     "&.mui-dark": DARK,
@@ -43,7 +43,7 @@ def framed(
 ) -> pmui.Page:
     """A page with this header above `main`, in the header's theme.
 
-    header: None in a frame of somebody else's page. styles: of what is in `main`, as `sx`.
+    header: None if the page is embedded in another one. styles: of the content of `main`, as `sx`.
     """
     whole = pmui.Page(
         title=TITLE,
@@ -51,7 +51,7 @@ def framed(
         sx=FRAME | (styles or {}),
         template=early_template(),
         dark_theme=dark,
-        busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page
+        busy_indicator=None,  # the player has its own; for this one Bokeh searches the whole page
         theme_config=THEME,
     )
     without_busy_watch(whole)

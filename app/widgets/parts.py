@@ -1,4 +1,4 @@
-"""What the tabs share: they compute only while they are seen, and their plots can be saved."""
+"""Features shared by the tabs: they compute only while visible, and their plots can be saved."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -17,10 +17,10 @@ from .select import Select
 
 NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 
-MOVES = ["moves"]  # tags of what the player draws itself while it plays
+MOVES = ["moves"]  # tag of parts that the player draws itself while playing
 
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
-# Small buttons: what one is here for, and what else can be done.
+# Small buttons: the main action, and others.
 PRIMARY = {"color": "primary", "size": "small"}
 OUTLINED = {"variant": "outlined", "color": "default", "size": "small"}
 
@@ -46,21 +46,21 @@ const name = fig.toolbar.tools.find(one => one.filename).filename;
 
 
 class TabView:
-    """A tab's view, which calls `update` when something watched has changed, but only on screen.
+    """A tab's view, which calls `update` after a change of something watched, if it is on screen.
 
-    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks, work: of
-    these.
+    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks, work:
+    parameters of these.
     """
 
     name: str
     update: Callable[[], None]
-    told: pn.pane.HTML  # where small print is
+    told: pn.pane.HTML  # the place of notes
 
     def __init__(
         self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
     ) -> None:
         self.state, self.looks = state, state.looks
-        self._stale, self.left = True, False  # whether it was taken off the page
+        self._stale, self.left = True, False  # whether it was removed from the page
         state.param.watch(self._changed, [*watched])
         self.looks.param.watch(self._changed, ["tab", "wide", *looks])
         state.work.param.watch(self._changed, [*work])
@@ -71,7 +71,7 @@ class TabView:
         return not self.left and self.looks.shows(self.name)
 
     def catch_up(self) -> None:
-        """Update if need be and if seen; to be called once when the view has been built."""
+        """Update if necessary and visible; call it once after building the view."""
         if self._stale and self.visible:
             self._stale = False
             together(self.update)
@@ -82,7 +82,7 @@ class TabView:
         self.catch_up()
 
     def failed(self, event: Any) -> None:
-        """Tell what went wrong in a task, the message of which is watched."""
+        """Show the error of a task whose message is watched."""
         if event.new:
             self.told.object = event.new
 
@@ -105,10 +105,10 @@ def savable(fig: Figure, name: str) -> Figure:
 
 
 def saving(mark: str) -> list[Any]:
-    """A button each that saves the newest figure with this tag as PNG and as SVG, for all to see.
+    """Buttons that save the newest figure with this tag as PNG and SVG, shared by all figures.
 
-    Buttons outlive figures: a widget that leaves the page while it is still being drawn there ends
-    in an error of React's.
+    They outlive figures: a widget that leaves the page during its first rendering causes an error
+    in React.
     """
     buttons = []
     for kind in ("png", "svg"):
@@ -122,7 +122,7 @@ def saving(mark: str) -> list[Any]:
 
 
 def plotted(fig: Figure) -> pn.pane.Bokeh:
-    """A figure's place, as wide as there is room."""
+    """A pane for a figure, as wide as the available room."""
     return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
 
 
@@ -150,12 +150,12 @@ SWATCH = (
 
 
 def mark(colour: str, words: str, corner: str = "1px") -> str:
-    """What a mark of this colour in a plot means, as HTML; corner: its radius."""
+    """A legend entry for a colour, as HTML; corner: its radius."""
     return SWATCH.format(corner, colour) + words
 
 
 def note(text: str = "", **options: Any) -> pn.pane.HTML:
-    """Small print, as HTML."""
+    """A note in small print, as HTML."""
     return pn.pane.HTML(
         text, styles=NOTE, stylesheets=[SHARED, CLAIMS], sizing_mode="stretch_width",
         margin=(2, 10, 8, 10), **options,
@@ -163,37 +163,37 @@ def note(text: str = "", **options: Any) -> pn.pane.HTML:
 
 
 def by_words(labels: dict[str, str]) -> dict[str, str]:
-    """Labels {value: words} as a list takes them: {words: value}."""
+    """Labels {value: words} in the form for a list: {words: value}."""
     return {words: value for value, words in labels.items()}
 
 
 def choice(labels: dict[str, str], value: str) -> Any:
-    """Buttons of which one is pressed; labels {value: words}."""
+    """Buttons of which one is selected; labels {value: words}."""
     return pmui.RadioButtonGroup(
         options=by_words(labels),
         value=value,
         size="small",
         margin=(6, 8),
-        # Capitals would make other symbols of fₙ and fₜ.
+        # Capitals would turn fₙ and fₜ into other symbols.
         sx={"& .MuiToggleButton-root": PLAIN, **PLAIN},
     )
 
 
 def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
-    """A list under a label, of the values {value: words} of the parameter of this name."""
+    """A labelled list of the values {value: words} of the parameter with this name."""
     look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
     made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
     return linked(made, looks, name)
 
 
 def linked(widget: Any, looks: Looks, name: str) -> Any:
-    """A widget whose value is the parameter of this name."""
+    """A widget bound to the parameter with this name."""
     widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
     looks.param.watch(lambda event: widget.param.update(value=event.new), name)
     return widget
 
 
-# Lines that open what is below them, without the shadows of cards.
+# Lines that open the content below them, without the shadows of cards.
 FOLDS = {
     "&, & .MuiPaper-root": {"background": "transparent", "boxShadow": "none"},
     "&::before, & .MuiPaper-root::before": {"display": "none"},
@@ -204,7 +204,7 @@ FOLDS = {
 
 
 def folded_away(*titled: Any) -> Any:
-    """Panels (title, panel, …) that are closed until they are opened."""
+    """Panels (title, panel, …) that are initially closed."""
     pairs = list(zip(titled[::2], titled[1::2], strict=True))
     return pmui.Accordion(
         *pairs,
@@ -217,5 +217,5 @@ def folded_away(*titled: Any) -> Any:
 
 
 def folded(text: str) -> str:
-    """HTML of what only those read who want to know more."""
+    """Collapsed HTML for readers who want details."""
     return f"<details><summary>How was this computed?</summary>{text}</details>"

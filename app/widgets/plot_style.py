@@ -1,22 +1,22 @@
-"""Colours and small helpers that the plots share."""
+"""Colours and small helpers shared by the plots."""
 
 from typing import Any
 
 from bokeh.models import CustomJS, HoverTool, Title, WheelZoomTool
 from bokeh.plotting import figure as Figure
 
-# Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
-# so that contacts without friction are seen on pale disks, by day and by night.
+# Blue and orange are distinguishable with every common colour-vision deficiency; the middle is
+# grey, not white, so that contacts without friction are visible on pale disks, by day and by night.
 BLUE, GREY, ORANGE = "#1464c8", "#747880", "#e8710a"
-# By day and by night: chains at μ = 0, where mobilisation means nothing.
+# By day and by night: chains at μ = 0, where mobilisation is undefined.
 NEUTRAL = "#4a5563", "#aab4c2"
-# Cividis, which reads the same with every common colour blindness, less the end that would be lost
-# on the ground, by day and by night.
+# Cividis, which looks the same with every common colour-vision deficiency, without the end that
+# would not contrast with the background, by day and by night.
 EXTENT = (
     ("#16407a", "#3c5a80", "#5f6f7d", "#7f8478", "#a39a6c", "#c6b159", "#e3c53f"),
     ("#2f62a6", "#4c6a94", "#66768a", "#858a7e", "#a9a070", "#cdb85e", "#fee838"),
 )
-STATES = "#3d8bd4"  # small dots, seen by day and by night
+STATES = "#3d8bd4"  # small dots, visible by day and by night
 EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
@@ -28,7 +28,7 @@ COLOURS = 33
 
 
 def ramp(*stops: str, count: int = COLOURS) -> list[str]:
-    """Colours "#rrggbb" along the stops, straight lines in between."""
+    """Colours "#rrggbb" interpolated linearly between the stops."""
     pieces = len(stops) - 1
     return [_mix(stops, k * pieces / (count - 1)) for k in range(count)]
 
@@ -40,7 +40,7 @@ def _mix(stops: tuple[str, ...], at: float) -> str:
 
 
 def palettes(dark: bool) -> dict[str, Any]:
-    """Colours of the packing: of the chains by what they show, and of everything else in it."""
+    """Colours of the packing: of the chains by the quantity shown, and of everything else."""
     diverging = ramp(BLUE, GREY, ORANGE)
     body, line = ((150, 172, 200), 0.5) if dark else ((139, 160, 187), 0.75)
     fills = (0.34, 0.12, 0.16, 0.06) if dark else (0.42, 0.14, 0.2, 0.07)
@@ -73,17 +73,17 @@ def palettes(dark: bool) -> dict[str, Any]:
 
 
 def lines(dark: bool) -> tuple[str, str]:
-    """Colours of the two lines whose forces are the axes of force space: across, and up."""
+    """Colours of the two contacts whose forces are the axes of force space: across, and up."""
     return ("#4ecb8d", "#c39bff") if dark else ("#12793f", "#7a3fc4")
 
 
 def text(dark: bool) -> str:
-    """Colour of words in plots, as the page's theme has it."""
+    """Colour of text in plots, for the page's theme."""
     return "#ffffff" if dark else "rgba(0, 0, 0, 0.87)"
 
 
 def now(dark: bool) -> str:
-    """Colour of the small dots of the network on screen, over bars."""
+    """Colour of the small dots of the network on screen, drawn over bars."""
     return "#ffffff" if dark else "#12324f"
 
 
@@ -92,9 +92,9 @@ def _faded(colour: tuple[int, ...], part: float) -> str:
 
 
 def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
-    """A figure that fills its width, with a toolbar inside its frame that shows on hover.
+    """A figure that fills its width, with a toolbar inside its frame that appears on hover.
 
-    The wheel zooms with Ctrl held, and scrolls the page otherwise.
+    The wheel zooms with Ctrl pressed, and otherwise scrolls the page.
     """
     settled = {
         "tools": "pan,box_zoom,reset",
@@ -124,14 +124,14 @@ def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
 
 
 def hover(renderers: list[Any], *rows: tuple[str, str], **options: Any) -> HoverTool:
-    """Show these (label, field) rows over the renderers."""
-    # Beside the mouse: where it would snap to a bar, Bokeh 3.9 fails for want of the bar's sides.
+    """Show these (label, field) rows when hovering over the renderers."""
+    # At the mouse: if it snapped to a bar, Bokeh 3.9 would fail because bars have no sides.
     policy = {"point_policy": "follow_mouse"}
     return HoverTool(renderers=renderers, tooltips=list(rows), **policy, **options)
 
 
 def corner(fig: Figure, word: str) -> Title:
-    """Say in a plot's upper right corner whether it shows exact, seen or measured values."""
+    """Label a plot's upper right corner as exact, seen or measured values."""
     look = {"text_font_size": "11px", "text_font_style": "italic", "text_color": "#808080"}
     title = Title(text=word, align="right", **look)
     fig.add_layout(title, "above")
@@ -139,7 +139,7 @@ def corner(fig: Figure, word: str) -> Title:
 
 
 def legend_above(fig: Figure, columns: int = 4) -> None:
-    """A small legend above the plot, where no curve strikes it through."""
+    """A small legend above the plot, where no curve crosses it."""
     legend = fig.legend[0]
     fig.center.remove(legend)
     legend.update(
@@ -149,7 +149,7 @@ def legend_above(fig: Figure, columns: int = 4) -> None:
         glyph_width=16, glyph_height=14, label_height=14, label_standoff=3,
     )  # fmt: skip
     fig.add_layout(legend, "above")
-    # Outside the plot Bokeh draws a legend's marks but once, before there may be any data.
+    # Outside the plot Bokeh draws a legend's marks only once, possibly before there are data.
     again = CustomJS(args={"legend": legend}, code="setTimeout(() => legend.change.emit(), 50)")
     for source in {renderer.data_source for item in legend.items for renderer in item.renderers}:
         source.js_on_change("data", again)

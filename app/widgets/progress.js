@@ -1,10 +1,10 @@
-// How far a task is, with a button that cancels it; nothing is seen while it rests.
+// The progress of a task, with a button that cancels it; hidden while idle.
 
 import { ask } from "../browser/send.js"
 
 export function render({ model, view }) { return taskLine(model, view) }
 
-/** Bar, words and buttons of the task that a model follows. */
+/** Bar, text and buttons of the task that a model follows. */
 export function taskLine(model, view) {
   const root = document.createElement("div")
   root.className = "task"

@@ -1,4 +1,4 @@
-"""How far tasks are, with a button that cancels; nothing is seen while they rest."""
+"""The progress of tasks, with a button that cancels; hidden while idle."""
 
 from typing import Any
 
@@ -12,11 +12,11 @@ FOLLOWED = ("running", "fraction", "keeps")
 
 
 class Progress(Scripted):
-    """Bar, stage, time left and Cancel of a jobs.Task: of several, the first that is running.
+    """Bar, stage, time left and Cancel of a jobs.Task: the first running one of several.
 
-    Where what is there so far would be a result, Stop and keep, and Discard in place of Cancel.
+    If the partial result is a valid result, the buttons are Stop and keep, and Discard.
 
-    Not Panel's LinearProgress, text and button: they keep the page's thread for 40 ms, this 4 ms.
+    Not Panel's LinearProgress, text and button, which block the page's thread for 40 ms; here 4 ms.
     """
 
     running = param.Boolean()
@@ -33,7 +33,7 @@ class Progress(Scripted):
 
     @property
     def _told(self) -> Task:
-        """The task that is told of."""
+        """The task to show."""
         return next((task for task in self._tasks if task.running), self._tasks[0])
 
     def _heard(self, message: Message) -> None:

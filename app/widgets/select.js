@@ -1,4 +1,4 @@
-// One of several, chosen from the browser's own list, which every keyboard and screen reader knows.
+// A choice from the browser's own list, which every keyboard and screen reader supports.
 
 import { made } from "../browser/dom.js"
 
@@ -14,12 +14,12 @@ export function render({ model }) {
     list.value = model.value
   }
 
-  let clicked = false // and not reached by keyboard, who goes on there
+  let clicked = false // not reached by keyboard, whose user continues there
   list.addEventListener("pointerdown", () => { clicked = true })
   list.addEventListener("keydown", () => { clicked = false })
   list.addEventListener("change", () => {
     model.value = list.value
-    if (clicked) list.blur() // Space and arrows mean the player again, see buttons.js
+    if (clicked) list.blur() // Space and arrows control the player again, see buttons.js
   })
   for (const name of ["label", "options", "value"]) model.on(name, show)
   show()

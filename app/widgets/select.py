@@ -1,4 +1,4 @@
-"""One of several, chosen from a list."""
+"""A choice from a list."""
 
 import param
 
@@ -6,9 +6,9 @@ from ..browser.bundle import Scripted
 
 
 class Select(Scripted):
-    """A list of which one is chosen; see select.js.
+    """A list with one chosen entry; see select.js.
 
-    Not panel-material-ui's Select: its open menu is told to screen readers as one without options.
+    Not panel-material-ui's Select: screen readers find no options in its open menu.
     """
 
     label = param.String()
