@@ -1,1 +1,1 @@
-"""Small scenes and the lesson."""
+"""The lesson and the workbench of small scenes."""

@@ -1,4 +1,5 @@
-// The seven chapters: their words, as functions of the numbers on screen, and what is played in each.
+// The seven chapters: their text, as functions of the numbers on screen, and the experiment of
+// each.
 
 import { Chance } from "./experiments/chance.js"
 import { Friction } from "./experiments/friction.js"
@@ -11,7 +12,7 @@ const percent = (v) => `${Math.round(100 * v)} %`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
 const PRESSED = "− 2, since the forces between disks cancel in the sum over all of them; + 1 for the pressure"
 
-/** How free numbers are counted, line by line: {rows, head}, head null where the last row is the sum. */
+/** The count of free numbers, line by line: {rows, head}; head is null if the last row is the sum. */
 function counted({ contacts, disks, equations, free }, pressed, disksNote = "") {
   const whole = 3 * disks
   const rows = [
@@ -25,7 +26,7 @@ function counted({ contacts, disks, equations, free }, pressed, disksNote = "") 
 
 /**
  * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing, the instruction
- * for the hand; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
+ * for dragging; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
  */
 export const CHAPTERS = [
   {

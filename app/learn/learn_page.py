@@ -23,7 +23,7 @@ KEYS = [
 
 
 def learn_page(document: Document, query: str) -> Any:
-    """What an address shows of Learn: chapters, or with `scene` the workbench."""
+    """The page for an address of Learn: chapters, or with `scene` the workbench."""
     asked = small_scenes.asked(query)
     wake, visitor = visit.turns(document), visit.visitor(document)
     given = parse_qs(query.lstrip("?"), keep_blank_values=True)

@@ -1,4 +1,5 @@
-// Learn: seven chapters, one on screen; which, and how far the reader is, is in the address and in the browser.
+// Learn: seven chapters, one on screen; the chapter and the reader's progress are in the address
+// and in the browser.
 
 import { button, made } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
@@ -7,7 +8,8 @@ import { PredictDoSee } from "./predict_do_see.js"
 import { Progress } from "./progress.js"
 import { Source } from "./source.js"
 
-// What later chapters show, asked for one after the other while the first is read: some of it is computed.
+// The data of later chapters, requested one after the other while the first is read, as some take
+// time.
 const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push"]]
 
 class Lesson {
@@ -40,14 +42,14 @@ class Lesson {
     this.experiment = this.mechanism = null
   }
 
-  /** The chapter that the address names; else the first that is not done. */
+  /** The chapter in the address, otherwise the first unfinished one. */
   get named() {
     const name = new URLSearchParams(window.location.search).get("learn")
     const chapter = CHAPTERS.find((one) => one.name === name) ?? CHAPTERS.find((one) => !this.progress.of(one.name).done)
     return Math.max(0, CHAPTERS.indexOf(chapter))
   }
 
-  /** The address of a chapter, with all else that this page's says. */
+  /** The address of a chapter, with all other parameters of this page. */
   address(name) {
     const query = new URLSearchParams(window.location.search)
     query.set("learn", name)
@@ -89,7 +91,7 @@ class Lesson {
   }
 
   async fetch() {
-    for (const [want, name] of AHEAD) await this.source.get(want, name).catch(() => {}) // who wants it, is told
+    for (const [want, name] of AHEAD) await this.source.get(want, name).catch(() => {}) // the caller that needs it reports errors
   }
 
   /** The parts of a chapter's page. */
@@ -110,13 +112,13 @@ class Lesson {
     return { text, pictures, picture, plot, voice, row }
   }
 
-  /** The list of chapters, with those that are done. */
+  /** The list of chapters, with finished ones marked. */
   show() {
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
       const item = made("li", {}), link = item.appendChild(made("a", { textContent: title, href: this.address(name) }))
       if (k === this.number) {
         link.ariaCurrent = "step"
-        requestAnimationFrame(() => this.list.parentNode.scrollTo({ left: item.offsetLeft - 40 })) // where the list is a line
+        requestAnimationFrame(() => this.list.parentNode.scrollTo({ left: item.offsetLeft - 40 })) // if the list is horizontal
       }
       if (this.progress.of(name).done) item.append(made("span", { className: "done", textContent: " ✓", title: "done" }))
       link.addEventListener("click", (event) => {
@@ -137,7 +139,7 @@ class Lesson {
   }
 }
 
-/** Whether a friction is a power of ten: other ticks would show an answer. */
+/** Whether a friction is a power of ten: other ticks would reveal an answer. */
 const isDecade = (mu) => Math.abs(Math.log10(mu) - Math.round(Math.log10(mu))) < 1e-9
 
 export function render({ model, view }) { return new Lesson(model, view).root }

@@ -15,12 +15,12 @@ from ..widgets.plot_style import palettes
 from .model import lesson_data
 from .model.lesson_data import Packings
 
-# The forces over which S is drawn in each small scene, across and up, as in chapters.js.
+# The forces used as axes of S in each small scene, across and up, as in chapters.js.
 PLANES = {"groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
 
 
 class Lesson(Scripted):
-    """One lesson; what a chapter shows is sent when the chapter asks for it."""
+    """The lesson; the data of a chapter are sent when the chapter requests them."""
 
     dark = param.Boolean()
     alone = param.Boolean(doc="whether one chapter is shown in a frame of another page")
@@ -43,7 +43,7 @@ class Lesson(Scripted):
         self.param.watch(self._dress, "dark")
 
     def close(self) -> None:
-        """End what is being computed."""
+        """End all computations."""
         for task in self._tasks.values():
             task.close()
 
@@ -51,7 +51,7 @@ class Lesson(Scripted):
         self.palettes = palettes(event.new)
 
     def _heard(self, message: Message) -> None:
-        """A chapter wants what it shows."""
+        """Handle a chapter's request for data."""
         packings, name = self._packings, message["name"]
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match message["want"]:
@@ -71,7 +71,7 @@ class Lesson(Scripted):
                 self._send("curve", "", lesson_data.curve)
 
     def _send(self, what: str, name: str, made: Callable[[], Any], pool: Any = reading) -> None:
-        """Make it off the event loop and tell the script, or why it cannot be."""
+        """Compute the data off the event loop and send them, or the reason for a failure."""
         task = self._tasks.get(what + name)
         if task is None:
             task = self._tasks[what + name] = self._task(pool)

@@ -1,4 +1,5 @@
-// The one way in which every chapter works: predict with a marker, do with the hand, see the answer beside it.
+// The common course of every chapter: predict with a marker, do by dragging, see the answer next to
+// the prediction.
 
 import { button, made } from "../browser/dom.js"
 import { QuantityPlot } from "./drawing/quantity_plot.js"
@@ -9,8 +10,8 @@ const STAGES = ["Predict", "Do", "See"]
 
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: where they go; prediction: made before, or
-   * null; kept({prediction, done}): to be remembered; drawn(): the picture is to be painted.
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: their elements; prediction: from an
+   * earlier visit, or null; kept({prediction, done}): called to store progress; drawn(): called to repaint.
    */
   constructor(chapter, experiment, { plot, voice, row }, prediction, kept, drawn) {
     Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true })
@@ -23,14 +24,14 @@ export class PredictDoSee {
     this.show()
   }
 
-  /** A value of the quantity that is asked for, in words. */
+  /** A value of the quantity in question, in words. */
   named(value) { return this.chapter.x.log ? `μ = ${Number(value.toPrecision(2))}` : value.toFixed(2) }
 
   stop() { this.sized.disconnect() }
 
   get stage() { return !this.predicted ? 0 : this.experiment.found ? 2 : 1 }
 
-  /** Where the marker waits before it is moved: at the low end of the axis. */
+  /** The initial position of the marker: the low end of the axis. */
   get waiting() { return this.chapter.x.low }
 
   mark(value) {
@@ -38,7 +39,7 @@ export class PredictDoSee {
     this.show()
   }
 
-  /** The prediction stands; the hand may act. */
+  /** The prediction is made; dragging is enabled. */
   begin() {
     this.predicted = true
     this.experiment.locked = false
@@ -54,7 +55,7 @@ export class PredictDoSee {
 
   fail(error) { this.voice.textContent = error.message }
 
-  /** Everything follows the experiment. */
+  /** Update everything from the experiment. */
   show() {
     const { experiment, stage, prediction } = this, { picture } = experiment
     if (stage === 2 && !this.told) this.kept({ prediction, done: (this.told = true) })
@@ -70,7 +71,7 @@ export class PredictDoSee {
     this.drawn()
   }
 
-  /** The one voice: what is to be done, or what was found. */
+  /** The only line of text: the instruction, or the result. */
   speak(stage) {
     const { chapter, experiment, voice } = this
     if (stage < 2) {
@@ -83,7 +84,7 @@ export class PredictDoSee {
     }
   }
 
-  /** The answer beside the prediction, with its reason, what is surprising, and the count. */
+  /** The answer next to the prediction, with its reason, the surprise, and the count. */
   answer([reason, surprise], count) {
     const { experiment: { answer }, prediction } = this
     const verdict = made("p", { className: "verdict" })

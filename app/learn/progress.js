@@ -1,4 +1,4 @@
-// How far a reader is: predictions and finished chapters, as this browser remembers them.
+// The reader's progress: predictions and finished chapters, stored in this browser.
 
 const KEY = "granforce.learn"
 

@@ -1,4 +1,4 @@
-// What chapters show, asked of the server once: scenes, packings, and what is computed of them.
+// Data for chapters, requested from the server once: scenes, packings, and computed results.
 
 import { ask } from "../browser/send.js"
 import { plain } from "../browser/to_object.js"
@@ -9,7 +9,7 @@ export class Source {
     model.on("msg:custom", (news) => this.arrived(plain(news)))
   }
 
-  /** A promise of what is asked for; rejected with the reason where it cannot be had. */
+  /** A promise of the requested data; rejected with the reason if they are not available. */
   get(want, name = "") {
     const { model, view } = this, key = `${want} ${name}`
     if (!this.promises.has(key)) {
@@ -23,7 +23,7 @@ export class Source {
     const key = `${what} ${name}`, waiting = this.waiting.get(key)
     this.waiting.delete(key)
     if (error) {
-      this.promises.delete(key) // to be asked for again
+      this.promises.delete(key) // allows another request
       waiting?.reject(new Error(error))
     } else waiting?.resolve(Object.fromEntries(Object.entries(plain(given)).map(([field, value]) => [field, native(value)])))
   }
@@ -31,7 +31,7 @@ export class Source {
 
 const ARRAYS = [Float64Array, Float32Array, Int32Array, Int8Array, Uint8Array]
 
-/** An array as scripts know it: a part of Bokeh's own kind, by subarray, is the whole of it. */
+/** A plain copy of an array: Bokeh's own array type ignores subarray. */
 function native(value) {
   const kind = ARRAYS.find((one) => value instanceof one)
   return kind ? new kind(value) : value

@@ -1,5 +1,5 @@
-// What is around the scene: tools over it; below it the player's bar, the legend, and what compares and checks
-// networks.
+// The controls around the scene: tools above it; below it the player's bar, the legend, and the
+// controls that compare and check networks.
 
 import { made } from "../browser/dom.js"
 import { Keyboard } from "./keyboard.js"
@@ -27,7 +27,7 @@ function button(name, title, word = "") {
     `${icon(name)}${said}</button>`
 }
 
-// Tools come and go with what is selected.
+// Tools appear depending on the selection.
 const BUTTONS = `
   <div class="scenes">
     <div class="view">
@@ -68,7 +68,7 @@ const BUTTONS = `
   <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
   </details>`
-const CLOSER = 0.7 // of the view, by a button
+const CLOSER = 0.7 // zoom factor of a button
 
 export class Buttons {
   /**
@@ -105,13 +105,13 @@ export class Buttons {
 
   part(name) { return this.root.querySelector(`.${name}`) }
 
-  /** Error bar of a force that is held, in ⟨fₙ⟩; NaN where what was typed is none. */
+  /** Error bar of a held force, in ⟨fₙ⟩; NaN for invalid input. */
   get error() {
     const typed = this.part("error").valueAsNumber
     return typed >= 0 ? typed : NaN
   }
 
-  /** Whether a contact is selected, whose force can be held. */
+  /** Whether a contact is selected, so that its force can be held. */
   tellChosen(chosen) { this.root.classList.toggle("chosen", Boolean(chosen)) }
 
   tellPlaying(playing) {
@@ -119,32 +119,32 @@ export class Buttons {
     this.root.classList.toggle("playing", playing)
   }
 
-  /** What lines show, to be chosen; what was open, or has the focus, keeps it. */
+  /** The quantities shown by lines, to be chosen; the open list, or the one with the focus, stays so. */
   tellLegend(html) {
     const legend = this.part("legend"), details = () => legend.querySelector("details")
-    if (details()) this.unfolded = details().open // there are none while a packing is made
+    if (details()) this.unfolded = details().open // there is none while a packing is made
     const { name } = legend.getRootNode().activeElement ?? {}
     legend.innerHTML = html
     if (details()) details().open = this.unfolded ?? false
     if (name) legend.querySelector(`[name="${name}"]`)?.focus({ preventScroll: true })
   }
 
-  /** Panels that are open: of those here there is one. */
+  /** The open panels, of which only one is here. */
   tellOpen(names) { this.part("extras").open = names.includes("check") }
 
-  /** One line below the player; empty: none. */
+  /** One line below the player; empty: no line. */
   say(words) { this.part("said").textContent = words }
 
-  /** What was asked for and is not there yet lies over the old picture; empty: nothing was. */
+  /** A message over the old picture about a request in progress; empty: no message. */
   tellAsked(words) {
     this.asked.textContent = words
     this.root.classList.toggle("pale", Boolean(words))
   }
 
-  /** Whether a network is on screen that was pulled. */
+  /** Whether a pulled network is on screen. */
   tellHeld(held) { this.root.classList.toggle("held", held) }
 
-  /** Whether two networks are asked for, and whether they are there. */
+  /** Whether two networks are requested, and whether they are shown. */
   tellSplit(asked, there) {
     if (asked) this.part("extras").open = true
     this.part("split").classList.toggle("on", asked)

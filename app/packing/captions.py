@@ -1,4 +1,4 @@
-"""What pictures and files say about themselves: captions, and their names."""
+"""Captions and names of pictures and files."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,11 +10,11 @@ from ..state.view_settings import WIDTHS
 from .view import colour_bar, colour_words
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
-NAMED = 4  # known forces that a caption names
+NAMED = 4  # known forces in a caption
 
 
 def caption(state: AppState) -> dict[str, Any]:
-    """What a picture says about itself: background, colour bar, scale and words."""
+    """The caption of a picture: background, colour bar, scale and words."""
     pulled, looks = bool(state.hand.pulls), state.looks
     low, stops, high = colour_bar(state, pulled)
     contrast = "#f2f5f9" if looks.dark else "#18191d"
@@ -32,12 +32,12 @@ def caption(state: AppState) -> dict[str, Any]:
 
 
 def origin(cell: Cell) -> str:
-    """Where states come from, in all words that it takes to make them again."""
+    """The origin of states, with everything needed to compute them again."""
     return f"μ = {cell.mu:g}, {cell.series}"
 
 
 def known_words(state: AppState) -> Iterator[str]:
-    """What is known, in a line of a caption; none where nothing is."""
+    """The known forces as a line of a caption, or nothing."""
     number = state.replay.backbone
     told = [one.words(number[one.contact]) for one in state.knowledge.known]
     if told:
@@ -46,7 +46,7 @@ def known_words(state: AppState) -> Iterator[str]:
 
 
 def stem(selection: Selection) -> str:
-    """Name of a file without its ending."""
+    """A file name without suffix."""
     if selection.imported:
         return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"
     return f"granforce_n{selection.packing['n']}_mu{selection.mu:g}_s{selection.packing['seed']}"

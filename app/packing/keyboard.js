@@ -1,4 +1,5 @@
-// The keys of the player, which mean it wherever the focus is, unless the element there needs them itself.
+// The keys of the player, active wherever the focus is, unless the focused element uses them
+// itself.
 
 const HELD = { "[": "less", "]": "more", z: "undo", Z: "undo", Escape: "free", h: "hold", H: "hold" }
 const KEYS = {
@@ -6,12 +7,12 @@ const KEYS = {
 }
 
 export class Keyboard {
-  /** Call actions by their names while the element `root` is on the page. */
+  /** Call actions by name while the element `root` is on the page. */
   constructor(root, actions) {
     this.root = root
     this.actions = actions
-    // Before the widget that has the focus: what was clicked keeps it, but Space and arrows then mean
-    // the player again. Who goes by Tab means the widget.
+    // Before the focused widget: a clicked widget keeps the focus, but Space and arrows then
+    // control the player again. After Tab they control the widget.
     this.tabbed = false
     this.onKey = (event) => this.press(event)
     this.onPointer = () => { this.tabbed = false }
@@ -41,7 +42,7 @@ export class Keyboard {
   }
 }
 
-// Which keys the element with the focus needs for itself
+// Keys that the focused element uses itself
 
 function typing(at) {
   return at.isContentEditable || /^(TEXTAREA|SELECT)$/.test(at.tagName) ||
@@ -51,7 +52,7 @@ function typing(at) {
 const chosen = (at) => at.ariaSelected === "true" || at.ariaPressed === "true"
 const inMenu = (at) => ["option", "menuitem", "listbox", "menu"].includes(at.role)
 
-/** A tab or one of several that is chosen already has no use for it. */
+/** An active tab or a chosen option has no use for it. */
 function usesSpace(at, tabbed) {
   if (inMenu(at)) return true
   const pressed = at.tagName === "BUTTON" || at.tagName === "A" || at.type === "checkbox" ||

@@ -1,5 +1,5 @@
-// Replays states in the page. The frames come once; per painted frame the chains are drawn anew and
-// the plots beside follow, without telling the server.
+// Replays states in the page. The frames arrive once; each painted frame redraws the chains, and
+// the plots next to them follow, without telling the server.
 
 import { actions } from "./hand/actions.js"
 import { ask, knownThere } from "../browser/send.js"
@@ -17,12 +17,12 @@ import { Scene } from "./drawing/scene.js"
 import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
-const PLOTS_MS = 30 // the plots beside are repainted no more often than this while a force is pulled
-const OLD = 0.88 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
+const PLOTS_MS = 30 // shortest time between two repaints of the plots while a force is pulled
+const OLD = 0.88 // opacity of outdated results, which are also grey but still legible
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
-const REST_MS = 400 // after which a view that was moved is taken into the link
+const REST_MS = 400 // after which a moved view is stored in the link
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
-const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
+const WIDE = 1800 // px; from there on force space has its own column, see explore_page.py
 
 class Player {
   constructor(model, page, tell) {
@@ -54,7 +54,7 @@ class Player {
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(this)
     this.tell = tell
-    this.listeners = new Set() // functions to be called when other numbers are on screen
+    this.listeners = new Set() // functions called when other numbers are on screen
     this.scene.onMarks = (context, scene) => {
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
@@ -71,28 +71,28 @@ class Player {
     }
   }
 
-  /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
+  /** Whether the tab for pushing a contact is open: playing would distract. */
   get pushes() { return this.model.tab === "perturb" }
 
-  /** Whether a contact is to be pushed, and there is something to be held against that. */
+  /** Whether a contact is to be pushed, and any other force can change. */
   get pushable() { return this.pushes && this.model.pushing === "one" && this.replay?.walk.free > 0 }
 
-  /** What the tab that is open asks of the packing. */
+  /** Apply the open tab's settings to the packing. */
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
     if (!this.pushable) this.pushed.end()
   }
 
-  /** Whether force space has been turned to, where the point is what can be dragged first. */
+  /** Whether force space is in view, where the point is what can be dragged first. */
   get points() { return this.model.tab === "plane" }
 
-  // What is on screen
+  // The view
 
-  /** Take the frames that the server sent. */
+  /** Take the frames sent by the server. */
   load() {
     const { model, scene, playing } = this, walk = plain(model.walk)
     if (model.walk === this.loaded || !walk.contacts) return
-    const shown = this.loaded !== null, zoom = shown ? null : model.zoom // of the link that opened the page
+    const shown = this.loaded !== null, zoom = shown ? null : model.zoom // from the link that opened the page
     this.loaded = model.walk
     const view = this.live.leave(), place = this.grownInto(walk)
     this.playback.halt()
@@ -121,7 +121,7 @@ class Player {
     else if (!shown) this.playFirst()
   }
 
-  /** Where a walk that is finished goes on, if it is the one that was being computed; else null. */
+  /** The position in a finished walk that corresponds to the walk in progress; null for another walk. */
   grownInto(walk) {
     const { replay } = this
     if (walk.room || !replay?.walk.numbers || replay.walk.contacts !== walk.contacts) return null
@@ -130,7 +130,7 @@ class Player {
     return Math.max(0, walk.number.findLastIndex((other) => other <= number))
   }
 
-  /** More states of the walk under way. */
+  /** Add states to the walk in progress. */
   grow(states) {
     const { replay } = this
     if (!replay?.walk.numbers) return
@@ -141,7 +141,7 @@ class Player {
     if (!this.playing) this.paintPlots()
   }
 
-  /** More exact bounds of the packing on screen. */
+  /** Add exact bounds of the packing on screen. */
   arrive(bounds) {
     const { replay, plots } = this
     if (!replay || bounds.low.length !== replay.walk.contacts ) return
@@ -156,14 +156,15 @@ class Player {
   /** Whether the packing is on the page. */
   get shown() { return this.scene.root.isConnected }
 
-  /** Whether more states are to come. */
+  /** Whether more states are expected. */
   get grows() { return this.replay?.walk.room > 0 }
 
   tellAsked() {
     const { model, live } = this, { style } = document.documentElement
     this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
-    // What is beside is pale by these: told by its own style, Bokeh would lay out the whole page anew.
+    // Neighbouring plots are dimmed by these: a style set from Python would make Bokeh lay out the
+    // whole page again.
     const pale = { "--still": model.asked, "--growing": model.asked && !this.grows }
     for (const [name, old] of Object.entries(pale)) {
       style.setProperty(name, old ? OLD : 1)
@@ -177,7 +178,7 @@ class Player {
     this.scene.pair = (this.points || this.model.wide) ? this.plots.plane.pair ?? [] : []
   }
 
-  /** What is chosen, seen. */
+  /** Show the selection. */
   mark() {
     if (!this.replay || this.live.moves) return
     this.select()
@@ -200,10 +201,10 @@ class Player {
     for (const listener of this.listeners) listener()
   }
 
-  /** The same network, as it is to look now. */
+  /** Redraw the same network with a new look. */
   repaint() { if (!this.live.moves) this.paint() }
 
-  /** Go to a position on the track and paint it; tell: the server, too. */
+  /** Go to a position on the track and paint it; tell: also tell the server. */
   show(to, tell = true) {
     this.replay.go(to)
     this.paint()
@@ -211,7 +212,7 @@ class Player {
     if (tell) this.model.frame = this.replay.frame
   }
 
-  /** Where the view has come to rest, for links. */
+  /** Report the resting view, for links. */
   tellView() {
     const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
     if (key === this.viewed || scene.frozen) return
@@ -224,7 +225,7 @@ class Player {
     }, REST_MS)
   }
 
-  /** A network that was pulled has changed. */
+  /** A pulled network has changed. */
   repaintHeld() {
     this.replay.mix()
     this.paint()
@@ -232,13 +233,13 @@ class Player {
     if (now - this.playback.painted > PLOTS_MS) return this.paintPlots(now)
     this.buttons.read(this.replay)
     clearTimeout(this.late)
-    this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the hand has come to rest
+    this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the pointer has come to rest
   }
 
-  /** Whether a network is on screen that was pulled: the legend says so, too. */
+  /** Report whether a pulled network is on screen, for the legend. */
   tellHeld(held) {
     this.buttons.tellHeld(held)
-    if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
+    if (this.pulled !== held) this.model.pulled = this.pulled = held // reading a model is slow
   }
 
   again() {
@@ -265,7 +266,7 @@ class Player {
     this.mark()
   }
 
-  /** Play, or come to rest, whichever it does not just now. */
+  /** Toggle between playing and rest. */
   toggle() {
     const { playback, buttons } = this
     playback.newest = false
@@ -276,14 +277,14 @@ class Player {
     }
   }
 
-  /** The page opens playing, unless its link says that it rests, or nothing is to move. */
+  /** Start playing when the page opens, unless its link says otherwise or motion is reduced. */
   playFirst() {
     const { model } = this
     if (STILL.matches || model.paused || model.between || this.pulled || this.pushes) model.paused = true
     else requestAnimationFrame(() => this.play(true))
   }
 
-  /** Select the next contact, the one with the largest force on screen first. */
+  /** Select the next contact, starting with the largest force on screen. */
   choose({ mixed: { normal } }, sign) {
     const { model } = this, order = Array.from(normal.keys()).sort((a, b) => normal[b] - normal[a] || a - b)
     const at = order.indexOf(model.contact ?? -1), { length } = order
@@ -293,16 +294,16 @@ class Player {
     this.say(told.join("; "))
   }
 
-  /** One line beside the number of the network; refused: until something else is done. */
+  /** One line next to the number of the network; refused: shown until the next action. */
   say(words, refused = false) {
     this.refused = refused
     this.buttons.say(words)
   }
 
-  /** Something was done. */
+  /** An action succeeded. */
   recover() { if (this.refused) this.say("") }
 
-  /** Take the selected contact's force for known, as it is on screen; known, let it go. */
+  /** Declare the selected contact's force known, as it is on screen, or release a known one. */
   hold({ mixed }) {
     const { contact } = this.model, { error } = this.buttons
     if (contact === null || contact === undefined) return this.say(UNCHOSEN, true)
@@ -312,7 +313,7 @@ class Player {
     this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
   }
 
-  /** Begin or end going to and fro between the pinned state and this one. */
+  /** Begin or end the motion to and fro between the pinned state and this one. */
   between({ swinging, frame, last }) {
     const { model } = this, here = frame || last
     if (swinging) { model.between = null; return }
@@ -320,9 +321,9 @@ class Player {
     this.play(true)
   }
 
-  // What the server tells
+  // Messages from the server
 
-  /** What is done when a parameter of the model has changed. */
+  /** Handlers for changes of the model's parameters. */
   changes() {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
@@ -367,7 +368,7 @@ export function render({ model, view }) {
   const player = new Player(model, page, tell), changes = player.changes()
   knownThere(page)
   view.model.data.player = player
-  view.model.data.scene = player.scene // for those who find the model by its name
+  view.model.data.scene = player.scene // for code that finds the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())

@@ -1,4 +1,4 @@
-"""The player: draws the packing and replays states in the browser; no server work per frame."""
+"""The player: draws the packing and replays states in the browser, without the server."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,12 +20,12 @@ SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATI
 class Player(Scripted, Seen):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
-    Its script has parts: what is replayed and how it plays (replay/), where and how it is drawn
-    (drawing/), what takes forces into the hand (hand/), and the bar, keys and tools around it.
+    Its script has parts: what is replayed and how (replay/), where and how it is drawn (drawing/),
+    dragging of forces (hand/), and the bar, keys and tools around it.
 
-    The frames are shipped once, in `walk`. Plots beside it are found in the page by their names;
-    any ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the
-    columns of the source called NAME, one row of which belongs to each frame, while TAB is visible.
+    The frames are sent once, in `walk`. Plots next to it are found in the page by name; any
+    ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the columns
+    of the source called NAME, which have one row per frame, while TAB is visible.
     """
 
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
@@ -52,7 +52,7 @@ class Player(Scripted, Seen):
 
     def __init__(self, **params: Any) -> None:
         super().__init__(**params)
-        # Who hears of "tab", "hand", "known", "wide" and "live", each called with what is told.
+        # Handlers of "tab", "hand", "known", "wide" and "live", called with the message.
         self.hears: dict[str, Callable[[Any], object]] = {}
 
     def _heard(self, message: Message) -> None:
@@ -62,9 +62,9 @@ class Player(Scripted, Seen):
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
-    """What the player needs of a Replay: flat arrays, frame after frame, and the geometry.
+    """The data of a Replay for the player: flat arrays, frame after frame, and the geometry.
 
-    room: frames that it grows to while it is being computed.
+    room: number of frames of a growing replay.
     """
     disks, links = replay.disks, replay.links
     whole = {"contact", "i", "j"}
@@ -95,7 +95,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "r": disks.r,
         "grain": disks.grain.astype(np.int32),
         "touching": disks.contacts.astype(np.int32),
-        # rows of style's disk colours: whole, rattler, image, image of a rattler
+        # rows of the style's disk colours: whole, rattler, image, image of a rattler
         "kind": (2 * disks.image + (disks.contacts == 0)).astype(np.int8),
         "radius": radius,
         **{
@@ -108,7 +108,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
 def _acceptance(attempts: Floats) -> Floats:
     """Accepted states per attempt (F,) up to each frame; NaN for the original."""
     tried = np.append(np.nan, np.cumsum(attempts[1:]))
-    # Where nothing was tried, since all forces are determined, nothing was accepted either.
+    # With all forces determined nothing was tried, so nothing was accepted.
     return np.divide(
         np.arange(len(attempts)), tried, out=np.full(len(attempts), np.nan), where=tried > 0
     )

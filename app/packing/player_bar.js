@@ -1,4 +1,4 @@
-// The bar of the player: steps, play, the slider and the number of the network, and how many there are.
+// The bar of the player: steps, play, the slider, the number of the network, and their total.
 
 import { button, made } from "../browser/dom.js"
 
@@ -17,7 +17,7 @@ function iconButton(name, title, act) {
 
 export class PlayerBar {
   /**
-   * actions: back(), play(), step(), scrub(position), and keep(): have all networks stored.
+   * actions: back(), play(), step(), scrub(position), and keep(): store all networks.
    * say(words): show a line.
    */
   constructor(actions, say) {
@@ -51,7 +51,7 @@ export class PlayerBar {
   /** Rows of the track per second. */
   get speed() { return 2 ** Number(this.speedInput.value) }
 
-  /** Go to the network whose number was typed, or to the nearest that is stored. */
+  /** Go to the network whose number was typed, or to the nearest stored one. */
   go() {
     const asked = Number(this.number.value), { replay } = this
     if (!replay) return
@@ -72,14 +72,14 @@ export class PlayerBar {
     this.playButton.setAttribute("aria-label", word)
   }
 
-  /** How many networks pass in a second: of those that are not stored, too. */
+  /** The number of networks passed per second, including those not stored. */
   showRate() {
     const rate = this.speed * (this.replay?.stride ?? 1)
     const shown = rate < 10 ? Number(rate.toFixed(1)) : Math.round(rate)
     this.rate.textContent = this.replay?.swinging ? "" : `${shown} network${shown === 1 ? "" : "s"}/s`
   }
 
-  /** Another track: its length, and whether the networks that are left out can be had. */
+  /** Show another track: its length, and whether the omitted networks can be computed. */
   showTrack(replay, keepable) {
     this.replay = replay
     const { last, swinging, stride, walk } = replay
@@ -91,7 +91,7 @@ export class PlayerBar {
     this.showRate()
   }
 
-  /** Where the replay is. */
+  /** Show the present position. */
   show(replay) {
     this.scrub.value = replay.position
     this.place.textContent = replay.place

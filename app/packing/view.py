@@ -1,4 +1,4 @@
-"""The packing: the player, what it shares with the server, and the legend."""
+"""The packing: the player, its parameters shared with the server, and the legend."""
 
 from typing import Any
 
@@ -17,16 +17,16 @@ from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
 from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
 from .player import Player, frames
 
-# Both ways.
+# In both directions.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
 SHARED += ("stretch", "paused", "opened")
 SEEN = sorted(set(Seen.param) - {"name"})
 
-Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
+Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty if unknown
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
-LARGE = 4.0  # ⟨f_n⟩, up to which widths are shown: few forces are larger
+LARGE = 4.0  # ⟨f_n⟩, limit of the widths shown: few forces are larger
 LEGEND = """
 <label data-term="{colour_term}">Colour {colour}</label><span>{bar}</span>
 <label data-term="{width_term}">Width {width}</label>
@@ -59,7 +59,7 @@ class PackingView:
         self.state = state
         self.looks = looks = state.looks
         self.player = Player(
-            name="player",  # by which others in the page find it
+            name="player",  # its name for other components of the page
             sizing_mode="stretch_width",
             palettes=palettes(looks.dark),
             zoom=None if looks.zoom is None else list(looks.zoom),
@@ -100,14 +100,14 @@ class PackingView:
         self._explain()
 
     def _go(self, event: Any) -> None:
-        """To and fro, or to another part of the picture: browsers have lists for tuples."""
+        """To and fro, or to another part of the picture; browsers send tuples as lists."""
         self.looks.param.update({event.name: None if event.new is None else tuple(event.new)})
 
     def _follow(self, *events: Any) -> None:
         self.player.param.update({event.name: event.new for event in events})
 
     def _show(self, *events: Any) -> None:
-        """What belongs together comes in one message."""
+        """Send related changes in one message."""
         state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
             return
@@ -127,7 +127,7 @@ class PackingView:
         self.player.param.update(changes)
 
     def _accompany(self, *events: Any) -> None:
-        """Another packing, beside the one on screen."""
+        """Show another packing next to the one on screen."""
         twin = self.state.besides.twin
         if twin is None:
             self.player.twin = {}
@@ -151,7 +151,7 @@ class PackingView:
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
-    """Contacts that are known, whether exactly, and those to measure next, the best first."""
+    """Known contacts, exact or not, and those to measure next, the best first."""
     return {
         "contacts": [one.contact for one in knowledge.known],
         "exact": [not one.error for one in knowledge.known],
@@ -160,7 +160,7 @@ def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
 
 
 def projection(plane: Plane | None) -> dict[str, Any]:
-    """A planes.Plane as the player takes it: axes of f_n and f_t, and what to take away."""
+    """A planes.Plane for the player: axes of f_n and f_t, and the origin to subtract."""
     if plane is None:
         return {}
     axes = plane.axes.astype(np.float32)
@@ -181,7 +181,7 @@ def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
 
 
 def gone(knowledge: Knowledge, replay: Replay) -> Any:
-    """Of ΔF_n (N_c,), by what is known, in ⟨f_n⟩; or None while nothing is."""
+    """Reduction of ΔF_n (N_c,) by known forces, in ⟨f_n⟩; None without known forces."""
     narrowed = knowledge.narrowed
     if narrowed is None or len(narrowed.gone) != len(replay.backbone):
         return None
@@ -189,7 +189,7 @@ def gone(knowledge: Knowledge, replay: Replay) -> Any:
 
 
 def measured(state: AppState, replay: Replay) -> dict[str, Any]:
-    """Of an opened frame the measured f_n in ⟨f_n⟩ and how far off it is in σ; {} for others."""
+    """Measured f_n in ⟨f_n⟩ of an opened frame, and its deviation in σ; otherwise {}."""
     found = state.measured
     if found is None or state.selection is None or state.selection.packing != found.packing:
         return {}
@@ -198,14 +198,14 @@ def measured(state: AppState, replay: Replay) -> dict[str, Any]:
 
 
 def normal_extent(replay: Replay, exact: Bounds) -> Any:
-    """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
+    """ΔF_n (N_c,) in ⟨f_n⟩: exact if known, otherwise from all states."""
     if exact:
         return exact["high"] - exact["low"]
     return replay.high[:, 0] - replay.low[:, 0]
 
 
 def full_extent(replay: Replay, exact: Bounds, asked: float | None = None) -> float:
-    """ΔF_n in ⟨f_n⟩ at which its colour is full, where no other was asked for."""
+    """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested."""
     if asked is not None:
         return asked
     extent = normal_extent(replay, exact)
@@ -213,7 +213,7 @@ def full_extent(replay: Replay, exact: Bounds, asked: float | None = None) -> fl
 
 
 def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
-    """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
+    """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
@@ -233,12 +233,12 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
 
 
 def colour_words(looks: Looks, pulled: bool) -> str:
-    """What colours mean just now."""
+    """The present meaning of colours."""
     return "change by the pull" if pulled else COLOURS[looks.colour]
 
 
 def _full(looks: Looks, most: float) -> str:
-    """From where on ΔF_n has its full colour, and why there."""
+    """The ΔF_n of full colour, and the reason for it."""
     why = "" if looks.full else f" ({SATURATION:g} quantile; larger are full colour)"
     return f"≥ {most:.2f} ⟨fₙ⟩{why}"
 
@@ -250,7 +250,7 @@ def _largest(loads: Floats | None, full: float | None) -> str:
 
 
 def legend(state: AppState, pulled: bool = False) -> str:
-    """What width and colour mean just now, as HTML."""
+    """The present meaning of width and colour, as HTML."""
     looks, replay = state.looks, state.seen
     if replay is None:
         return ""
@@ -285,7 +285,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
 
 
 def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:
-    """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
+    """The quantities for colour or width: pinned state and known forces only if present."""
     pinned = state.looks.reference
     there = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
     there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
@@ -294,7 +294,7 @@ def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, 
 
 
 def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
-    """A list of what lines can show as HTML; the player takes over what is chosen."""
+    """A list of the quantities that lines can show, as HTML; the player handles the choice."""
     value, there = getattr(state.looks, name), meaningful(state, labels, name)
     options = "".join(
         f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'

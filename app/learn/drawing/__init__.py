@@ -1,1 +1,1 @@
-"""Pictures of small scenes and their S."""
+"""Drawings of small scenes and their S."""

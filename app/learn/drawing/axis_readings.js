@@ -1,12 +1,12 @@
-// Of a polygon S: the two forces that it is drawn by, one across and one up.
+// The two forces used as axes of a polygon S, one across and one up.
 
 import { dot } from "../model/polytope.js"
 
-const LEAST = 0.3 // of the largest change: forces that change less are no axis
+const LEAST = 0.3 // of the largest change: forces that change less are not used as axes
 
 /**
  * Two contacts: the one along whose normal force S is longest, and the one whose normal force grows in
- * the most different way; none where all grow alike.
+ * the most different way; none if all grow alike.
  */
 export function readBy({ count, axes, corners }) {
   const slopes = Array.from({ length: count }, (_, c) => axes.map((axis) => axis[2 * c])), sizes = slopes.map((s) => Math.hypot(...s))
@@ -19,7 +19,7 @@ export function readBy({ count, axes, corners }) {
   return turned[other] > 1e-6 ? [one, other] : []
 }
 
-/** The name of S within it: so far on the way from its middle to the corner that is farthest from that. */
+/** The name of S inside it: at a fraction of the way from its centre to the farthest corner. */
 export function drawName(space, places, middle, part = 0.5) {
   const far = ([x, y]) => Math.hypot(x - middle[0], y - middle[1])
   const corner = places.reduce((one, other) => (far(other) > far(one) ? other : one))

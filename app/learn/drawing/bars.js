@@ -1,14 +1,14 @@
-// The exact intervals of all normal forces in a small scene, and where each force is in its own. What
-// has not changed is not touched, and nothing that moves is laid out anew: a frame is to be cheap.
+// The exact intervals of all normal forces in a small scene, with the present force in each. Only
+// changes are applied and nothing moving is laid out again, so that a frame is cheap.
 
 import { forceName, number } from "../model/sentences.js"
 
-const SEEN = 0.03 // part of the rail: how wide a bar is at least, to be seen beside the mark of the force
+const SEEN = 0.03 // fraction of the rail: least width of a bar, to be visible next to the mark of the force
 
 export class Bars {
   constructor(host) { this.host = host; this.rows = [] }
 
-  /** ends: [least, largest] of each contact, known otherwise where S is not drawn whole. */
+  /** ends: [least, largest] of each contact, from another source if S is not drawn whole. */
   draw(body, lit, ends) {
     this.host.hidden = body.empty
     if (body.empty) return
@@ -27,7 +27,7 @@ export class Bars {
     })
   }
 
-  /** Intervals of a body that is drawn whole, until it is cut anew. */
+  /** Intervals of a body that is drawn whole, until it is cut again. */
   exact(body) {
     if (this.corners !== body.corners) {
       this.corners = body.corners
@@ -53,7 +53,7 @@ export class Bars {
   }
 }
 
-/** Between which values a force may lie, in words. */
+/** The range of a force, in words. */
 function range(low, high, scale) {
   if (Number.isNaN(low)) return ""
   if (high - low < 1e-9 * scale) return " (fixed)"

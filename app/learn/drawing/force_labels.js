@@ -1,11 +1,11 @@
-// What stands beside the forces of a small scene: their values, and of a single disk their names.
+// Labels of the forces in a small scene: their values and, for a single disk, their names.
 
 import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
-export const ASIDE = 9 // px of friction from a wall, which would lie over it
+export const ASIDE = 9 // px between friction and the wall that would cover it
 
-/** Beside the forces that S is drawn by: their values, on the side of each that is more free. */
+/** Values next to the forces used as axes of S, on the side of each with more room. */
 export function drawValues(arrows, F) {
   const { context: g, body, look } = arrows
   g.font = "bold 12px sans-serif"
@@ -25,11 +25,11 @@ export function drawValues(arrows, F) {
     g.strokeText(text, px, py)
     g.fillStyle = colour
     g.fillText(text, px, py)
-    arrows.shafts.push([[px - wide, py], [px + wide, py]]) // no number of a disk there
+    arrows.shafts.push([[px - wide, py], [px + wide, py]]) // keeps numbers of disks away
   }
 }
 
-/** Beside the only disk: what each wall does, in numbers, and the weight. */
+/** Next to the only disk: the force of each wall, in numbers, and the weight. */
 export function drawNames(arrows, F) {
   const { context: g, body, look } = arrows, { scene } = body
   g.font = "13px sans-serif"
@@ -57,7 +57,7 @@ export function drawNames(arrows, F) {
   drawParts(arrows, arrows.ends()[0], F)
 }
 
-/** Of one force, which of its arrows is which. */
+/** The components of one force, labelled. */
 function drawParts(arrows, { contact, at, inward, across }, F) {
   const { context: g, look } = arrows, [px, py] = arrows.px(...at), unit = arrows.unit * arrows.forceUnit
   const tip = (way, long) => [px + way[0] * long * unit, py - way[1] * long * unit]

@@ -1,8 +1,8 @@
-// A canvas that is painted anew each frame. What stands still on it is painted once, on a canvas of its
-// own that is copied; nothing shines through, which halves what a browser without a graphics card does.
+// A canvas that is painted every frame. Static parts are painted once, on a separate canvas that is
+// copied; it is opaque, which halves the work of a browser without a graphics card.
 
 export class Easel {
-  /** ratio: pixels of the canvas for one of the page. */
+  /** ratio: pixels of the canvas per pixel of the page. */
   constructor(canvas, ratio = window.devicePixelRatio || 1) {
     this.canvas = canvas
     this.ratio = ratio
@@ -11,16 +11,16 @@ export class Easel {
     this.measure()
   }
 
-  /** Size in CSS pixels; to be asked for once a frame, before it, as the answer may need a layout. */
+  /** Size in CSS pixels; read once before each frame, as it may trigger a layout. */
   measure() { ({ clientWidth: this.wide, clientHeight: this.high } = this.canvas) }
 
-  /** Where an event is on it. */
+  /** The position of an event on it. */
   at(event) {
     const box = this.canvas.getBoundingClientRect()
     return [event.clientX - box.left, event.clientY - box.top]
   }
 
-  /** A frame with what stands still; that is painted by `paint` where a value of `key` is another one. */
+  /** A frame with its static parts, which `paint` repaints when a value of `key` changes. */
   begin(paper, key, paint) {
     const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
     const whole = [paper, ...size, ...key], own = this.g

@@ -1,11 +1,11 @@
-// S where it is a line: with what stops it at its ends; and axes of forces, below S and beside it.
+// S as a line, with the events at its ends; and axes of forces, below S and next to it.
 
 import { line } from "../../browser/canvas_paths.js"
 import { forceName, number } from "../model/sentences.js"
 
-const TICKS = 70 // pixels between two numbers of an axis, at least
+const TICKS = 70 // least pixels between two numbers of an axis
 
-/** The line, with what stops it at its ends. */
+/** The line, with the events at its ends. */
 export function drawSegment(space) {
   const { context: g, body, look, easel } = space
   const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
@@ -18,7 +18,7 @@ export function drawSegment(space) {
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"
-  let before = null // words of the other end
+  let before = null // words at the other end
   for (const side of ends.length > 1 ? body.sides : []) {
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
@@ -35,18 +35,19 @@ export function drawSegment(space) {
   }
 }
 
-/** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
+/** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at
+ * x next to it. */
 export function drawAxis(space, index, at, d = 0) {
   const { context: g, body, look, easel } = space
   const ends = d ? [easel.high - space.floor, 10] : [24 + space.aside, easel.wide - 24]
   const value = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], body.origin[index])
-  // A line is drawn by its own length: how much the force changes by a step along it.
+  // A line is drawn with its own length: how much the force changes per step along it.
   const [zero, slope] = space.over ? [0, 1] : [body.origin[index], value(space.moving(body.u, 1, 0)) - value(body.u)]
   const place = (v) => space.px(d ? [0, (v - zero) / slope] : [(v - zero) / slope, 0])[d]
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
   const marked = [...extremes(space, value, d).map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
     .map((mark) => ({ ...mark, x: mark.place[d] }))
-  const own = look.axes?.get(index) // the colour that its arrows have
+  const own = look.axes?.get(index) // the colour of its arrows
   const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
   const beside = (x, text, colour) => (d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(x + 5, at - 10, text, colour, 12, "left"))
@@ -76,7 +77,7 @@ export function drawAxis(space, index, at, d = 0) {
   nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
 }
 
-/** Least and largest value of a force in S, with their places, but where S has no end; none until they are known. */
+/** Least and largest value of a force in S, with their positions, except where S is unbounded; none while unknown. */
 function extremes(space, value, d) {
   const { body, outline } = space, shadow = outline.stale ? [] : space.corners().map((p) => ({ v: p[d], place: space.px(p) }))
   const all = body.whole ? body.corners.map(({ u, cap }) => ({ v: value(u), place: space.px(space.flat(u)), cap })) : shadow
@@ -84,7 +85,7 @@ function extremes(space, value, d) {
   return all.length ? [all[0], all.at(-1)].filter(({ cap }) => !cap) : []
 }
 
-/** The name of an axis: below it, at y, or along the left edge. */
+/** The label of an axis: below it, at y, or along the left edge. */
 function nameAxis(space, words, colour, y) {
   const { context: g, easel: { wide, high } } = space
   if (y !== null) return space.write((wide + space.aside) / 2, y, words, colour)
@@ -97,10 +98,10 @@ function nameAxis(space, words, colour, y) {
   g.restore()
 }
 
-/** Which way a line is drawn: the force on its axis becomes larger to the right. */
+/** The direction in which a line is drawn: the force on its axis increases to the right. */
 export function signOf(body) { return body.h === 1 ? Math.sign(body.axes[0][axisForce(body, null)]) || 1 : 1 }
 
-/** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
+/** The force on the axis of a line: that of this contact if it changes, otherwise the one that changes most. */
 export function axisForce(body, contact) {
   const axis = body.axes[0], most = (part) => {
     const size = Array.from({ length: body.count }, (_, c) => Math.abs(axis[2 * c + part])), c = size.findIndex((v) => v > 0.999 * Math.max(...size)) // the first of equals
@@ -109,7 +110,7 @@ export function axisForce(body, contact) {
   return contact !== null && Math.abs(axis[2 * contact]) > 1e-9 ? 2 * contact : most(0) ?? most(1)
 }
 
-/** The least of 1, 2, 5, 10, … times a power of ten that is not below this. */
+/** The smallest of 1, 2, 5, 10, … times a power of ten that is not below this. */
 function nice(least) {
   const ten = 10 ** Math.floor(Math.log10(least))
   return ten * ([1, 2, 5].find((k) => k * ten >= least) ?? 10)

@@ -1,14 +1,16 @@
-// A packing of 400 disks in a chapter: lines as thick as their forces, bluer the more these changed, one of them marked.
+// A packing of 400 disks in a chapter: line widths show forces, blue shows their change, and one
+// contact is marked.
 
 import { Scene } from "../../packing/drawing/scene.js"
 import { arrow } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
-const FULL = 0.5 // change in mean forces at which the blue is full; orange is for contacts about to slip, as in the small scenes
-const REACH = 14 // px from the marked line within which the hand takes it
+const FULL = 0.5 // change in mean forces at full blue; orange is for contacts about to slip, as in the small scenes
+const REACH = 14 // px from the marked contact within which it can be dragged
 
 export class PackingPicture {
-  /** dragged(part): of the height of the picture, upwards, from where the marked line was taken; null: it is taken. */
+  /** dragged(part): fraction of the height of the picture, upwards, from the start of the drag; null: the
+   * drag starts. */
   constructor(host, palettes, dragged) {
     this.scene = new Scene(() => {})
     this.scene.frozen = true // nothing to point at or to select
@@ -24,7 +26,7 @@ export class PackingPicture {
 
   stop() { this.sized.disconnect() }
 
-  /** A packing, as `frames` in player.py, with one contact marked. */
+  /** A packing, as `frames` in player.py, with one marked contact. */
   show(packing, marked) {
     this.packing = packing
     const count = packing.contacts
@@ -35,7 +37,7 @@ export class PackingPicture {
     this.scene.changed()
   }
 
-  /** The network: normal forces, grey to blue by their change from `before`, or all grey without it. */
+  /** The network: normal forces, from grey to blue by their change from `before`, or all grey without it. */
   draw(normal, before, palettes) {
     const { scene, style } = this, colours = palettes.change, middle = colours.length >> 1
     for (let c = 0; c < normal.length; c++) {
@@ -67,7 +69,7 @@ export class PackingPicture {
 
   listen(host, dragged) {
     const { scene } = this
-    scene.root.style.pointerEvents = "none" // it would zoom under the wheel
+    scene.root.style.pointerEvents = "none" // otherwise the wheel would zoom
     let from = null
     const near = (event) => {
       if (!this.packing) return false

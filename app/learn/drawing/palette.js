@@ -1,7 +1,7 @@
-// Colours of the small scenes: blue for forces, green and violet for the two that are axes of S, magenta for
-// the hand, orange for what is at its limit.
+// Colours of the small scenes: blue for forces, green and violet for the two that are axes of S,
+// magenta for dragging, orange for limits.
 
-/** By what they are of, on dark paper or on white. */
+/** Colours by their role, on dark or on white background. */
 export function palette(dark) {
   return {
     ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#121212" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",

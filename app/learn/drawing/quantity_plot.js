@@ -1,10 +1,10 @@
-// A plot of one quantity, or two: where the hand has been, the prediction, the dot, and, once it is found, the
+// A plot of one or two quantities: the range explored, the prediction, the dot and, once found, the
 // answer. Drawn as SVG, so that its handles have roles, focus and keys.
 
 const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
-const GRAB = 26 // px from the dot within which it is taken where it is
-const STEPS = 60 // of the keyboard along an axis
+const GRAB = 26 // px from the dot within which dragging does not move it
+const STEPS = 60 // keyboard steps along an axis
 
 function element(parent, tag, attributes = {}) {
   const made = parent.appendChild(document.createElementNS(NS, tag))
@@ -12,7 +12,7 @@ function element(parent, tag, attributes = {}) {
   return made
 }
 
-/** One axis: {low, high, label, log, ticks, stops}, and its place in pixels. */
+/** One axis: {low, high, label, log, ticks, stops}, and its position in pixels. */
 class Scale {
   constructor(axis, from, to) { Object.assign(this, { axis, from, to }) }
 
@@ -28,7 +28,7 @@ class Scale {
     return log ? low * (high / low) ** part : low + part * (high - low)
   }
 
-  /** The value one step of the keyboard further: the next stop, where there are stops. */
+  /** The value one keyboard step further: the next stop, if there are stops. */
   step(value, sign) {
     const { stops } = this.axis
     if (!stops) return this.value(this.px(value) + (sign * (this.to - this.from)) / STEPS)
@@ -46,7 +46,7 @@ class Scale {
 }
 
 export class QuantityPlot {
-  /** axes: {x, y}, y null where one quantity is enough. hears: {marker(value), dot(x, y)}: moved by the hand. */
+  /** axes: {x, y}, y null for a single quantity. hears: {marker(value), dot(x, y)}: called when dragged. */
   constructor(host, { x, y = null }, hears) {
     Object.assign(this, { host, axes: { x, y }, hears, movable: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
@@ -69,7 +69,7 @@ export class QuantityPlot {
     return { group, line: element(group, "line"), box: element(group, "rect", { height: PILL.high, rx: 6 }), text: element(group, "text", { "text-anchor": "middle" }) }
   }
 
-  /** Take the size of the host; everything has its place anew. */
+  /** Fit the size of the host and lay out everything again. */
   fit() {
     const { clientWidth: wide, clientHeight: high } = this.host
     if (!wide || !high) return
@@ -77,12 +77,12 @@ export class QuantityPlot {
     const left = this.axes.y ? 66 : 26, bottom = high - 54
     Object.assign(this, { wide, high, left, bottom, top: 52 })
     this.x = new Scale(this.axes.x, left, wide - 26)
-    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 18, this.top + 16) : null // below it the prediction
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 18, this.top + 16) : null // leaves room for the prediction below
     this.drawAxes()
     this.draw(this.state)
   }
 
-  /** Height of what is drawn where there is but one quantity. */
+  /** Height of the drawing for a single quantity. */
   get level() { return (this.top + this.bottom) / 2 }
 
   place([x, y]) { return [this.x.px(x), this.y ? this.y.px(y) : this.level] }
@@ -107,7 +107,8 @@ export class QuantityPlot {
 
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
-   * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact is an area; thin: it is a curve.
+   * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact
+   * is an area; thin: it is a curve.
    */
   draw(state) {
     this.state = state
@@ -139,7 +140,7 @@ export class QuantityPlot {
     }
   }
 
-  /** A vertical line with words on it. */
+  /** A vertical line with a label. */
   show({ group, line, box, text }, what, y) {
     group.style.display = what ? "" : "none"
     if (!what) return
@@ -151,7 +152,7 @@ export class QuantityPlot {
     text.textContent = what.words
   }
 
-  /** Which handle the hand has: "marker", "dot" or none. */
+  /** The handle that can be dragged: "marker", "dot" or none. */
   allow(handle) {
     this.movable = handle
     for (const [one, group] of [["marker", this.marker.group], ["dot", this.dot]]) {
@@ -161,7 +162,7 @@ export class QuantityPlot {
     this.svg.style.touchAction = !handle ? "auto" : this.axes.y && handle === "dot" ? "none" : "pan-y"
   }
 
-  // The hand
+  // Dragging
 
   listen() {
     const { svg } = this

@@ -1,16 +1,16 @@
-// The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
-// cone, and, for a disk that is looked at, its forces put one after the other: they close.
+// The small scene: disks, walls, the force on each disk at each contact as an arrow within its
+// cone, and, for a highlighted disk, the closed polygon of its forces.
 
 import { distance, dot } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { ASIDE, drawNames, drawValues } from "./force_labels.js"
 import { circle, line } from "../../browser/canvas_paths.js"
 
-const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
-const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
-const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
+const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is room
+const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
+const NAMED = 3 // most disks, and most contacts of a single one, for which the numbered components of forces are drawn
 
-/** Whether a scene is so much higher than wide that it needs a picture like that. */
+/** Whether a scene is so much taller than wide that it needs a tall picture. */
 export function tall({ name, x, box }) {
   const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
   return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
@@ -18,7 +18,7 @@ export function tall({ name, x, box }) {
 
 export class Arrows {
   constructor(root, told, ratio) {
-    this.told = told // told(what, …): of a hand on it
+    this.told = told // told(what, …): called for pointer events
     this.canvas = root
     this.easel = new Easel(root, ratio)
     this.hover = null
@@ -37,9 +37,9 @@ export class Arrows {
     this.body = body
     this.easel.measure()
     const mean = body.sumAt(body.u) / body.count
-    const size = (body.scene.box[0] ? Math.min : Math.max)(...body.scene.r) // many arrows are short ones
+    const size = (body.scene.box[0] ? Math.min : Math.max)(...body.scene.r) // many arrows are shorter
     this.forceUnit = (0.75 * size) / (Math.max(Math.abs(mean), 1e-6) || 1)
-    if (same) return // where it is built, nothing moves but what the hand moves
+    if (same) return // in the builder only what is dragged moves
     const { scene } = body, { x, r, walls, box } = scene
     const xs = [], ys = []
     for (let g = 0; g < r.length; g++) {
@@ -59,13 +59,13 @@ export class Arrows {
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
   }
 
-  /** What is in the middle of the canvas. */
+  /** The coordinates at the centre of the canvas. */
   get middle() { return this.back(this.easel.wide / 2, this.easel.high / 2) }
 
   px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
   back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
 
-  /** Arrows of walls that press, three a wall: {from, force of length 1}. */
+  /** Arrows of pressing walls, three per wall: {from, force of length 1}. */
   pressing() {
     const { walls, pressing, press, r } = this.body.scene, long = 0.8 * Math.max(...r)
     return [...pressing].flatMap((wall, k) => {
@@ -75,7 +75,7 @@ export class Arrows {
     })
   }
 
-  /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
+  /** Both ends of every contact: {contact, disk, at, inward: force on the disk for f_n = 1, across}. */
   ends() {
     const { scene } = this.body, disks = scene.r.length, found = []
     if (this.endsOf === scene) return this.found
@@ -89,7 +89,7 @@ export class Arrows {
       }
       const [one, other] = found.slice(-2)
       if (!scene.box[0] || Math.hypot(one.at[0] - other.at[0], one.at[1] - other.at[1]) < 1e-6) continue
-      Object.assign(one, { copy: other.at }) // where it is seen on a copy of its disk
+      Object.assign(one, { copy: other.at }) // its position on a copy of its disk
       Object.assign(other, { copy: one.at })
     }
     return found
@@ -99,7 +99,7 @@ export class Arrows {
     const { body } = this
     this.look = look
     this.easel.measure()
-    this.shafts = [] // of arrows, where no number is to be
+    this.shafts = [] // of arrows, which numbers must avoid
     const wall = look.wall ?? []
     this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {
       this.drawWalls(wall)
@@ -117,7 +117,7 @@ export class Arrows {
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
 
-  /** more: a wall that is being drawn. */
+  /** more: a wall being drawn. */
   drawWalls(more) {
     const { context: g, body, look } = this, { box } = body.scene, walls = [...body.scene.walls, ...more]
     g.strokeStyle = look.ink
@@ -137,7 +137,7 @@ export class Arrows {
     g.setLineDash([])
   }
 
-  /** Where the disk in the hand is, before its scene is there. */
+  /** A disk being dragged, before its scene arrives. */
   drawCarried([x, y, r]) {
     const { context: g, look } = this
     circle(g, this.px(x, y), r * this.unit)
@@ -146,7 +146,7 @@ export class Arrows {
     g.stroke()
   }
 
-  /** Where the keyboard's hand is. */
+  /** The keyboard cursor. */
   drawCursor([x, y]) {
     const { context: g, look } = this
     g.strokeStyle = look.hand
@@ -172,7 +172,7 @@ export class Arrows {
     g.globalAlpha = 1
   }
 
-  /** Copies of the disks of a periodic scene that are in sight. */
+  /** Visible copies of the disks of a periodic scene. */
   copies() {
     const { x, r, box } = this.body.scene, { wide, high } = this.easel, found = []
     if (!box[0]) return found
@@ -193,10 +193,11 @@ export class Arrows {
     g.textBaseline = "middle"
   }
 
-  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
+  /** Numbers of the disks, clear of all arrows if there is room, and at the previous position if it is still
+   * clear. */
   drawNumbers() {
     const { context: g, body } = this, { r } = body.scene
-    this.ends() // a new scene forgets the places of the one before
+    this.ends() // a new scene resets the positions of the previous one
     this.beginNumbers()
     for (let d = 0; d < r.length; d++) {
       const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
@@ -208,7 +209,7 @@ export class Arrows {
     }
   }
 
-  /** Place k of a disk's number: 0 its middle, else around that. */
+  /** Position k of a disk's number: 0 its centre, otherwise around it. */
   numberAt(d, k) {
     const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
     const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
@@ -220,7 +221,7 @@ export class Arrows {
     const [normal, tangential] = [F[2 * contact], F[2 * contact + 1]]
     const [px, py] = this.px(...at), lit = look.contacts.has(contact), long = this.unit * body.scene.r[disk] * 0.62
     const slides = body.slides(normal, tangential)
-    // The cone: where the force on the disk may point.
+    // The cone: possible directions of the force on the disk.
     const wide = Math.atan(mu), middle = Math.atan2(-inward[1], inward[0])
     if (lit || slides || !body.crowded) {
       g.beginPath()
@@ -240,7 +241,7 @@ export class Arrows {
     }
     const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
     const own = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
-    const apart = own && body.scene.r.length <= NAMED // the part that its number tells, by itself
+    const apart = own && body.scene.r.length <= NAMED // the numbered component separately
     if (named) {
       g.globalAlpha = 0.45
       this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
@@ -255,7 +256,7 @@ export class Arrows {
     g.globalAlpha = 1
   }
 
-  /** The colour of a contact whose force S is drawn by. */
+  /** The colour of a contact whose force is an axis of S. */
   axisColour(contact) { return this.look.axes?.get(2 * contact) ?? this.look.axes?.get(2 * contact + 1) }
 
   arrow(px, py, force, colour, thick) {
@@ -280,7 +281,7 @@ export class Arrows {
     g.fill()
   }
 
-  /** Weights, and what the visitor added. */
+  /** Weights, and loads added by the visitor. */
   drawLoads() {
     const { body, look } = this, { x, r } = body.scene
     for (let d = 0; d < r.length; d++) {
@@ -319,7 +320,7 @@ export class Arrows {
     }
   }
 
-  /** The forces on one disk, weight first, put one after the other: they come back to the start. */
+  /** The forces on one disk, weight first, joined into a polygon that closes. */
   drawPolygon(disk, F) {
     const { context: g, body, look } = this, forces = [[body.load[3 * disk], body.load[3 * disk + 1], look.weight]]
     for (const { contact, disk: own, inward, across } of this.ends()) {
@@ -352,7 +353,7 @@ export class Arrows {
     })
   }
 
-  // The hand
+  // Pointer
 
   find(px, py) {
     const { body } = this, { x, r } = body.scene

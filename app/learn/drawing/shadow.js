@@ -1,15 +1,15 @@
-// The shadow that S casts on two forces above three dimensions.
+// The projection of S onto two forces, above three dimensions.
 
 import { polygon } from "../../browser/canvas_paths.js"
 import { drawName } from "./axis_readings.js"
 
-/** The shadow on the plane of two forces, with its exact outline. */
+/** The projection onto the plane of two forces, with its exact outline. */
 export function drawShadow(space) {
   const { context: g, look } = space
   const corners = space.corners().map((p) => space.px(p)), { stale } = space.outline
   if (corners.length) {
     polygon(g, corners)
-    g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
+    g.globalAlpha = stale ? 0.35 : 1 // belongs to another friction or load
     g.fillStyle = look.shade
     g.fill()
     polygon(g, corners)
@@ -19,6 +19,6 @@ export function drawShadow(space) {
     g.stroke()
     g.setLineDash([])
     g.globalAlpha = 1
-    drawName(space, corners, [0, 1].map((d) => corners.reduce((sum, p) => sum + p[d], 0) / corners.length), 0.8) // where few dots are
+    drawName(space, corners, [0, 1].map((d) => corners.reduce((sum, p) => sum + p[d], 0) / corners.length), 0.8) // where there are few dots
   }
 }

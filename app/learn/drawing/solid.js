@@ -1,13 +1,13 @@
-// S as a body in its true shape, and the interval of a force as its shadow on one axis.
+// S as a body in its true shape, and the interval of a force as its projection onto one axis.
 
 import { dot } from "../model/polytope.js"
 import { line, polygon } from "../../browser/canvas_paths.js"
 
-/** The body: sides that face the eye are shaded, those behind are dashed. */
+/** The body: sides that face the viewer are shaded, those behind are dashed. */
 export function drawSolid(space) {
   const { context: g, body, look } = space
   const places = body.corners.map(({ u }) => space.px(space.flat(u)))
-  const towards = (side) => -dot(space.view[2], side.slope) // sides' slopes point inwards
+  const towards = (side) => -dot(space.view[2], side.slope) // slopes of sides point inwards
   const sides = [...body.sides].sort((a, b) => towards(a) - towards(b)), words = []
   for (const side of sides) {
     const front = towards(side) > 0, lit = space.lit(side)
@@ -32,7 +32,7 @@ export function drawSolid(space) {
   words.forEach((text, k) => space.write(space.easel.wide / 2, 18 + 17 * k, text, look.ink)) // clear of the body
 }
 
-/** The exact interval of a contact's f_n: the shadow of S on that axis. */
+/** The exact interval of a contact's f_n: the projection of S onto that axis. */
 export function drawInterval(space, contact) {
   const { context: g, body, look } = space, slope = body.axes.map((axis) => axis[2 * contact])
   const size = Math.hypot(...slope)

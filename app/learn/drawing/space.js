@@ -1,5 +1,5 @@
 // S of a small scene: a segment, a polygon over two of the forces, or a body in its true shape that
-// turns in the hand, with the network on screen as a point in it. With more dimensions, its shadow.
+// can be turned, with the network on screen as a point in it. With more dimensions, its projection.
 
 import { distance, dot, solve } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
@@ -9,12 +9,12 @@ import { drawName, readBy } from "./axis_readings.js"
 import { drawShadow } from "./shadow.js"
 import { drawInterval, drawSolid } from "./solid.js"
 
-const TURN = 0.008 // radians a pixel
-// Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
+const TURN = 0.008 // radians per pixel
+// Pixels left and right of S, and above and below it, for labels, by the number of dimensions.
 const BESIDE = [[46, 46], [95, 46], [110, 50], [30, 30], [60, 24]]
-const FLOOR = 46, ASIDE = 72 // of what lies over two forces, for their axes
-const ON = 34 // pixels of an arrow where S goes on without an end
-const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
+const FLOOR = 46, ASIDE = 72 // the same for S over two forces, for their axes
+const ON = 34 // pixels of an arrow where S is unbounded
+const DRAWS = 700, WORK = 3e7 // draws from S, fewer if that takes more than WORK multiplications
 
 export class Space {
   constructor(canvas, told, ratio) {
@@ -48,7 +48,7 @@ export class Space {
     this.view = [0, 1, 2].map((k) => columns.map((column) => column[k]))
   }
 
-  /** Place of u in the plane of the screen, in units of force, and its depth. */
+  /** Position of u in the plane of the screen, in units of force, and its depth. */
   flat(u) {
     const { body } = this
     if (this.over) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
@@ -57,20 +57,20 @@ export class Space {
     return this.view.map((row) => dot(row, u))
   }
 
-  /** Which way a line is drawn. */
+  /** The direction in which a line is drawn. */
   get sign() { return signOf(this.body) }
 
-  /** The two forces that S is drawn by, 2 c for f_n of contact c, 2 c + 1 for f_t; none where it is drawn as it is. */
+  /** The two forces used as axes of S, 2 c for f_n of contact c, 2 c + 1 for f_t; none if S has its true shape. */
   get axed() {
     const { body } = this
     if (body.h > 3) return this.shadow
     if (body.h !== 2) return []
-    // Found once, as no friction shall turn the picture.
+    // Computed once, so that friction does not turn the picture.
     if (this.own?.of !== body.axes) this.own = { of: body.empty ? null : body.axes, forces: body.empty ? [] : readBy(body).map((c) => 2 * c) }
     return this.own.forces
   }
 
-  /** Contacts by whose forces the point is read: of the axis below S, and of the one beside it. */
+  /** Contacts whose forces are read from the point: on the axis below S, and on the one next to it. */
   get read() {
     const { body } = this
     if (body.h > 1) return this.axed.map((force) => force >> 1)
@@ -78,14 +78,14 @@ export class Space {
     return force === null ? [] : [force >> 1]
   }
 
-  /** Whether S, or its shadow, lies over two forces. */
+  /** Whether S, or its projection, is drawn over two forces. */
   get over() { return this.axed.length > 0 }
 
-  /** Pixels below it and left of it for their axes; a line leaves enough by itself. */
+  /** Pixels below and left of S for the axes; a line leaves enough room without them. */
   get floor() { return this.over ? FLOOR : 0 }
   get aside() { return this.over ? ASIDE : 0 }
 
-  /** Both forces that S is drawn by, as rows of u: found once, as many points are drawn. */
+  /** Both axis forces as rows of u: computed once, as many points are drawn. */
   get onAxes() {
     const { body, axed, axes } = this
     if (axes?.of !== body.axes || axes.origin !== body.origin || axes.axed.join() !== axed.join()) {
@@ -95,7 +95,7 @@ export class Space {
     return this.axes.rows
   }
 
-  /** u whose place moves by so much in the plane of the screen. */
+  /** The u whose position moves by (dx, dy) in the plane of the screen. */
   moving(u, dx, dy) {
     const { body } = this
     if (this.axed.length) {
@@ -108,16 +108,16 @@ export class Space {
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
-  /** Half the width and height that S may take, which leaves room for words. */
+  /** Half the width and height available to S, which leaves room for words. */
   get room() {
     const w = this.easel.wide - this.aside, h = this.easel.high - this.floor, [x, y] = BESIDE[Math.min(this.body.h, 4)]
     return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
-  /** Pixels of a unit of force. */
+  /** Pixels per unit of force. */
   get unit() { return this.room[1] / this.half }
 
-  /** How far this is from the middle of the picture, as a part of the room that it needs there. */
+  /** Distance from the centre of the picture, as a fraction of the available room. */
   far([dx, dy]) {
     const [wide, high] = this.room
     return this.body.h === 3 ? Math.hypot(dx, dy) * Math.max(1, high / wide) : Math.max((Math.abs(dx) * high) / wide, Math.abs(dy))
@@ -128,7 +128,7 @@ export class Space {
     return [(w + this.aside) / 2 + (x - this.centre[0]) * unit, (h - this.floor) / 2 - (y - this.centre[1]) * unit]
   }
 
-  /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
+  /** The visible part of the plane follows S in steps, so that its growth is visible. */
   frame(at_once) {
     const { body } = this
     const points = (body.whole ? body.corners.map(({ u }) => u) : [body.u]).map((u) => this.flat(u))
@@ -147,7 +147,7 @@ export class Space {
     return moves
   }
 
-  /** Two corners of the rectangle around all random points; found once. */
+  /** Two corners of the rectangle around all random points; computed once. */
   get dotted() {
     const { dots, onAxes } = this
     if (this.around?.dots !== dots || this.around.onAxes !== onAxes) {
@@ -174,7 +174,7 @@ export class Space {
     this.body = body
     this.look = look
     this.labels = []
-    this.taken = [] // by words: those of the longest sides of a polygon come first
+    this.taken = [] // places of words: those of the longest sides of a polygon come first
     this.easel.measure()
     const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
     this.easel.begin(look.paper, this.standing(), () => {
@@ -208,7 +208,7 @@ export class Space {
     return moves
   }
 
-  /** What decides how that looks which stands still while a point goes through S. */
+  /** The values on which the static parts depend while a point moves through S. */
   standing() {
     const { body, look, dots, outline, centre, half, shadow, view } = this
     return [body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
@@ -257,11 +257,11 @@ export class Space {
     g.globalAlpha = 1
   }
 
-  /** An arrow from this place in which S goes on without an end, with the mean of its rays. */
+  /** An arrow from this position in a direction in which S is unbounded, along the mean of its rays. */
   drawOn([x, y], thick) {
     const { context: g, body, look } = this, flat = body.rays.map((ray) => this.flat(ray))
     const way = [0, 1].map((k) => flat.reduce((sum, ray) => sum + ray[k], 0)), size = Math.hypot(...way)
-    if (size < 1e-6) return // it goes on away from the eye
+    if (size < 1e-6) return // it points away from the viewer
     const [ux, uy] = [way[0] / size, -way[1] / size], head = 8 + thick
     g.strokeStyle = g.fillStyle = look.cold
     g.lineWidth = thick
@@ -299,14 +299,15 @@ export class Space {
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
       g.font = "13px sans-serif"
-      // Words beside it, in short lines, where they could not be read along it, or are longer than it is.
+      // Words next to it, in short lines, if they would be illegible along it or are longer than
+      // it.
       const upright = Math.abs(uy) < 0.64 || (Math.abs(ux) > 0.5 && 0.6 * g.measureText(text).width > long)
       const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
       const inLines = (beside) => text.replace(/ (at|between) /, "\n$1 ").replace(beside ? /^(disk \d+) / : /^$/, "$1\n")
       const words = short ? text : inLines(upright)
       const on = side.cap ? ON : 0
       if ((long > 14 || lit) && !this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
-        const way = Math.sign(x - middle[0]) || 1 // beside it, where there is no room along it
+        const way = Math.sign(x - middle[0]) || 1 // next to it, without room along it
         this.besides(x + (way * long) / 2, y + 28, way, 0, inLines(true), lit, false)
       }
       this.labels.push({ side, a, b, reach: 14 })
@@ -315,7 +316,7 @@ export class Space {
     drawName(this, places, middle)
   }
 
-  /** Words outside a side at (x, y), u its normal: along it, or beside it; whether there was room. */
+  /** Words outside a side at (x, y), u its normal: along it, or next to it; returns whether there was room. */
   besides(x, y, ux, uy, text, lit, along) {
     const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
     const wide = Math.max(...lines.map((line) => g.measureText(line).width))
@@ -331,9 +332,9 @@ export class Space {
     return true
   }
 
-  /** Whether nothing is written yet where these words shall be, at this angle; then they have their place. */
+  /** Whether the place of these words at this angle is free; if so, it is reserved. */
   free([x, y], wide, high, angle = 0) {
-    const count = Math.max(1, Math.round(wide / high)), [cos, sin] = [Math.cos(angle), Math.sin(angle)] // squares, about
+    const count = Math.max(1, Math.round(wide / high)), [cos, sin] = [Math.cos(angle), Math.sin(angle)] // approximately squares
     const parts = Array.from({ length: count }, (_, k) => {
       const along = wide * ((k + 0.5) / count - 0.5), part = wide / count
       return { x: x + along * cos, y: y + along * sin, wide: part * cos + high * Math.abs(sin), high: part * Math.abs(sin) + high * cos }
@@ -349,7 +350,7 @@ export class Space {
     return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]])
   }
 
-  // The hand
+  // Dragging
 
   grabbed(px, py, event) {
     const { body } = this
@@ -359,7 +360,7 @@ export class Space {
     this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
     this.told("begin")
     this.told("point", this.read)
-    if (!near && body.h !== 3) { // the point comes to the hand
+    if (!near && body.h !== 3) { // the point moves to the pointer
       this.held = { px: x, py: y, u: [...body.u] }
       this.moved(px, py)
     }

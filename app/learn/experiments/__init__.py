@@ -1,1 +1,1 @@
-"""What is played with in the chapters, one class a chapter or kind of them."""
+"""The experiments of the chapters, one class per chapter or kind of chapter."""

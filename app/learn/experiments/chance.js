@@ -1,4 +1,4 @@
-// What 1000 random networks reach, of what is possible.
+// The part of the possible range that 1000 random networks reach.
 
 import { PackingExperiment } from "./packing_experiment.js"
 

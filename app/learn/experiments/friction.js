@@ -1,4 +1,5 @@
-// The same number of disks packed with more and more friction, each packing running through its networks.
+// The same number of disks packed with increasing friction, each packing running through its
+// networks.
 
 import { PackingExperiment } from "./packing_experiment.js"
 
@@ -11,15 +12,15 @@ export class Friction extends PackingExperiment {
     await this.go(this.mu)
     this.curve = source.get("curve").then((curve) => { this.curve = curve })
     this.frame = requestAnimationFrame((time) => this.play(time))
-    for (const mu of frictions) source.get("packing", String(mu)).catch(() => {}) // ahead of the hand
+    for (const mu of frictions) source.get("packing", String(mu)).catch(() => {}) // in advance
   }
 
-  /** The packing at a friction comes on screen. */
+  /** Show the packing at a friction. */
   async go(mu) {
     const packing = await this.source.get("packing", String(mu))
     if (!this.locked) this.visited.set(mu, packing)
     this.found ||= this.enough()
-    if (mu === this.mu) { // else the hand is elsewhere by now
+    if (mu === this.mu) { // otherwise the slider has moved on
       this.packing = packing
       this.network = Float32Array.from(this.asPacked(packing))
       this.before = this.asPacked(packing)
@@ -39,7 +40,7 @@ export class Friction extends PackingExperiment {
     this.canvas.draw(network, this.before, palettes)
   }
 
-  /** Whether the friction at which forces vary most was seen, and those on both sides of it. */
+  /** Whether the friction at which forces vary most was visited, and those on both sides of it. */
   enough() {
     const { frictions, visited, answer } = this, k = frictions.indexOf(answer)
     return k > 0 && [k - 1, k, k + 1].every((at) => at >= frictions.length || visited.has(frictions[at]))
@@ -49,7 +50,7 @@ export class Friction extends PackingExperiment {
 
   get value() { return this.mu }
 
-  /** The friction at which forces vary most, of those visited. */
+  /** The visited friction at which forces vary most. */
   get answer() {
     const rows = [...this.visited.values()]
     return rows.length ? rows.reduce((one, other) => (other.spread > one.spread ? other : one)).mu : NaN

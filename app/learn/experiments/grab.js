@@ -1,11 +1,11 @@
-// One force of 400 disks in the hand: all others follow along networks that the server computed.
+// One force of 400 disks is dragged: all others follow along networks computed by the server.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
-const FOUND = 0.01 // of the way between both ends
-const CHANGED = 0.1 // mean forces: a line that changed by more is counted
-const LONG = 1.6 // of the way between both ends that a drag over the whole picture covers
+const FOUND = 0.01 // of the distance between both ends
+const CHANGED = 0.1 // mean forces: contacts that changed by more are counted
+const LONG = 1.6 // a drag over the whole picture, relative to the distance between both ends
 
 export class Grab extends PackingExperiment {
   async load(source) {
@@ -29,7 +29,7 @@ export class Grab extends PackingExperiment {
     }
   }
 
-  /** Before it can be dragged. */
+  /** Whether it can be dragged. */
   ready() { return this.rail }
 
   drag(x) {

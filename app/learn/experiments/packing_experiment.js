@@ -1,4 +1,4 @@
-// What the chapters of 400 disks have in common: a packing, a marked contact, a picture of both.
+// Common parts of the chapters with 400 disks: a packing, a marked contact, a picture of both.
 
 import { PackingPicture } from "../drawing/packing_picture.js"
 
@@ -8,16 +8,16 @@ export class PackingExperiment {
     this.canvas = new PackingPicture(host, palettes, (part) => this.pulled(part))
   }
 
-  /** Numbers of a packing that the words need. */
+  /** Numbers of a packing that the text needs. */
   counted(packing) {
     const { contacts, free, disks, all_disks: all, mu, spread } = packing
     return { contacts, free, disks, all, mu, spread, equations: 2 * contacts - free }
   }
 
-  /** The first network of a packing, that it came to rest with. */
+  /** The first network of a packing, in which it came to rest. */
   asPacked(packing) { return packing.normal.subarray(0, packing.contacts) }
 
-  /** The marked line is dragged in the picture: nothing, but in chapters that say so. */
+  /** The marked contact is dragged in the picture: no effect, except in chapters that override this. */
   pulled() { return false }
 
   draw(dark, palettes) {
@@ -25,7 +25,7 @@ export class PackingExperiment {
     if (this.network) this.canvas.draw(this.network, this.before ?? null, palettes)
   }
 
-  /** How many things were found: the words follow where it grows. */
+  /** Number of results found: the text is updated when it grows. */
   get finds() { return 1 }
 
   stop() { this.canvas.stop() }

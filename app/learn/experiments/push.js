@@ -1,4 +1,4 @@
-// Two disks are pushed apart: the network follows, until disks set off.
+// Two disks are pushed apart: the network follows, until disks start to move.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { Sway } from "../../packing/drawing/displacement.js"

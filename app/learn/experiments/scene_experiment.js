@@ -1,12 +1,13 @@
-// Chapters of small scenes: the disks with their forces, and S over one force or two, drawn where the hand was.
+// Chapters of small scenes: the disks with their forces, and the explored part of S over one or two
+// forces.
 
 import { Arrows } from "../drawing/scene_canvas.js"
 import { Body } from "../model/polytope.js"
 import { middleOf } from "../model/middle.js"
 import { palette } from "../drawing/palette.js"
 
-const FOUND = 0.01 // of what is possible: this near to the end it has been found
-const WAY = 1500 // places of the hand's way that are kept
+const FOUND = 0.01 // relative distance from the end at which it counts as found
+const WAY = 1500 // stored positions of the drag
 
 export class SceneExperiment {
   /** options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. */
@@ -31,13 +32,13 @@ export class SceneExperiment {
     else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], pairs([...outline])))
   }
 
-  /** Before the answer can be found: where S is not drawn whole, only the server knows it. */
+  /** Whether the answer can be found: if S is not drawn whole, only the server knows it. */
   ready() { return this.ends }
 
-  /** The least and the largest value that is asked for, and the corners of S on its axes, around it. */
+  /** The least and the largest value of the quantity, and the corners of S on its axes, in order. */
   end([low, high], outline) { Object.assign(this, { low, high, outline }) }
 
-  /** Corners of a polygon S on its axes, around it. */
+  /** Corners of a polygon S on its axes, in order. */
   get corners() {
     const { body, options: { x, y } } = this
     const flat = body.corners.map(({ u }) => { const F = body.forces(u); return [F[x], y === null ? 0 : F[y]] })
@@ -53,7 +54,7 @@ export class SceneExperiment {
   get value() { return this.at[0] }
   get answer() { return this.high }
 
-  /** Numbers that the words need. */
+  /** Numbers that the text needs. */
   get facts() {
     const { scene, body } = this
     const named = (c) => scene.names[c]
@@ -64,11 +65,11 @@ export class SceneExperiment {
     }
   }
 
-  /** The dot is moved to these values, as far as S goes. */
+  /** Move the dot to these values, as far as S extends. */
   drag(x, y) {
     const { body, options } = this
     if (options.y !== null) body.steer([options.x, options.y], [x, y])
-    body.steer([options.x], [x]) // at the edge of S the other force gives way
+    body.steer([options.x], [x]) // at the edge of S the other force yields
     this.moved()
   }
 
@@ -94,7 +95,7 @@ export class SceneExperiment {
     return false
   }
 
-  /** What the plot shows. */
+  /** The contents of the plot. */
   get picture() {
     const { way, found, options: { y }, low, high, outline } = this, xs = way.map(([x]) => x)
     const line = way.length ? [[[Math.min(...xs), 0], [Math.max(...xs), 0]]] : []
@@ -118,11 +119,11 @@ export class SceneExperiment {
     arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null })
   }
 
-  /** How many things were found: the words follow where it grows. */
+  /** Number of results found: the text is updated when it grows. */
   get finds() { return 1 }
 
   stop() { /* nothing moves by itself */ }
 }
 
-/** Pairs of numbers that follow each other. */
+/** Pairs of consecutive numbers. */
 const pairs = (flat) => Array.from({ length: flat.length / 2 }, (_, k) => [flat[2 * k], flat[2 * k + 1]])

@@ -1,4 +1,4 @@
-"""What the chapters of Learn show: the exact ends of a small scene, and stored packings."""
+"""Data for the chapters of Learn: exact intervals of small scenes, and stored packings."""
 
 from functools import lru_cache
 from typing import Any
@@ -17,24 +17,24 @@ from ...results.library import Cell, Library, Shown, best_cell
 from . import small_scenes
 
 MU = 0.1  # of the packing that is pulled and pushed
-NEAR = 0.5  # how far from the middle a marked contact may be, in half of what is seen
-STRONG = 1.5  # ⟨f_n⟩ that a contact carries at least which is pulled
+NEAR = 0.5  # largest distance of a marked contact from the centre, in half view widths
+STRONG = 1.5  # least force of the contact that is pulled, ⟨f_n⟩
 
 
 @lru_cache
 def scene(name: str) -> dict[str, Any]:
-    """A small scene as `small_scenes.drawn`; made once."""
+    """A small scene as from `small_scenes.drawn`; cached."""
     return small_scenes.drawn(name)
 
 
 @lru_cache
 def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
-    """Exact ends of every normal force in a small scene, and the outline of S on two forces."""
+    """Exact interval of every normal force in a small scene, and the outline of S on two forces."""
     return small_scenes.measured(small_scenes.packing_of(name), plane=plane)
 
 
 class Packings:
-    """Packings of the stores as the lesson shows them; results are kept for all visitors."""
+    """Packings of the stores in the form for the lesson; results are cached for all visitors."""
 
     def __init__(self, library: Library) -> None:
         self.library = library
@@ -50,17 +50,17 @@ class Packings:
 
     @property
     def frictions(self) -> list[float]:
-        """Every μ above 0 of which there is a packing, ascending."""
+        """Every μ above 0 with a packing, ascending."""
         return sorted(self.cells)
 
     def shown(self, mu: float) -> Shown:
-        """The packing at a friction; InputError where there is none."""
+        """The packing at a friction; InputError if there is none."""
         if mu not in self.cells:
             raise InputError("this chapter needs a packing that the store does not have")
         return self.library.shown(self.cells[mu])
 
     def packing(self, mu: float) -> dict[str, Any]:
-        """Disks, networks and exact intervals at μ, with what is counted; forces in ⟨f_n⟩."""
+        """Disks, networks and exact intervals at μ, with counts; forces in ⟨f_n⟩."""
         replay, exact = self.shown(mu).replay, self.shown(mu).exact
         if exact is None:
             raise InputError("this chapter needs exact intervals that the store does not have")
@@ -78,10 +78,10 @@ class Packings:
         }
 
     def _grabbed(self, mu: float) -> int:
-        """The contact that is pulled: of the strong ones near the middle that with most room."""
+        """The contact to pull: of the strong ones near the centre, the least determined one."""
         shown = self.shown(mu)
         replay = shown.replay
-        assert shown.exact is not None  # as `packing` has looked
+        assert shown.exact is not None  # checked by `packing`
         low, high = _bounds(shown.exact)
         fits = (_away(replay) < NEAR) & (replay.normal[0] > STRONG)
         return int(np.argmax(np.where(fits, high - low, -1.0)))
@@ -91,7 +91,7 @@ class Packings:
         return Puller(self.library.packing(cell.params["packing"]), cell.mu)
 
     def _rail(self) -> dict[str, Any]:
-        """Networks from the least to the largest force of the contact that is pulled."""
+        """Networks from the least to the largest force of the contact to pull."""
         replay = self.shown(MU).replay
         contact, scale = self._grabbed(MU), replay.force_scale
         state = np.stack([replay.normal[0], replay.tangential[0]], axis=1).astype(np.float64)
@@ -104,7 +104,7 @@ class Packings:
         }
 
     def _push(self) -> dict[str, Any]:
-        """Networks under a push on the contact near the middle that bears most, and the motion."""
+        """Networks under a push on the most resistant contact near the centre, and the motion."""
         replay = self.shown(MU).replay
         found = self._pushed()
         position = {int(number): k for k, number in enumerate(replay.backbone)}
@@ -124,7 +124,7 @@ class Packings:
         }
 
     def _pushed(self) -> xr.Dataset:
-        """The pushed contacts of the packing that the stores have."""
+        """The stored pushed contacts of the packing."""
         selection = self.cells[MU].selection
         for store in self.library.stores:
             for entry in entries(store, kinds.PERTURBATION):
@@ -136,7 +136,7 @@ class Packings:
 
 
 def curve() -> dict[str, Any]:
-    """By how much forces vary over friction, in the finished study: means over its packings."""
+    """Variation of forces against friction, in the finished study: means over its packings."""
     by_mu: dict[float, list[float]] = {}
     for row in study_data.rows("walk"):
         by_mu.setdefault(row["mu"], []).append(row["eta1"])
@@ -150,7 +150,7 @@ def _bounds(exact: xr.Dataset) -> tuple[Any, Any]:
 
 
 def _away(replay: Any) -> Any:
-    """How far each contact is from the middle of the picture, in half of what is seen (N_c,)."""
+    """Distance of each contact from the centre of the picture, in half view widths (N_c,)."""
     links, (left, right, bottom, top) = replay.links, replay.window
     away = np.maximum(
         np.abs(links.x0 + links.x1 - left - right), np.abs(links.y0 + links.y1 - bottom - top)
@@ -161,7 +161,7 @@ def _away(replay: Any) -> Any:
 
 
 def _networks(states: Any, residual: Any) -> dict[str, Any]:
-    """Networks (k, N_c, 2) as scripts take them: flat, one after the other."""
+    """Networks (k, N_c, 2) for scripts: flat, one after the other."""
     return {
         "normal": states[..., 0].astype(np.float32).ravel(),
         "tangential": states[..., 1].astype(np.float32).ravel(),

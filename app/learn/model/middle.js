@@ -1,8 +1,8 @@
-// Where a scene of many dimensions begins: in the middle of S, about.
+// The initial state of a scene of many dimensions: near the centre of S.
 
 const DRAWS = 700
 
-/** The mean of draws from S, far from all of its sides, and the same each time; the body's own point without any. */
+/** The mean of draws from S, far from all of its sides, always the same; without draws the body's own point. */
 export function middleOf(body) {
   if (body.empty || !body.h || body.least(body.u) < -1e-6) return body.u
   const random = fixed(), between = Math.ceil(body.h / 2)
@@ -14,7 +14,7 @@ export function middleOf(body) {
   return sum
 }
 
-/** Numbers in [0, 1) that look random, always the same ones: a linear congruential generator. */
+/** Pseudo-random numbers in [0, 1), always the same: a linear congruential generator. */
 function fixed() {
   let state = 1
   return () => (state = (Math.imul(1664525, state) + 1013904223) >>> 0) / 2 ** 32

@@ -1,12 +1,12 @@
-// S of a small scene, cut anew out of all networks in balance for every μ and every load: corners
-// where sides meet, the nearest network to any other, and a walk through it.
+// S of a small scene, cut out of all balanced networks for every μ and every load: corners where
+// sides meet, the nearest network to any other, and a walk through it.
 
-const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside, to find rays along which it goes on
+const FAR = [1e4, 1e8] // bounds added to an apparently unbounded S, to find rays along which it is unbounded
 const SMALL = 1e-9
-const STEERED = 12 // projections on S at most, while the hand moves
+const STEERED = 12 // most projections onto S during dragging
 export const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
-/** From the segment between two points to a third. */
+/** Distance from the segment between two points to a third. */
 export function distance([ax, ay], [bx, by], px, py) {
   const [dx, dy] = [bx - ax, by - ay], size = dx * dx + dy * dy || 1
   const s = Math.max(0, Math.min(1, ((px - ax) * dx + (py - ay) * dy) / size))
@@ -19,7 +19,7 @@ export function dot(a, b) {
   return sum
 }
 
-/** The solution of a small square system, null where its rows depend on each other. */
+/** The solution of a small square system, null if its rows are dependent. */
 export function solve(rows, right) {
   const n = right.length, M = rows.map((row, k) => [...row, right[k]])
   for (let c = 0; c < n; c++) {
@@ -49,7 +49,7 @@ export class Body {
     this.reload()
   }
 
-  /** All networks in balance under the present loads: origin + u · axes, if there are any. */
+  /** All balanced networks under the present loads: origin + u · axes, if there are any. */
   reload() {
     const { scene } = this, rows = scene.b?.length ?? 0, width = 2 * this.count
     const b = this.b = Float64Array.from(scene.b ?? [])
@@ -71,17 +71,17 @@ export class Body {
     this.consistent = unbalanced < 1e-9 * size && this.touched()
   }
 
-  /** Whether every loaded disk touches anything at all. */
+  /** Whether every loaded disk touches anything. */
   touched() {
     const { scene, load } = this, held = new Set([...scene.i, ...scene.j])
     return [...scene.r].every((_, g) => held.has(g) || !(load[3 * g] || load[3 * g + 1]))
   }
 
-  /** Cones at this μ: slope · u + rest ≥ 0, three rows a contact. */
+  /** Cones at this μ: slope · u + rest ≥ 0, three rows per contact. */
   cut(mu) {
     this.mu = mu
     this.rows = []
-    let still = true // whether cones hold that no u can change
+    let still = true // whether cones that do not depend on u are satisfied
     for (let c = 0; c < this.count; c++) {
       for (const what of [1, -1, OPENS]) {
         const of = (force) => (what === OPENS ? force[2 * c] : mu * force[2 * c] - what * force[2 * c + 1])
@@ -97,7 +97,7 @@ export class Body {
     return this
   }
 
-  /** Corners, sides and rays; three dimensions at most. */
+  /** Corners, sides and rays, in at most three dimensions. */
   draw() {
     const scale = this.scaleOf(), total = this.sum()
     const cap = (reach) => {
@@ -112,12 +112,12 @@ export class Body {
       far = corners.filter((corner) => corner.cap)
       this.rays = far.map(({ u }) => this.along(u, total.slope))
         .filter((ray) => ray && this.isRay(ray))
-        .filter((ray, k, all) => all.findIndex((other) => dot(other, ray) > 1 - 1e-12) === k) // of parallel sides one
+        .filter((ray, k, all) => all.findIndex((other) => dot(other, ray) > 1 - 1e-12) === k) // one of parallel sides
       if (!far.length || this.rays.length) break
     }
     this.empty = !corners.length
     this.bounded = !this.rays.length
-    if (!this.bounded) { // for the eye, cut nearer
+    if (!this.bounded) { // cut closer for the picture
       const reach = Math.max(...corners.filter((corner) => !corner.cap).map((corner) => this.sumAt(corner.u)), scale)
       rows = [...this.rows, ...cap(3 * reach)]
       corners = this.meetings(rows)
@@ -128,7 +128,7 @@ export class Body {
     this.middle = this.u.map((_, k) => corners.reduce((s, corner) => s + corner.u[k], 0) / corners.length)
   }
 
-  /** A friction, in hundredths, under which S of the present loads has a point; null where none up to `most` has. */
+  /** A friction, in hundredths, at which S under the present loads is not empty; null if none up to `most` is. */
   enough(most) {
     const trial = new Body(this.scene)
     trial.load = this.load
@@ -140,7 +140,7 @@ export class Body {
     return trial.cut(found).empty ? null : found
   }
 
-  /** Outwards along the sides that meet in a corner far outside, to rounding; null without one. */
+  /** Outward direction along the sides that meet in a distant corner, to rounding; null if there is none. */
   along(u, total) {
     const { h } = this, met = this.rows.filter((row) => Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u)))
     let ray = h === 1 ? [1] : null
@@ -149,7 +149,7 @@ export class Body {
     return ray && ray.map((v) => (v * Math.sign(dot(ray, total))) / Math.hypot(...ray))
   }
 
-  /** Whether this change of forces, which balances itself, leaves no cone: the proof of no end. */
+  /** Whether this self-balanced change of forces leaves no cone: a proof that S is unbounded. */
   isRay(ray) {
     return this.rows.every((row) => dot(row.slope, ray) > -1e-11)
   }
@@ -166,7 +166,7 @@ export class Body {
 
   sumAt(u) { const { slope, rest } = this.sum(); return dot(slope, u) + rest }
 
-  /** Points where h sides meet and none is left, {u, cap}. */
+  /** Points where h sides meet and no constraint is violated, {u, cap}. */
   meetings(rows) {
     const { h } = this, found = []
     const add = (picked) => {
@@ -186,7 +186,7 @@ export class Body {
     return found
   }
 
-  /** met([row, row, row]) at both ends of what all others leave of the line in which two sides meet. */
+  /** met([row, row, row]) at both ends of the part inside all other sides of the line in which two sides meet. */
   edges(rows, met) {
     for (let i = 0; i < rows.length; i++) for (let j = i + 1; j < rows.length; j++) {
       const [one, other] = [rows[i], rows[j]], along = cross(one.slope, other.slope), size = dot(along, along)
@@ -207,7 +207,7 @@ export class Body {
     }
   }
 
-  /** Sides: {corners in order, stops: [[contact, what], …], cap}; those of one place together. */
+  /** Sides: {corners in order, stops: [[contact, what], …], cap}; coinciding sides are joined. */
   faces(rows) {
     const { h } = this, found = new Map()
     for (const row of rows) {
@@ -238,7 +238,7 @@ export class Body {
     return [...corners].sort((a, b) => angle(a) - angle(b))
   }
 
-  /** Whether a contact with this force is at the limit of friction. */
+  /** Whether a contact with this force is at the friction limit. */
   slides(normal, tangential) {
     return this.mu > 0 && this.mu * normal - Math.abs(tangential) < 1e-6 * Math.max(1, normal)
   }
@@ -250,7 +250,7 @@ export class Body {
     return F
   }
 
-  /** Least and largest value of a force (2 c for f_n, 2 c + 1 for f_t), where S is drawn whole. */
+  /** Least and largest value of a force (2 c for f_n, 2 c + 1 for f_t), if S is drawn whole. */
   interval(index) {
     const values = this.corners.map(({ u }) => dot(this.axes.map((axis) => axis[index]), u) + this.origin[index])
     const along = this.rays.map((ray) => dot(this.axes.map((axis) => axis[index]), ray))
@@ -262,10 +262,10 @@ export class Body {
 
   least(u) { return Math.min(Infinity, ...this.rows.map((row) => dot(row.slope, u) + row.rest)) }
 
-  /** Whether there are so many disks that only the wedges that matter are drawn. */
+  /** Whether there are so many disks that only the relevant wedges are drawn. */
   get crowded() { return this.scene.r.length > 8 }
 
-  /** To a network within S, as far from its sides as is found near by; whether there is one. */
+  /** Go to a network inside S, locally as far from its sides as possible; returns whether there is one. */
   goInside() {
     for (const margin of [0.1, 0.03, 0.01, 1e-3, 0]) {
       const u = this.nearest(this.u, null, margin * this.scaleOf())
@@ -275,8 +275,8 @@ export class Body {
   }
 
   /**
-   * The network nearest to u, in the metric of H (its inverse; the unit one without): each side in
-   * turn pushes by what it takes (Hildreth 1957).
+   * The network nearest to u, in the metric of H (given by its inverse; by default the identity): each side in
+   * turn pushes by the required amount (Hildreth 1957).
    */
   nearest(target, inverse = null, margin = 0) {
     if (!this.h) return []
@@ -297,7 +297,7 @@ export class Body {
     return u
   }
 
-  /** Go to the network nearest to u; whether there is one. */
+  /** Go to the network nearest to u; returns whether there is one. */
   goTo(u, inverse = null) {
     let found = this.least(u) >= 0 ? u : this.nearest(u, inverse)
     if (this.least(found) < -1e-7 && !this.empty) found = this.inwards(found, this.whole ? this.middle : this.u)
@@ -306,7 +306,7 @@ export class Body {
     return true
   }
 
-  /** What rounding left outside, on the straight line to a place inside. */
+  /** Correct rounding errors outside S, on the straight line to a position inside. */
   inwards(u, place) {
     let inside = 0
     for (const row of this.rows) {
@@ -316,7 +316,7 @@ export class Body {
     return u.map((v, k) => v + inside * (place[k] - v))
   }
 
-  /** Pull the force of a contact towards (f_n, f_t); everything else follows as little as it can. */
+  /** Pull the force of a contact towards (f_n, f_t), changing all others as little as possible. */
   pull(contact, normal, tangential) {
     const B = [2 * contact, 2 * contact + 1].map((index) => this.axes.map((axis) => axis[index]))
     const now = this.forces(), miss = [normal - now[2 * contact], tangential - now[2 * contact + 1]]
@@ -327,7 +327,7 @@ export class Body {
     return this.goTo(this.u.map((v, k) => v + dot(inverse[k], gain)), inverse)
   }
 
-  /** Towards a network with these values of these forces, changing all others as little as possible. */
+  /** Move towards a network with these values of these forces, changing all others as little as possible. */
   steer(forces, values) {
     const rows = forces.map((force) => this.axes.map((axis) => axis[force]))
     const square = rows.map((a) => rows.map((b) => dot(a, b)))
@@ -343,7 +343,7 @@ export class Body {
   step(u, random = Math.random) {
     const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random()))
     let low = -Infinity, high = Infinity
-    for (const row of this.whole ? this.drawn : this.rows) { // without an end, as far as it is drawn
+    for (const row of this.whole ? this.drawn : this.rows) { // if unbounded, up to the added bounds
       const slope = dot(row.slope, direction), room = dot(row.slope, u) + row.rest
       if (slope > 1e-12) low = Math.max(low, -Math.max(room, 0) / slope)
       if (slope < -1e-12) high = Math.min(high, -Math.max(room, 0) / slope)

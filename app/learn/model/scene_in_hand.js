@@ -1,12 +1,12 @@
-// A small scene while it is played with: its S, the network on screen, what is looked at, and what was pulled.
+// A small scene in use: its S, the network on screen, the highlighted parts, and the pulls.
 
 import { Body } from "./polytope.js"
 import { middleOf } from "./middle.js"
 
-const PULLS = 100 // that can be undone
+const PULLS = 100 // undo steps
 
 export class SceneInHand {
-  /** scene: as small_scenes.drawn; changed(): there is something new to be said and painted. */
+  /** scene: as from small_scenes.drawn; changed(): called when text and picture have to be updated. */
   constructor(scene, changed) {
     Object.assign(this, { scene, changed, mu: scene.mu, undos: [], path: [] })
     Object.assign(this, { contact: null, disk: null, side: null, contacts: new Set(), read: [], chosen: false })
@@ -17,13 +17,13 @@ export class SceneInHand {
     if (!body.whole) body.u = middleOf(body)
   }
 
-  /** What the server tells of one friction and load: a motion in which disks fall, bounds; and a friction that is enough. */
+  /** Drop the server's results for one friction and load: a falling motion, bounds, and a sufficient friction. */
   forget() { Object.assign(this, { fall: null, bounds: null, enough: null }) }
 
-  /** Contacts that light up: those looked at, and those the point is read by. */
+  /** Highlighted contacts: the selected ones, and those read from the point. */
   get lit() { return new Set([...this.contacts, ...this.read]) }
 
-  /** Cones of another μ, or other loads, on the same disks: S is cut anew, the point stays if it can. */
+  /** Cones of another μ, or other loads, on the same disks: S is cut again, and the point stays if possible. */
   cut(mu = this.mu) {
     const { body } = this
     this.mu = mu
@@ -47,14 +47,14 @@ export class SceneInHand {
     this.contacts = new Set(contact === null ? [] : [contact])
   }
 
-  /** The hand is over something in the picture of the disks: {contact, disk, loose}, or nothing. */
+  /** The pointer is over {contact, disk, loose} in the picture of the disks, or over nothing. */
   point(found) {
     this.disk = found ? found.disk : null
     if (!this.chosen) this.choose(found && !found.loose ? found.contact : null)
     this.side = null
   }
 
-  /** The same, taken in hand. */
+  /** The same, on pressing. */
   select(found) {
     this.chosen = Boolean(found && !found.loose)
     this.disk = found ? found.disk : null
@@ -63,14 +63,14 @@ export class SceneInHand {
     if (this.chosen) this.remember()
   }
 
-  /** A side of S is looked at: what stops there. */
+  /** Highlight a side of S and the contacts that limit it. */
   lookAt(side) {
     this.read = []
     this.side = side ? side.corners.join() : null
     this.contacts = new Set(side ? side.stops.map(([c]) => c) : this.contact === null ? [] : [this.contact])
   }
 
-  /** The point is looked at: the contacts by which it is read. */
+  /** Highlight the point and the contacts read from it. */
   readBy(contacts) {
     Object.assign(this, { side: null, read: contacts, contacts: new Set(this.contact === null ? [] : [this.contact]) })
   }
@@ -85,7 +85,7 @@ export class SceneInHand {
     this.changed()
   }
 
-  /** Pull the chosen contact by a step of the keyboard. */
+  /** Pull the selected contact by a keyboard step. */
   nudge(sign) {
     const { body } = this, contact = this.contact ?? 0, F = body.forces()
     if (body.empty || !body.count) return
@@ -95,7 +95,7 @@ export class SceneInHand {
     this.pull(contact, F[2 * contact] + sign * 0.05 * body.scaleOf(), F[2 * contact + 1])
   }
 
-  /** Choose the next contact. */
+  /** Select the next contact. */
   next() {
     this.choose(this.body.count ? ((this.contact ?? -1) + 1) % this.body.count : null)
     this.chosen = true

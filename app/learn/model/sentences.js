@@ -1,4 +1,4 @@
-// What the page of a small scene says: what stops S at a side, what is counted, what is on screen, in a sentence.
+// Sentences about a small scene: the events at a side of S, the count, and what is on screen.
 
 import { OPENS } from "./polytope.js"
 
@@ -7,7 +7,7 @@ const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
 const BOTH = "at the left wall and at the right wall"
-// A disk between two walls cannot slide down both: what is so is that friction does all it can.
+// A disk between two walls cannot slide down both: friction is at its limit at both.
 const AT_BOTH = {
   "about to slide up": "friction pushes the disk down\nas hard as it can",
   "about to slide down": "friction pushes the disk up\nas hard as it can",
@@ -19,7 +19,7 @@ export function forceName({ names }, index) {
   return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith("disk") ? "on " : ""}${place}`
 }
 
-/** What happens at a side of S, in words: which contacts are about to slide or to open there. */
+/** The event at a side of S, in words: which contacts are about to slide or to open there. */
 export function stopping({ scene }, side) {
   const kinds = new Map()
   for (const [contact, what] of side.stops) {
@@ -33,14 +33,15 @@ export function stopping({ scene }, side) {
   }).join(", ")
 }
 
-/** Where a disk is about to slide: against the friction on it; of two disks, which way round each other. */
+/** The direction in which a disk is about to slide: against the friction on it; for two disks, the sense of
+ * rotation. */
 function way(scene, contact, what) {
   if (scene.j[contact] < scene.r.length) return what > 0 ? " clockwise" : " anticlockwise"
   const [x, y] = [-what * scene.normal[2 * contact + 1], what * scene.normal[2 * contact]]
   return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
 }
 
-/** What is drawn of the disks, in this scene. */
+/** The legend of the picture of the disks in this scene. */
 export function legend(body) {
   const { scene, h, empty, load } = body
   if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
@@ -54,13 +55,13 @@ export function legend(body) {
   return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
 
-/** Whether friction is at its limit at some contact. */
+/** Whether friction is at its limit at any contact. */
 function slips(body) {
   const F = body.forces()
   return Array.from(body.scene.i).some((_, c) => F[2 * c] > 1e-9 && body.slides(F[2 * c], F[2 * c + 1]))
 }
 
-/** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
+/** Forces minus equations, as HTML; if S is empty, that no solution is allowed. */
 export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + ", each with a normal and a tangential component"
@@ -75,7 +76,7 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
   return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}: ${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}: ${why})</span>`
 }
 
-/** The sum that gives the number of equations, and what its parts are. */
+/** The sum that gives the number of equations, and its parts. */
 function equationsOf({ grains, r, pressing, box, equations }) {
   const disks = box[0] ? [...(grains ?? [])].filter((grain) => grain < r.length).length : r.length, walls = 2 * pressing.length // loose disks of a box have no load
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
@@ -85,12 +86,12 @@ function equationsOf({ grains, r, pressing, box, equations }) {
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations${rank}`, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
-/** What the bars below show; empty where there are none. */
+/** The meaning of the bars below; empty if there are none. */
 export function barred({ empty, h, scene }) {
   return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
 }
 
-/** What is special about a scene, besides its forces; empty for most. */
+/** Special features of a scene, besides its forces; empty for most. */
 export function special({ scene }) {
   if (!scene.box[0]) return ""
   const touched = new Set([...scene.i, ...scene.j])
@@ -99,7 +100,7 @@ export function special({ scene }) {
   return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity. The dashed square repeats in all directions; pale disks are copies.${rattles}`
 }
 
-/** What the picture of S is. */
+/** The meaning of the picture of S. */
 export function pictured(body, { filled: dotted }) {
   const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
   if (scene.idle) return "S: not before something presses"
@@ -109,7 +110,7 @@ export function pictured(body, { filled: dotted }) {
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 
-/** The sentence over a scene. */
+/** The sentence above a scene. */
 export function sentence(body, mu, now) {
   const { h, scene } = body, several = scene.r.length > 1
   if (scene.idle) return "Nothing presses on these disks yet: choose “Make a wall press”, then click a wall."
@@ -136,19 +137,19 @@ export function sentence(body, mu, now) {
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 
-/** Whether a normal force can be more than all disks weigh. */
+/** Whether a normal force can exceed the weight of all disks. */
 function wedges(body) {
   const { load, r } = body.scene, weight = Array.from(r).reduce((sum, _, d) => sum + Math.hypot(load[3 * d], load[3 * d + 1]), 0)
   return weight > 0 && Array.from({ length: body.count }, (_, c) => body.interval(2 * c)[1]).some((most) => most > 1.5 * weight)
 }
 
-/** Whether friction on a disk between two walls, and nothing else, points down at both, as it can only there. */
+/** Whether friction on a disk between two walls points down at both, as it can only there. */
 function gripped(body) {
   const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side) === AT_BOTH["about to slide up"])
   return between?.stops.every(([c]) => -F[2 * c + 1] * scene.normal[2 * c] < -1e-9)
 }
 
-/** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */
+/** Why S is empty: the disks and walls that give way in the motion that proves it, and a sufficient friction. */
 function falling({ scene: { r, box, pressing, load: own }, load }, mu, { fall, enough }) {
   const moving = fall ? Array.from({ length: fall.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...fall.slice(3 * k, 3 * k + 3)) > 0.05) : []
   const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length

@@ -1,4 +1,4 @@
-"""Small scenes as the page draws them, by name or built by a visitor, and what links say."""
+"""Small scenes in the form for drawing, by name or built by a visitor, and their links."""
 
 import io
 import re
@@ -17,26 +17,27 @@ from granforce.types import Floats, Integers
 FIRST, MANY, OWN = "groove", "many", "own"
 MOST_DISKS, MOST_WALLS = 30, 12
 LONGEST = 4000  # characters of a built scene in a link
-BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # what a visitor begins to build with
-PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: which walls press
-DRAWN = 6.0  # of all loads: up to which f_n an S without an end is drawn
-SNAP = 1e-6  # of the largest radius: what a visitor's hand left open is closed up to here
+BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builder
+PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
+DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
+SNAP = 1e-6  # fraction of the largest radius: gaps left by hand are closed up to here
 
 
 class Asked(NamedTuple):
-    """What a link asks of the page."""
+    """The request in a link."""
 
     scene: str  # MANY for the page of large packings
     mu: float | None
     dark: bool
-    built: str  # a scene of the visitor's, as text
+    built: str  # a visitor's scene, as text
     query: str  # for the page of large packings
 
 
 def asked(query: str) -> Asked:
-    """What a link's query asks for; what cannot be read is left out.
+    """The request in a link's query; invalid parts are left out.
 
-    Links from before there were scenes name a μ, a tab or the like, and are of large packings.
+    Older links, from before scenes existed, contain a μ, a tab or similar, and refer to large
+    packings.
     """
     given = dict(parse_qsl(query.lstrip("?")))
     named = "scene" in given
@@ -54,14 +55,14 @@ def asked(query: str) -> Asked:
 
 
 def titles() -> list[list[str]]:
-    """[name, title] of every scene, as the list on the page has them."""
+    """[name, title] of every scene, for the list on the page."""
     return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
 
 
 def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]:
-    """What the page draws of a scene: plain numbers and arrays.
+    """The data for drawing a scene: plain numbers and arrays.
 
-    Raises InputError for a built scene that cannot be.
+    Raises InputError for an invalid built scene.
     """
     packing = packing_of(name, mu, built)
     built = (built or BEGIN) if name == OWN else ""
@@ -70,7 +71,7 @@ def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]
 
 
 def packing_of(name: str, mu: float | None = None, built: str = "") -> Packing:
-    """The Packing of a scene, by name or built, whether or not anything balances."""
+    """The Packing of a scene, by name or built, balanced or not."""
     return own(built, mu) if name == OWN else scenes.sketched(name, mu)
 
 
@@ -89,7 +90,7 @@ def geometry(packing: Packing) -> dict[str, Any]:
         "walls": walls.ravel(),
         "pressing": np.array(lids, dtype=np.int32),
         "press": packing.load[count : count + len(lids), :2].ravel(),
-        "idle": not loaded,  # nothing says how large forces are
+        "idle": not loaded,  # nothing sets the scale of forces
         "packed": packing.info.get("packed_mu"),
         "box": box,
         "pressure": float(np.nan_to_num(packing.pressure)),
@@ -116,7 +117,7 @@ def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
 
 
 def names(packing: Packing, count: int) -> list[str]:
-    """Where each contact is, in words."""
+    """The position of each contact, in words."""
     contacts, said = packing.contacts, []
     several, lids = count > 1, len(packing.info.get("pressing", []))
     for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
@@ -131,7 +132,7 @@ def names(packing: Packing, count: int) -> list[str]:
 
 
 def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
-    """Motion (N, 3) of the disks, and of walls that press, that proves that nothing balances.
+    """Motion (N, 3) of the disks and pressing walls that proves that nothing balances.
 
     Flat; empty without a proof.
     """
@@ -146,7 +147,7 @@ def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
 
 
 def _straight(packing: Packing, motion: Floats) -> Floats:
-    """The same motion, but of what moves, what presses on nothing falls straight along its load."""
+    """The same motion, except that bodies that press on nothing fall straight along their load."""
     contacts, straight = packing.contacts, motion.copy()
     loads = np.nan_to_num(packing.load)
     loads /= np.abs(loads).max() or 1.0
@@ -163,12 +164,12 @@ def _straight(packing: Packing, motion: Floats) -> Floats:
 def measured(
     packing: Packing, load: npt.ArrayLike | None = None, plane: Sequence[int] = ()
 ) -> dict[str, Any]:
-    """What is exact about S where it is not drawn whole: its ends, and its outline in a plane.
+    """Exact results on S if it is not drawn whole: its bounds, and its outline in a plane.
 
     plane: two force components, 2 c for f_n and 2 c + 1 for f_t of contact c. bounds: [least,
-    largest f_n] of every contact, None where not certified. outline: corners, flat, empty where
-    there is no area. Where S has no end there are no bounds, and the outline is that of the part
-    in which no f_n is above `most`.
+    largest f_n] of every contact, None if not certified. outline: corners, flat, empty without an
+    area. If S is unbounded there are no bounds, and the outline is that of the part in which no f_n
+    is above `most`.
     """
     packing = _loaded(packing, load)
     found = hulls.bounds(packing)
@@ -192,7 +193,8 @@ def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
 def own(text: str, mu: float | None = None) -> Packing:
     """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity.
 
-    With a third part, "p1,2", there is none, and walls 1 and 2 press: with 1 on a length of 1.
+    With a third part, such as "p1,2", there is no gravity, and walls 1 and 2 press with 1 per
+    length.
     """
     disks, walls, press = ([*(text or BEGIN).split("|"), "", ""])[:3]
     disks, walls = _numbers(disks, 3, MOST_DISKS, "disks"), _numbers(walls, 4, MOST_WALLS, "walls")
@@ -209,7 +211,7 @@ def own(text: str, mu: float | None = None) -> Packing:
 
 
 def _pressing(text: str, walls: int) -> Integers:
-    """Which of so many walls press."""
+    """Mask of the pressing walls."""
     lids = [int(k) for k in text[1:].split(",") if k] if PRESSED.fullmatch(text) else [walls]
     if max(lids, default=0) >= walls and lids:
         raise InputError("the pressing walls in this link cannot be read")
@@ -228,12 +230,12 @@ def _numbers(text: str, width: int, most: int, what: str) -> Floats:
 
 
 def file_of(packing: Packing, load: npt.ArrayLike | None = None) -> bytes:
-    """The packing under these loads as an NPZ file, with a network of its own if there is one."""
+    """The packing under these loads as an NPZ file, with a network if there is one."""
     packing = _loaded(packing, load)
     try:
         packing = scenes.with_network(packing)
     except (InputError, NotJammedError):
-        pass  # kept as it is: S is empty, and the library says why
+        pass  # kept unchanged: S is empty, and the library says why
     file = io.BytesIO()
     importers.save_packing(packing, file)
     return file.getvalue()

@@ -1,9 +1,9 @@
-// The address of the workbench: a scene is a step to go back to, friction is not.
+// The address of the workbench: a scene is a step in the history, friction is not.
 
 export class Address {
-  /** opened(query): the reader went back, or forward, to another scene. */
+  /** opened(query): called after going back or forward to another scene. */
   constructor(opened) {
-    this.returning = false // until the scene gone back to is there
+    this.returning = false // until the scene in the history is loaded
     this.listener = () => {
       const { search } = window.location
       if ([null, "many"].includes(new URLSearchParams(search).get("scene"))) return window.location.reload()
@@ -15,7 +15,7 @@ export class Address {
 
   stop() { window.removeEventListener("popstate", this.listener) }
 
-  /** The address follows what is on screen. */
+  /** Update the address to the present scene. */
   write({ scene: { name, built }, mu }, dark) {
     if (this.returning) return
     const there = new URLSearchParams(window.location.search).get("scene"), step = there && there !== name
@@ -27,6 +27,6 @@ export class Address {
     return new URLSearchParams(named)
   }
 
-  /** To a page of its own, in the same theme, with the friction if it was chosen by hand. */
+  /** Leave for another page, in the same theme, with the friction if it was chosen by the visitor. */
   leave(scene, mu, dark) { window.location.assign(`?${this.query({ scene, mu: mu === null ? "" : String(Number(mu.toPrecision(6))) }, dark)}`) }
 }

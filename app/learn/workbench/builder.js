@@ -1,15 +1,15 @@
-// Build your own: disks and walls are put, moved and removed by hand; what comes near snaps into contact.
+// Build your own: disks and walls are placed, moved and removed; nearby disks snap into contact.
 
 import { distance, solve } from "../model/polytope.js"
 
-const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
+const NEAR = 0.45 // of the largest radius, within which a disk snaps into contact
 const MOST_DISKS = 30, MOST_WALLS = 12
-// One disk on the floor, by its weight or under a wall that presses.
+// One disk on the floor, under gravity or under a pressing wall.
 const BARE = "2,1,1|0,0,4,0", BARE_UNDER_PRESS = "2,1,1|0,0,4,0;0.4,2,3.6,2|p1"
-// What those begin with who let walls press: three disks under one that does.
+// The initial scene with pressing walls: three disks under a pressing wall.
 const UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 
-// What each tool does.
+// The explanation of each tool.
 const HOW = {
   disk: "Click an empty place to add a disk; drag a disk to move it.",
   wall: "Drag from one end of the wall to the other.",
@@ -19,7 +19,7 @@ const HOW = {
 }
 
 export class Builder {
-  /** changed(text): of another scene, of the one to begin with if empty. */
+  /** changed(text): called with another scene, or empty for the initial one. */
   constructor(host, changed) {
     this.changed = changed
     this.tool = "disk"
@@ -28,9 +28,9 @@ export class Builder {
     this.walls = []
     this.held = null
     this.cursor = null // of the keyboard
-    this.pressure = false // in place of gravity
-    this.pressing = new Set() // of walls
-    this.untouched = true // the scene is one to begin with
+    this.pressure = false // instead of gravity
+    this.pressing = new Set() // numbers of walls
+    this.untouched = true // the scene is an initial one
     this.host = host
     host.innerHTML = `
       <span role="radiogroup" aria-label="What presses the disks">
@@ -69,7 +69,7 @@ export class Builder {
     for (const name of ["[data-tool=press]", ".presses"]) this.host.querySelector(name).hidden = !this.pressure
   }
 
-  /** Pressure in place of gravity, or the other way round. */
+  /** Choose pressure or gravity. */
   choose(pressure) {
     if (pressure === this.pressure) return
     this.pressure = pressure
@@ -79,13 +79,13 @@ export class Builder {
     else this.publish()
   }
 
-  /** Another scene in place of this one, by default that to begin with under the load that is chosen. */
+  /** Load another scene, by default the initial one with the chosen kind of load. */
   begin(text = this.pressure ? UNDER_PRESS : "") {
-    this.text = null // whatever comes is taken over
+    this.text = null // accept any scene that arrives
     this.changed(text)
   }
 
-  /** Take over a scene from its text, unless the hand is ahead of it; whether it is another one. */
+  /** Load a scene from its text, unless the visitor has already changed it; returns whether it is another one. */
   read(text, begins) {
     if (text === this.text || this.held) return false
     this.untouched = begins || text === UNDER_PRESS
@@ -105,7 +105,7 @@ export class Builder {
     this.changed(this.text)
   }
 
-  /** Whether the hand builds here, with what it pressed on. */
+  /** Whether the builder handles the press at this position. */
   press(at) {
     if (this.tool === "pull") return false
     const own = this.disks.findIndex(([x, y, r]) => Math.hypot(at[0] - x, at[1] - y) < r)
@@ -136,7 +136,7 @@ export class Builder {
     return true
   }
 
-  /** The wall at the hand presses, or no longer does. */
+  /** Toggle whether the wall at this position presses. */
   switchWall(at) {
     const wall = this.walls[this.wallAt(at)]
     if (!wall) return true
@@ -145,7 +145,7 @@ export class Builder {
     return true
   }
 
-  /** Number of the wall at the hand, −1 without one. */
+  /** Number of the wall at this position, −1 if none. */
   wallAt(at) {
     const far = this.walls.map(([a, b, c, d]) => distance([a, b], [c, d], ...at)), least = Math.min(...far)
     return least < 0.4 ? far.indexOf(least) : -1
@@ -175,7 +175,7 @@ export class Builder {
     else this.publish()
   }
 
-  /** By keyboard: arrow keys move a cursor that begins at `from`, Enter takes what is there, and lets go. */
+  /** By keyboard: arrow keys move a cursor from the position `from`, Enter takes and releases. */
   key(key, from) {
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
     if (!step && key !== "Enter") return false
@@ -188,14 +188,14 @@ export class Builder {
     return true
   }
 
-  /** Walls that are nearly level or upright become so. */
+  /** Make walls that are nearly level or upright exactly so. */
   straight([a, b], [x, y]) {
     if (Math.abs(y - b) < 0.12 * Math.abs(x - a)) return [x, b]
     if (Math.abs(x - a) < 0.12 * Math.abs(y - b)) return [a, y]
     return [x, y]
   }
 
-  /** The place nearest to the hand where a disk touches two others, or one, or is free; null: none. */
+  /** The nearest position where a disk touches two others, one, or none; null if there is none. */
   snapped([x, y], r, own) {
     const curves = []
     this.disks.forEach(([a, b, R], k) => { if (k !== own) curves.push({ centre: [a, b], reach: R + r }) })
@@ -219,7 +219,7 @@ export class Builder {
   }
 }
 
-/** Places of centres are on circles around disks and ends of walls, and on lines beside walls. */
+/** Centres are on circles around disks and ends of walls, and on lines parallel to walls. */
 function foot(curve, [x, y]) {
   if (curve.along) {
     const s = (x - curve.from[0]) * curve.along[0] + (y - curve.from[1]) * curve.along[1]

@@ -1,4 +1,4 @@
-// What stands on the workbench before it is filled.
+// The empty layout of the workbench.
 
 /** Its HTML; most: μ at the end of the slider. */
 export function layout(most) {

@@ -1,15 +1,15 @@
-// A push on a disk, by hand or by arrow keys, and how large it may become: the limit load.
+// A push on a disk, by dragging or by arrow keys, and its largest value, the limit load.
 
 import { Body } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
 const HOW = "Drag a disk, or choose one with N and push with the arrow keys: S shrinks until nothing balances. Press the button again to let go."
-const STEP = 0.02 // of the keyboard, of the largest load
+const STEP = 0.02 // per key press, of the largest load
 
 export class PushHand {
   constructor() { this.stop() }
 
-  /** Nothing is pushed: no disk, and no load but the scene's. */
+  /** Remove the push: no disk, and only the scene's loads. */
   stop() { Object.assign(this, { on: false, disk: null, force: [0, 0], note: "", grip: null }) }
 
   start() {
@@ -17,19 +17,19 @@ export class PushHand {
     Object.assign(this, { on: true, note: HOW })
   }
 
-  /** A disk is taken, at a place of the picture; unit: lengths in which a force of 1 is drawn. */
+  /** A disk is taken at a position of the picture; unit: drawn length of a force of 1. */
   take(disk, at, unit) {
     const before = this.disk === disk ? this.force : [0, 0]
     this.grip = { disk, unit, from: at.map((v, k) => v - before[k] * unit) }
   }
 
-  /** It is dragged to a place. */
+  /** It is dragged to a position. */
   carry(hand, at) {
     const { disk, unit, from } = this.grip
     this.push(hand, disk, at.map((v, k) => (v - from[k]) / unit))
   }
 
-  /** An arrow key: whether it pushed. */
+  /** Handle an arrow key; returns whether it pushed. */
   key(hand, key) {
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
     if (!step || !this.on) return false
@@ -54,7 +54,7 @@ export class PushHand {
     return loads
   }
 
-  /** What is pushed, and how much can be, in words. */
+  /** The push and its largest value, in words. */
   words(body) {
     const size = Math.hypot(...this.force)
     if (size < 1e-6 || !body.whole) return ""
@@ -63,7 +63,7 @@ export class PushHand {
     return `You push disk ${this.disk + 1} with ${number(size)}: ${end}.${body.empty ? " Now nothing balances." : ""}`
   }
 
-  /** The largest push this way under which S is not empty, by halving; Infinity without one. */
+  /** The largest push in this direction with a nonempty S, by bisection; Infinity if unbounded. */
   limit(body) {
     const trial = new Body(body.scene), size = Math.hypot(...this.force)
     const holds = (F) => {

@@ -1,10 +1,10 @@
-// A walk through S by itself: from one draw to the next in a straight line, which lies in S.
+// An automatic walk through S: straight from one draw to the next, which stays in S.
 
 const LEG_MS = 450
-const PATH = 60 // corners of its path that are kept
+const PATH = 60 // stored corners of its path
 
 export class RandomWalk {
-  /** button: it begins and ends a walk; moved(path): another point of it is on screen. */
+  /** button: starts and stops the walk; moved(path): called with each new point. */
   constructor(button, moved) { Object.assign(this, { button, moved, frame: null }) }
 
   pause() {

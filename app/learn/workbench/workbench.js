@@ -1,4 +1,4 @@
-// The workbench of small scenes: the disks and their S side by side, friction, and what is done with them.
+// The workbench of small scenes: the disks and their S side by side, friction, and the tools.
 
 import { goneBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
@@ -16,9 +16,9 @@ import { PushHand } from "./push_hand.js"
 import { RandomWalk } from "./random_walk.js"
 import { Axes } from "./shadow_axes.js"
 
-const MOST_MU = 1.5 // on the slider; larger ones can be typed
-const REST_MS = 150 // after which what only the server tells is asked for
-const FEW = 12 // contacts up to which all their intervals are seen at once
+const MOST_MU = 1.5 // end of the slider; larger values can be typed
+const REST_MS = 150 // time after which the server's results are requested
+const FEW = 12 // contacts up to which all intervals are visible at once
 
 class Workbench {
   constructor(model, view) {
@@ -44,7 +44,7 @@ class Workbench {
 
   part(name) { return (this.parts[name] ??= this.root.querySelector(`.${name}`)) }
 
-  /** The model, the window and the keys are listened to, until the page goes. */
+  /** Listen to the model, the window and the keys until the page is closed. */
   follow() {
     const { model, root } = this, key = (event) => this.key(event)
     const sized = new ResizeObserver(() => { this.arrows.wide = 0; this.soon() })
@@ -63,11 +63,11 @@ class Workbench {
 
   dress() { this.root.style.colorScheme = this.model.dark ? "dark" : "light" } // for the browser's own controls
 
-  // What is seen
+  // Display
 
   soon() { this.frame ||= requestAnimationFrame(() => this.paint()) }
 
-  /** What is said and what is painted follow the hand. */
+  /** Update text and pictures after a change. */
   changed() {
     this.say()
     this.soon()
@@ -91,10 +91,10 @@ class Workbench {
     arrows.draw({ ...look, contacts: lit })
     if (space.draw(body, look, hand.path)) this.soon()
     this.painted++
-    if (!this.walk.frame || this.painted % 2) this.bars.draw(body, lit, hand.bounds) // numbers on a walk: every second frame
+    if (!this.walk.frame || this.painted % 2) this.bars.draw(body, lit, hand.bounds) // numbers during a walk: every second frame
   }
 
-  /** Words into a part of the page, if they are others: what stays the same is not laid out anew. */
+  /** Write text into a part of the page if it differs: unchanged parts are not laid out again. */
   write(name, text, how = "textContent") {
     if (this.written[name] !== text) this.part(name)[how] = this.written[name] = text
   }
@@ -113,7 +113,7 @@ class Workbench {
     this.part("undo").disabled = !hand.undos.length
   }
 
-  // A scene comes
+  // Loading of scenes
 
   show() {
     const { model: { scene }, space, builder } = this, before = this.hand?.scene, own = scene.name === "own"
@@ -143,14 +143,14 @@ class Workbench {
     this.soon()
   }
 
-  /** Which two forces S casts its shadow on. */
+  /** The two forces onto which S is projected. */
   cast(shadow) {
     Object.assign(this.space, { shadow, outline: { points: [], stale: true }, sceneDrawn: null })
     this.changed()
     this.measure()
   }
 
-  /** A scene that was built by hand: one at a time is asked for, of those built meanwhile the last one. */
+  /** A built scene: one is requested at a time; of those built meanwhile, only the last one. */
   build(built) {
     this.next = built
     if (!this.asked) this.askNext()
@@ -162,7 +162,7 @@ class Workbench {
     ask(model, view, { built, mu: this.hand.mu })
   }
 
-  /** The scene asked for has come, or cannot be; whether the hand is not ahead of it. */
+  /** The requested scene arrived or failed; returns whether the visitor has not changed it since. */
   built() {
     this.asked = false
     const last = this.next === null
@@ -183,13 +183,13 @@ class Workbench {
     this.showMu()
   }
 
-  /** S is another one: its points are drawn anew, and what only the server tells is asked for once the hand rests. */
+  /** S has changed: its random points are drawn again, and the server's results are requested once dragging stops. */
   cut(act) {
     const { space } = this
     space.outline.stale = true
     act()
     if (this.filled && this.hand.body.whole) space.fill()
-    else space.dots = [] // many dimensions take their time: once friction rests
+    else space.dots = [] // many dimensions take time: after friction has come to rest
     this.rest()
     this.soon()
   }
@@ -201,22 +201,22 @@ class Workbench {
 
   rested() {
     const { hand, space } = this, { body } = hand, fails = body.empty && !body.scene.idle
-    this.address.write(hand, this.model.dark) // first: where the server is gone, asking it fails
+    this.address.write(hand, this.model.dark) // first, because a request fails without a server
     if (!body.empty && this.filled && !space.dots.length && body.bounded) { space.fill(); this.soon() }
     if (fails && !hand.enough) { hand.enough = body.enough(MOST_MU); this.changed() }
     if (fails) this.find("fall")
     this.measure()
   }
 
-  // What only the server tells
+  // Results from the server
 
-  /** Ask for a file, how the disks fall, or what is exact, of what is in hand. */
+  /** Request a file, the falling motion, or exact results, for the present scene. */
   find(what) {
     const { model, view, hand: { scene: { name: scene, built }, mu, body } } = this
     ask(model, view, { find: what, scene, built, mu, load: [...body.load], plane: this.space.shadow })
   }
 
-  /** Above three dimensions, what only linear programs tell. */
+  /** Above three dimensions, results that need linear programs. */
   measure() {
     const { body } = this.hand
     if (!body.empty && !body.whole) this.find("measured")
@@ -248,11 +248,11 @@ class Workbench {
     this.say(error)
   }
 
-  // The hand
+  // Dragging
 
   get builds() { return this.hand?.scene.name === "own" && !this.push.on }
 
-  /** What a picture tells of the hand on it. */
+  /** Handle pointer events in a picture. */
   heard(what, given) {
     const { hand } = this
     if (what === "words") return stopping(hand.body, given)
@@ -284,7 +284,7 @@ class Workbench {
     else this.cut(() => this.push.carry(this.hand, at))
   }
 
-  /** Test pushes begin, or end. */
+  /** Begin or end test pushes. */
   pushes(on) {
     const { push, hand } = this, pushed = push.disk !== null
     if (on) push.start()
@@ -310,7 +310,7 @@ class Workbench {
     return pushed
   }
 
-  /** A key that does something to the scene; whether it did. */
+  /** Handle a key that acts on the scene; returns whether it did. */
   sceneKey(key) {
     const { hand } = this
     if (key === "z") this.undo()
@@ -371,7 +371,7 @@ class Workbench {
       clearTimeout(this.resting)
       return this.address.leave(scene, chosenMu ? mu : null, model.dark)
     }
-    if (!this.gone.hidden) { // the page opens anew with its address, once there is a server again
+    if (!this.gone.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)
       return this.say("This scene opens once the connection is back.")
     }

@@ -15,7 +15,7 @@ from ..model import small_scenes
 
 
 class Workbench(Scripted):
-    """A small scene, and everything that can be done with it."""
+    """A small scene with all its tools."""
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
     titles = param.List(doc="[name, title] of every scene")
@@ -23,15 +23,15 @@ class Workbench(Scripted):
     dark = param.Boolean()
 
     def __init__(self, asked: small_scenes.Asked, task: Task, **params: Any) -> None:
-        """asked: what the link asks for. task: of the page, for what takes longer."""
+        """asked: the request in the link. task: a task of the page, for longer work."""
         super().__init__(titles=small_scenes.titles(), **params)
         self._task = task
-        self._made = True  # the scene that was asked for last
+        self._made = True  # the scene requested last
         task.param.watch(self._failed, "message")
         self._show(asked.scene, asked.mu, asked.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
-        if name == small_scenes.MANY:  # has a page of its own
+        if name == small_scenes.MANY:  # has its own page
             return
         self._made = name not in made.SCENES or not made.SCENES[name].packed
         if not self._made:
@@ -42,12 +42,12 @@ class Workbench(Scripted):
         except (InputError, NotJammedError) as error:
             if self.scene:
                 self.tell({"error": str(error)})
-            else:  # a link that cannot be: its page begins anew, and says why
+            else:  # an invalid link: its page starts with the initial scene, and says why
                 self.note = str(error)
                 self._show(name)
 
     def _put(self, scene: dict[str, Any]) -> None:
-        self._task.cancel()  # what was still to be told of the scene before
+        self._task.cancel()  # drop pending results for the previous scene
         self._made = True
         self.scene = scene
 
@@ -57,7 +57,7 @@ class Workbench(Scripted):
             self.tell({"error": event.new})
 
     def _heard(self, message: Message) -> None:
-        """Another scene, another μ, or a question about what is shown."""
+        """Handle a request for another scene, another μ, or results on the present one."""
         try:
             match message:
                 case {
@@ -82,10 +82,10 @@ class Workbench(Scripted):
     def _find(
         self, what: str, scene: str, built: str, mu: float, load: list[float], plane: list[int]
     ) -> None:
-        """Tell what is asked of a scene at this μ, under these loads.
+        """Send results for a scene at this μ, under these loads.
 
-        Nothing of a scene that has been replaced, or is about to be: an answer would end the making
-        of the next.
+        Nothing for a scene that was replaced, or is about to be: the answer would stop the
+        computation of the next one.
         """
         if not self._made or (scene, built) != (self.scene["name"], self.scene["built"]):
             return

@@ -1,1 +1,1 @@
-"""How packings are drawn."""
+"""Drawing of packings."""

@@ -1,10 +1,10 @@
-// The plots beside, found in the page by name: a few numeric columns of them are rewritten in place,
-// without telling the server.
+// Bokeh plots next to the packing, found in the page by name: some numeric columns are updated in
+// place, without telling the server.
 
 import { Handles, Layer, LAYERS } from "./plot_layer.js"
 
 export class Plots {
-  /** hands: what takes hold of the dots of the bars, and of the point in force space. */
+  /** hands: handlers for dragging the dots of the bars, and the point in force space. */
   constructor(document, onData, { dots, point }) {
     this.document = document
     this.handles = [
@@ -14,13 +14,13 @@ export class Plots {
     this.plane = {}
     this.onData = onData
     this.heard = new Set()
-    this.layers = {} // by the name of the source whose plot they lie on
+    this.layers = {} // by the name of the source in their plot
     this.moving = false
     this.colours = {}
-    this.placed = { count: 0, drawn: 0 } // states of a walk under way: in force space, and by Bokeh
+    this.placed = { count: 0, drawn: 0 } // states of a walk in progress: placed in force space, and drawn by Bokeh
   }
 
-  /** Draw what moves on layers, or at rest have it drawn by Bokeh. */
+  /** Draw moving parts on layers, or at rest let Bokeh draw them. */
   move(on) {
     this.moving = on
     if (on) return
@@ -35,7 +35,7 @@ export class Plots {
     return (this.layers[name] = new Layer(fig, (context, scales) => LAYERS[name](context, scales, this, this.replay)))
   }
 
-  /** Show new contents of a source: on its layer while things move. */
+  /** Show new contents of a source, on its layer during motion. */
   changed(source, name) {
     const layer = this.layer(name)
     layer?.take(this.moving)
@@ -43,14 +43,14 @@ export class Plots {
     else source.change.emit()
   }
 
-  /** A source by name; new contents of it are heard from now on. */
+  /** A source by name; its changes are watched from now on. */
   find(name) {
     const source = named(this.document, name)
     if (source) this.watch(source)
     return source
   }
 
-  /** Hear of new contents of a source, which the server sets as the states have them, not the hand. */
+  /** Watch for new contents of a source, which the server computes from the states, not from a pull. */
   watch(source) {
     if (this.heard.has(source)) return
     this.heard.add(source)
@@ -77,19 +77,19 @@ export class Plots {
     this.changed(growth, "growth")
   }
 
-  /** The axis of η reaches as far as η, which is not known while states are being found. */
+  /** Extend the axis of η to η, which is unknown while states are being computed. */
   reach(most) {
     const range = named(this.document, "growth_range")
     if (most > range?.end) range.end = 1.25 * most
   }
 
-  /** Exact bounds that are there, while others are still computed. */
+  /** Exact bounds so far, while others are still being computed. */
   showBounds(replay, scale) {
     this.fillBounds(replay, scale)
     this.find("bars")?.change.emit()
   }
 
-  /** Where only one bound is there, the bar ends at what was seen. */
+  /** Where only one bound is known, the bar ends at the value seen. */
   fillBounds({ walk, bounds }, scale) {
     const bars = this.find("bars"), at = bars?.get_column("at")
     if (!at) return
@@ -106,13 +106,13 @@ export class Plots {
     if (scale !== "own") this.reachBars(most)
   }
 
-  /** The axis of forces reaches as far as the bars do. */
+  /** Extend the axis of forces to the bars. */
   reachBars(most) {
     const axis = named(this.document, "bars_range")
     if (1.04 * most > axis?.end) axis.end = 1.04 * most
   }
 
-  /** The forces now; of a walk under way what was seen, too, which stands still otherwise. */
+  /** The present forces; for a walk in progress also the values seen, which otherwise do not change. */
   showBars(bars, { walk, mixed, seen, low, high }, scale) {
     const column = (name) => bars.get_column(name)
     const at = column("at"), bottom = column("low"), top = column("high"), now = column("now")
@@ -130,7 +130,7 @@ export class Plots {
     this.changed(bars, "bars")
   }
 
-  /** Where a network lies in the plane on screen, or null if there is none of its contacts. */
+  /** The position of a network in the plane on screen, or null if its contacts are not in it. */
   projected({ normal, tangential }) {
     const { xn, xt, yn, yt, origin } = this.plane
     if (xn?.length !== normal.length) return null
@@ -142,7 +142,7 @@ export class Plots {
     return [x, y]
   }
 
-  /** States of a walk under way go to their places in force space as they come. */
+  /** Place the states of a walk in progress in force space as they arrive. */
   fill({ walk }) {
     const path = this.find("path"), x = path?.get_column("x"), y = path?.get_column("y")
     const { contacts, number, numbers } = walk
@@ -158,10 +158,10 @@ export class Plots {
       y[k] = py
       if (x_range && !(px > x_range.start && px < x_range.end && py > y_range.start && py < y_range.end)) outside = true
     }
-    if (outside || !this.moving) this.drawPlaced() // else their layer shows them meanwhile
+    if (outside || !this.moving) this.drawPlaced() // otherwise their layer shows them meanwhile
   }
 
-  /** Have Bokeh draw the states in force space that it has not yet drawn, and fit the axes. */
+  /** Let Bokeh draw the states in force space that it has not drawn yet, and fit the axes. */
   drawPlaced() {
     const { placed } = this
     if (placed.drawn === placed.count) return
@@ -169,7 +169,7 @@ export class Plots {
     this.find("path")?.change.emit()
   }
 
-  /** Points that go along a path: sources with the tags "follows", name of the path, name of tab. */
+  /** Points that move along a path: sources with the tags "follows", name of the path, name of tab. */
   follow(tabs, replay) {
     this.replay = replay
     if (tabs.includes("plane")) this.fill(replay)
@@ -195,7 +195,7 @@ export class Plots {
   }
 }
 
-/** The model of a name: of several the newest, while a plot goes from one place to another. */
+/** The model of a name: the newest of several, while a plot moves from one place to another. */
 function named(page, name) {
   return [...page._all_models.values()].findLast((model) => model.name === name) ?? null
 }

@@ -1,9 +1,10 @@
-// Chains as strokes on a canvas: one by one, or, of many, all of about the same colour and width at once.
+// Chains as strokes on a canvas: one by one or, if there are many, all of similar colour and width
+// at once.
 
 export const LEAST = 0.1 // px; thinner chains are not drawn
-const FINE = 16 // colours; of more, every second serves where chains are gathered
+const FINE = 16 // colours; if there are more, gathered chains use every second one
 
-/** lines: `rows` to draw, their `width` and `bin` of `colours` by row, and ends(row): [xa, ya, xb, yb]. */
+/** lines: the `rows` to draw, their `width` and `bin` of `colours` by row, and ends(row): [xa, ya, xb, yb]. */
 export function strokeEach(context, { rows, width, bin, colours, ends }) {
   context.lineCap = "round"
   for (const k of rows) {
@@ -17,7 +18,7 @@ export function strokeEach(context, { rows, width, bin, colours, ends }) {
   }
 }
 
-/** The same in half the time, by one stroke for each class; scale: px per unit. */
+/** The same in half the time, with one stroke for each class; scale: px per unit. */
 export function strokeByClass(context, { rows, width, bin, colours, ends }, scale) {
   const classes = new Map()
   for (const k of rows) {

@@ -1,22 +1,22 @@
-// How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
+// The look of the forces: width, colour and marks of each contact's chain, as set in the model.
 
 import { plain } from "../../browser/to_object.js"
 
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
-const THIN = 0.15 // of its width, a chain that a filter leaves out
+const THIN = 0.15 // factor on the width of a chain excluded by a filter
 
 export class Look {
   constructor(model, walk) {
     this.model = model
     this.walk = walk
     this.scales = plain(model.scales)
-    this.only = null // 1 for each contact that a filter leaves, or null
+    this.only = null // 1 for each contact that passes a filter, or null
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.measure()
   }
 
-  /** ΔFₙ: of exact intervals where known, else of all states. */
+  /** ΔFₙ: of exact intervals if known, otherwise of all states. */
   measure() {
     const { model, walk } = this, exact = plain(model.exact ?? {})
     this.exact = exact.low?.length === walk.contacts ? exact : null
@@ -26,14 +26,14 @@ export class Look {
     this.mostLoad = Math.max(...(this.loads ?? [1]))
     const measured = plain(model.measured ?? {})
     this.measured = measured.normal?.length === walk.contacts ? measured : null
-    this.gone = model.gone?.length === walk.contacts ? model.gone : null // of ΔFₙ, by what is known
+    this.gone = model.gone?.length === walk.contacts ? model.gone : null // reduction of ΔFₙ by known forces
   }
 
   /** The style of these forces, for the scene. */
   of(mixed) {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
-    // A model is slow to ask.
+    // Reading the model is slow.
     this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
     this.asked.load = full ?? this.mostLoad
     const unit = this.scales.width * (stretch ?? 1)
@@ -54,7 +54,7 @@ export class Look {
   /** fₙ of the pinned state. */
   pinned(c) { return this.walk.normal[this.asked.pinned + c] }
 
-  /** What the width shows, in ⟨fₙ⟩. */
+  /** The quantity shown by the width, in ⟨fₙ⟩. */
   thickness(c, { normal }) {
     const { thickness } = this.asked
     if (thickness === "extent") return this.extent[c]
@@ -64,7 +64,7 @@ export class Look {
     return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
   }
 
-  /** Place on the scale of colours, 0 … 1. */
+  /** Position on the colour scale, 0 … 1. */
   shade(c, { normal, tangential }) {
     const { colour, most } = this.asked
     if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
@@ -77,12 +77,12 @@ export class Look {
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
   }
 
-  /** fₜ/(μ fₙ), or null where it means nothing. */
+  /** fₜ/(μ fₙ), or null if undefined. */
   mobilised(normal, tangential) {
     return this.walk.mu > 0 && normal > CARRYING ? tangential / (this.walk.mu * normal) : null
   }
 
-  // What is told of the one under the pointer: rows of name and value
+  // Details of the contact under the pointer: rows of name and value
 
   contact(k, { mixed, seen, low, high }) {
     const { walk, exact } = this, c = walk.contact[k]
@@ -116,7 +116,7 @@ export class Look {
     ]
   }
 
-  /** What presses on a grain: {normal direction outwards nx, ny, force on it fx, fy} of each contact. */
+  /** The forces on a grain: {outward normal nx, ny, force fx, fy} of each contact. */
   forcesOn(grain, { normal, tangential }) {
     const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, found = [], seen = new Set()
     for (let k = 0; k < contact.length; k++) {
@@ -145,7 +145,7 @@ export class Look {
     return { pressure: (unit * (xx + yy)) / 2, shear, angle: Math.atan2(2 * xy, xx - yy) / 2 }
   }
 
-  /** Mean pressure of the grains, each by its area. */
+  /** Mean pressure of the grains, weighted by area. */
   meanPressure({ normal }) {
     const { walk } = this, { i, j, contact, radius } = walk, seen = new Set()
     let virial = 0

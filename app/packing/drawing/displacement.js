@@ -1,11 +1,11 @@
-// A displacement field of the disks goes to and fro; the largest displacement is one mean radius.
+// A displacement field moves the disks to and fro; the largest displacement is one mean radius.
 
 const SWING = 2.2 // s, to and fro
 
 export class Sway {
   constructor(scene) { this.scene = scene }
 
-  /** field: flat (2 N,) displacements, or null where nothing moves any more. */
+  /** field: flat (2 N,) displacements, or null to stop. */
   take(field) {
     const { scene } = this, was = scene.offset
     let most = 0

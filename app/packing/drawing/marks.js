@@ -1,12 +1,12 @@
-// Marks over the chains of a Scene, which says where everything is: the selected contact, axes of force space,
-// and forces on a disk.
+// Marks over the chains of a Scene, which provides all positions: the selected contact, axes of
+// force space, and forces on a disk.
 
 import { arrow, circle, line } from "../../browser/canvas_paths.js"
 
-const ARROW = 1.3 // of the largest force on a disk, in largest radii
-const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
+const ARROW = 1.3 // length for the largest force on a disk, in largest radii
+const AXIS = [0.3, 7] // width of a contact whose force is an axis of force space, in largest radii, and at most in px
 
-/** The forces that press on a disk, each an arrow that ends where it acts. */
+/** The forces on a disk, each an arrow that ends at its contact point. */
 export function markForces(marks, scene, disk) {
   const { scale, palette, geometry } = scene, { x, y, r, grain, radius } = geometry
   const forces = scene.describe.forces(grain[disk])
@@ -24,7 +24,7 @@ export function markForces(marks, scene, disk) {
   marks.stroke()
 }
 
-/** A line in the colour of its axis of force space. */
+/** A contact in the colour of its axis of force space. */
 export function highlight(marks, scene, chosen, colour) {
   const { scale, palette } = scene
   marks.lineCap = "round"

@@ -1,14 +1,14 @@
-// Marks of what is known: a pin on each contact that is held, open where it has an error bar;
-// numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
+// Marks of known forces: a pin on each held contact, hollow if it has an error bar; numbers on the
+// contacts most worth measuring, the best first; and arrows where a contact is pushed.
 
 import { arrow, circle } from "../../browser/canvas_paths.js"
 import { markSelected } from "./marks.js"
 import { plain } from "../../browser/to_object.js"
 
 const PIN = 17 // px, its height
-const ARROW_PX = 10, GROWN_PX = 100 // beyond the edge of the disk that is pushed: at least, and more at most
+const ARROW_PX = 10, GROWN_PX = 100 // length beyond the edge of the pushed disk: least, and the largest addition
 const COPY = 0.35 // opacity of the arrows at a periodic copy
-const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
+const SPOT = 0.22 // largest radii, of the spot that replaces it in exported pictures
 
 export class Pins {
   constructor(player) {
@@ -38,8 +38,8 @@ export class Pins {
     context.restore()
   }
 
-  /** The two forces that push the disks of a contact apart, the selected one or the one that is pointed out;
-   * faintly at its periodic copies. */
+  /** The two forces that push the disks of a contact apart, the selected or the highlighted one; faint at its
+   * periodic copies. */
   push(context, scene) {
     const { geometry, ratio, palette, scale } = scene, { replay, pushed } = this.player
     const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
@@ -66,7 +66,7 @@ export class Pins {
     context.restore()
   }
 
-  /** In a picture to take along: a spot on each contact that is known, open with an error bar. */
+  /** In an exported picture: a spot on each known contact, hollow with an error bar. */
   onSheet(sheet, scene) {
     const { contacts = [], exact = [] } = this.pins, { known, halo } = scene.palette
     for (const [n, held] of [...contacts].entries()) {

@@ -1,13 +1,13 @@
-// What moves in the plots beside, on canvases of its own above what stands still: while the player
-// plays or a force is in the hand, Bokeh draws nothing. At rest the same is drawn by Bokeh again.
+// Moving parts of the plots next to the packing, on separate canvases above the static parts: while
+// the player plays or a force is dragged, Bokeh draws nothing. At rest Bokeh draws the same parts.
 
 import { made } from "../../browser/dom.js"
 import { circle, line } from "../../browser/canvas_paths.js"
 
-const TRAIL = 4 // states that the trail in force space reaches back
-const PACKED = 1.25 // radius of a dot of the force as packed, px
-const DOT_REACH = 9 // px from a dot that still mean it
-const TOUCH_REACH = 22 // the same of a finger
+const TRAIL = 4 // states in the trail in force space
+const PACKED = 1.25 // radius of the dot for the original force, px
+const DOT_REACH = 9 // px from a dot that still count as the dot
+const TOUCH_REACH = 22 // the same for a finger
 
 export class Layer {
   /** A figure whose moving renderers have the tag "moves"; draw(context, scales) draws them. */
@@ -58,7 +58,7 @@ export class Layer {
   }
 }
 
-/** A linear scale of Bokeh's as a plain function. */
+/** A linear Bokeh scale as a plain function. */
 function linear(scale) {
   const zero = scale.compute(0), slope = scale.compute(1) - zero
   return (value) => zero + slope * value
@@ -122,7 +122,7 @@ export const LAYERS = {
   },
 }
 
-/** The state on screen, in force space; as Bokeh draws it (views/plane.py). */
+/** The state on screen, in force space, as Bokeh draws it (tabs/force_space/space_figure.py). */
 function spot(context, [px, py], plots) {
   context.fillStyle = plots.colours.now
   context.strokeStyle = "white"
@@ -147,12 +147,12 @@ function curve(context, xs, ys, x, y, count, from = 0) {
   context.stroke()
 }
 
-/** What is dragged in a plot: hand.take(k, x, y), move(x, y), leave(), in the units of the plot. */
+/** Points that can be dragged in a plot: hand.take(k, x, y), move(x, y), leave(), in the units of the plot. */
 export class Handles {
   /** The points k of a source, in these columns, on the plot with the layer `name`. */
   constructor(plots, name, source, columns, hand) {
     Object.assign(this, { plots, name, source, columns, hand })
-    this.taken = null // the id of the pointer that has one
+    this.taken = null // id of the pointer that drags one
     this.heard = ["pointerdown", "pointermove", "pointerup", "pointercancel"].map((name) => {
       const hear = (event) => this.hear(event)
       window.addEventListener(name, hear, { capture: true }) // before Bokeh, which would pan
@@ -171,7 +171,7 @@ export class Handles {
       const k = this.nearest(event, element, view.frame)
       if (k < 0) return
       this.taken = pointerId
-      view.canvas_view.events_el?.dispatchEvent(new PointerEvent("pointerout", event)) // or a tip stays
+      view.canvas_view.events_el?.dispatchEvent(new PointerEvent("pointerout", event)) // otherwise a tooltip remains
       this.hand.take(k, ...this.place(event, element, view.frame))
     } else if (this.taken === pointerId && type === "pointermove") {
       this.hand.move(...this.place(event, element, view.frame))

@@ -1,5 +1,5 @@
-// The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
-// chains only. One unit of length is the same number of pixels in x and y by construction.
+// The packing on canvases: disks, chains and marks on separate layers, so that a frame repaints
+// only chains. One unit of length is the same number of pixels in x and y.
 
 import { made } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
@@ -8,8 +8,8 @@ import { listen } from "../hand/pointing.js"
 import { PIXELS, Sheet } from "./svg_context.js"
 
 const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
-const GRAB = 6 // px from a chain that still mean it
-const ZOOM = [0.02, 4] // least and largest part of the whole view
+const GRAB = 6 // px from a chain that still count as the chain
+const ZOOM = [0.02, 4] // smallest and largest fraction of the whole view
 const ZOOM_HINT = "Ctrl + wheel zooms; after a click here the wheel alone does."
 
 export class Scene {
@@ -28,7 +28,7 @@ export class Scene {
     this.selected = null
     this.pair = [] // contacts whose forces are the axes of force space, across and up
     this.pointed = -1 // the disk under the pointer, whose forces are drawn
-    this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
+    this.frozen = false // whether the drawing is animated and cannot be pointed at
     this.offset = null
     this.mixed = null
     listen(this)
@@ -46,7 +46,7 @@ export class Scene {
     if (moved) this.reset(false)
   }
 
-  /** The view of all of it. */
+  /** The view of the whole packing. */
   get whole() {
     const [left, right, bottom, top] = this.geometry.window
     return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
@@ -57,7 +57,7 @@ export class Scene {
     if (paint) this.changed()
   }
 
-  /** px of the layout per unit of length, along x and y alike. */
+  /** px of the layout per unit of length, along x and y. */
   get scale() { return this.size / (2 * this.view.half) }
 
   toPixel(x, y) {
@@ -77,14 +77,14 @@ export class Scene {
     this.finer(size * ratio)
   }
 
-  /** Draw with so many pixels a side, however many of them are seen; `resize` takes it back. */
+  /** Draw with this many pixels per side, independent of the screen; undone by `resize`. */
   finer(pixels) {
     this.ratio = pixels / this.size
     for (const { canvas } of [this.disks, this.chains, this.marks]) canvas.width = canvas.height = Math.round(pixels)
     if (this.geometry) this.changed()
   }
 
-  /** After pan, zoom, resize or a new theme: everything, once per painted frame. */
+  /** After pan, zoom, resize or a change of theme: redraw everything, once per painted frame. */
   changed() {
     this.stale = true
     if (this.asked) return
@@ -113,7 +113,7 @@ export class Scene {
     context.setTransform(s, 0, 0, -s, middle - s * view.x, middle + s * view.y)
   }
 
-  /** The whole packing, drawn as on screen, as the text of an SVG. */
+  /** The whole packing, drawn as on screen, as SVG text. */
   picture(caption) {
     const { disks, chains, marks, view, size, geometry } = this, sheet = new Sheet()
     Object.assign(this, { disks: sheet, chains: sheet, marks: sheet, size: PIXELS, pointed: -1 })
@@ -143,7 +143,7 @@ export class Scene {
       }
       disks.fillStyle = fill
       disks.fill()
-      if (scale < 3) continue // outlines of disks of a few pixels would be all that is seen
+      if (scale < 3) continue // disks a few pixels large would be nothing but outline
       disks.lineWidth = 0.8 / scale
       disks.strokeStyle = line
       disks.stroke()
@@ -167,7 +167,7 @@ export class Scene {
     context.setLineDash([])
   }
 
-  /** How far a grain is displaced at this moment of an animated displacement field. */
+  /** The displacement of a grain at this moment of an animated displacement field. */
   shift(grain, axis) {
     return this.offset ? this.offset.amplitude * this.offset.field[2 * grain + axis] : 0
   }
@@ -196,7 +196,7 @@ export class Scene {
     this.begin(chains)
     this.stroke(order.slice(0, drawn), style.colours)
     this.drawMarks()
-    if (!this.painted++) performance.mark("packing painted") // how long opening took
+    if (!this.painted++) performance.mark("packing painted") // time until the page showed a packing
   }
 
   /** Stroke these rows of the geometry. */
@@ -214,7 +214,7 @@ export class Scene {
     ]
   }
 
-  /** Of the contacts that are chosen(contact) each segment k: both ends a and b, and its middle. */
+  /** Each segment k of the contacts with chosen(contact): both ends a and b, and the midpoint. */
   *segments(chosen) {
     const { contact } = this.geometry
     for (let k = 0; k < contact.length; k++) {
@@ -224,7 +224,7 @@ export class Scene {
     }
   }
 
-  /** The selected contact, the axes of force space, and what others add. */
+  /** The selected contact, the axes of force space, and marks of other modules. */
   drawMarks() {
     const { marks, palette } = this
     this.begin(marks)
@@ -237,20 +237,20 @@ export class Scene {
 
   // Pointer
 
-  /** Say for a while how the wheel zooms. */
+  /** Explain briefly how the wheel zooms. */
   hintAtZoom() {
     const hint = this.root.appendChild(made("div", { className: "hint", textContent: ZOOM_HINT, role: "status" }))
     hint.addEventListener("animationend", () => hint.remove())
   }
 
-  /** Segment under a point of the layout, or −1; reach: px from a chain that still mean it. */
+  /** The segment at a point of the layout, or −1; reach: px from a chain that still count as the chain. */
   linkAt(px, py, reach = GRAB) {
     const [x, y] = this.toPlace(px, py), { x0, y0, x1, y1, contact } = this.geometry
     let best = -1, least = Infinity
     for (let k = 0; k < contact.length; k++) {
       const dx = x1[k] - x0[k], dy = y1[k] - y0[k]
       const along = ((x - x0[k]) * dx + (y - y0[k]) * dy) / (dx * dx + dy * dy)
-      if (along < 0.05 || along > 0.95) continue // at a centre many chains meet
+      if (along < 0.05 || along > 0.95) continue // many chains meet at a centre
       const away = Math.hypot(x - x0[k] - along * dx, y - y0[k] - along * dy)
       if (away - this.width[k] / 2 < least) { least = away - this.width[k] / 2; best = k }
     }
@@ -270,7 +270,7 @@ export class Scene {
     return [event.clientX - box.left, event.clientY - box.top]
   }
 
-  /** A disk is pointed at, or none (−1). */
+  /** Highlight a disk, or none (−1). */
   point(disk) {
     if (disk === this.pointed) return
     this.pointed = disk

@@ -1,6 +1,6 @@
-// Two networks side by side: the pinned state beside the one on screen, in the same view, or another
-// packing that is played along with it. The pinned state is drawn anew only where the view, the look
-// or the pinned state changes.
+// Two networks side by side: the pinned state next to the one on screen, in the same view, or
+// another packing that is played along with it. The pinned state is redrawn only when the view, the
+// look or the pinned state changes.
 
 import { Look } from "./chain_style.js"
 import { made } from "../../browser/dom.js"
@@ -33,7 +33,7 @@ export class Split {
     return Boolean(model.split && replay && (this.other || !live.moves))
   }
 
-  /** Another packing has come, or is gone. */
+  /** Another packing arrived or was removed. */
   take() {
     const walk = plain(this.player.model.twin)
     this.other = walk.contacts ? new Replay(walk) : null
@@ -41,7 +41,7 @@ export class Split {
     this.show()
   }
 
-  /** Take over what is beside, and how it looks. */
+  /** Apply the comparison and its look. */
   show() {
     const { on, player, other } = this, { model, buttons } = player
     buttons.tellSplit(Boolean(model.split), on)
@@ -80,7 +80,7 @@ export class Split {
     this.dress(new Proxy(own, { get: (mine, name) => (name in mine ? mine[name] : model[name]) }), walk, this.other)
   }
 
-  /** Have the twin show a network of a walk, as the model asks. */
+  /** Make the twin show a network of a walk, as set in the model. */
   dress(model, walk, shown) {
     const { twin, player } = this
     if (twin.geometry !== walk) {
@@ -94,7 +94,7 @@ export class Split {
     twin.style = look.of(shown.mixed)
   }
 
-  /** Where another packing's walk is as far as the one that plays, by the numbers of its states. */
+  /** The position at which another packing's walk has the state number of the one that plays. */
   get along() {
     const { walk, spot: [a, b, part] } = this.player.replay, { number } = this.other.walk
     const reached = (1 - part) * walk.number[a] + part * walk.number[b]
@@ -102,7 +102,7 @@ export class Split {
     return k + 1 < number.length ? k + (reached - number[k]) / (number[k + 1] - number[k]) : k
   }
 
-  /** The player has gone on: another packing does, too. */
+  /** The player advanced: so does the other packing. */
   step() {
     const { other, on, twin } = this
     if (!other || !on || !twin.style) return
@@ -111,7 +111,7 @@ export class Split {
     twin.drawChains(this.look.of(other.mixed))
   }
 
-  /** After the view, or what is selected, has changed. */
+  /** After a change of the view or the selection. */
   paint() {
     const { twin, on, player, other } = this
     if (!on || !twin.style) return
@@ -125,11 +125,11 @@ export class Split {
   }
 }
 
-/** The view of one scene as seen in another, whose packing has a box of its own: whole is whole. */
+/** The view of one scene in another, whose packing has its own box: the whole maps to the whole. */
 class Through {
   constructor(scene, twin) { Object.assign(this, { scene, twin }) }
 
-  /** A packing that moves is seen whole, and so is what is beside it. */
+  /** A moving packing is shown whole, and so is the comparison. */
   get from() { return this.scene.frozen ? this.scene.whole : this.scene.view }
 
   get ratio() { return this.twin.whole.half / this.scene.whole.half }

@@ -1,4 +1,4 @@
-// A canvas of sorts that keeps what is drawn on it as SVG: only what the scene asks of one.
+// A minimal canvas context that records drawings as SVG, with only the methods that the scene uses.
 
 export const PIXELS = 900 // of the picture's side
 const BELOW = 60 // pixels from the picture to the first line of its caption
@@ -48,11 +48,11 @@ export class Sheet {
 
   setLineDash(dash) { this.dash = dash }
 
-  // The whole is shown, and nothing was there before.
+  // The whole is shown on an empty canvas.
   setTransform() {}
   clearRect() {}
 
-  /** All that was drawn, as a text, with colour bar, scale and caption below. */
+  /** The drawing as text, with colour bar, scale and caption below. */
   svg([left, right, bottom, top], { background, ink, bar, lines: told, unit }) {
     const lines = told.flatMap(wrapped)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
@@ -78,7 +78,7 @@ export class Sheet {
   }
 }
 
-/** A line as lines that fit, broken between words, or within one that does not fit by itself. */
+/** Break a line into lines that fit, between words, or within a word that is too long. */
 function wrapped(line) {
   const lines = [""]
   for (const word of line.match(new RegExp(`\\S{1,${MOST}}\\s*`, "g")) ?? []) {

@@ -1,1 +1,1 @@
-"""How forces are dragged."""
+"""Dragging of forces."""

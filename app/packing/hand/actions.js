@@ -1,6 +1,6 @@
-// What buttons and keys do, by name, on a player.
+// Actions of buttons and keys, by name, on a player.
 
-/** name → function, none of which does anything while a packing is being made. */
+/** name → function; all are inactive while a packing is being made. */
 export function actions(player) {
   const loaded = (action) => (given) => { if (player.replay && !player.live.moves) action(player.replay, given) }
   const halted = (action) => loaded((replay, given) => {

@@ -1,6 +1,6 @@
-// A force in the hand. A contact that is dragged follows between its exact bounds, along a rail of
-// networks that the server made; between two of them the straight line is shown, which is admissible
-// too. Let go, and it stays: the next pull starts there.
+// Dragging of a force. A dragged contact stays between its exact bounds, on a rail of networks from
+// the server; between two of them the straight line is shown, which is also admissible. After
+// release the force stays: the next pull starts there.
 
 import { CARRYING } from "../drawing/chain_style.js"
 import { circle, line } from "../../browser/canvas_paths.js"
@@ -8,24 +8,24 @@ import { plain } from "../../browser/to_object.js"
 import { PointHand } from "./drag_point.js"
 import { networkAt } from "../replay/replay.js"
 
-const RAIL = 190 // px, the longest
+const RAIL = 190 // px, largest length
 const EDGE = 14 // px between a rail and the edge of the picture
-const AT_END = 2e-3 // of a rail, within which the hand is at its end
+const AT_END = 2e-3 // fraction of a rail that counts as its end
 const FINDING = "Finding how far it can be pulled …"
 export const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const KNOWN = "This force is held: release it (press H) before you pull it."
-const NUMBER_LINE = 14 // px, height of a line of numbers beside it
-const NUDGE = 1 / 40 // of a rail, by a key
-const REST = 600 // ms after the last key until the force is let go
-const LINGER = 1000 // ms for which its rail is seen after it was let go
+const NUMBER_LINE = 14 // px, height of a line of numbers next to it
+const NUDGE = 1 / 40 // of a rail, per key press
+const REST = 600 // ms after the last key press until the force is released
+const LINGER = 1000 // ms for which its rail stays visible after release
 
 export class Grab {
-  /** tell(message): to the server. */
+  /** tell(message): send to the server. */
   constructor(player, tell) {
     this.player = player
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
-    this.moved = this.flung = false // whether it was, and whether it was let go before its rail was there
+    this.moved = this.flung = false // whether it moved, and whether it was released before its rail arrived
     this.lingers = 0
     this.frames = 0
     this.spot = new PointHand(this)
@@ -34,12 +34,12 @@ export class Grab {
 
   get replay() { return this.player.replay }
 
-  /** Whether a contact is in the hand. */
+  /** Whether a contact is being dragged. */
   get active() { return this.contact !== null || this.spot.active }
 
-  // The hand
+  // Dragging
 
-  /** Take a contact; place: how far along its rail a pointer is, given the rail. */
+  /** Take a contact; place: position of the pointer on its rail, given the rail. */
   take(contact, place) {
     const { player } = this
     if (!this.begin()) return
@@ -48,11 +48,11 @@ export class Grab {
     this.place = place
     player.scene.selected = contact
     player.scene.tip.classList.remove("on")
-    this.tell({ grab: contact }) // the server selects it, too
+    this.tell({ grab: contact }) // the server also selects it
     player.paint()
   }
 
-  /** Come to rest at a network that has a name; whether there is one to take hold of. */
+  /** Come to rest at a network with a name; returns whether there is one to drag. */
   begin() {
     const { player } = this
     if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
@@ -67,20 +67,20 @@ export class Grab {
     return true
   }
 
-  /** The hand has moved. */
+  /** The pointer has moved. */
   move(place) {
     this.moved = true
     this.place = place ?? this.place
     if (this.rail && this.contact !== null) this.set(this.place(this.rail))
   }
 
-  /** Let go: the force stays. */
+  /** Release: the force stays. */
   leave() {
     const { contact, rail, value } = this
     if (contact === null) return
     clearTimeout(this.resting)
     this.flung = !rail && this.moved
-    if (this.flung) return // followed once its rail is there
+    if (this.flung) return // applied when its rail arrives
     this.contact = null
     if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
       this.tell({ hold: [contact, value] })
@@ -89,7 +89,7 @@ export class Grab {
     this.still()
   }
 
-  /** Nothing is in the hand any more. */
+  /** Nothing is being dragged any more. */
   still() {
     this.unsay()
     this.player.plots.move(false)
@@ -97,13 +97,13 @@ export class Grab {
     this.player.paintPlots()
   }
 
-  /** What the rail said can be read for a while after the force was let go. */
+  /** Keep the rail's message for a while after release. */
   linger() {
     clearTimeout(this.lingers)
     this.lingers = setTimeout(() => { this.lingers = 0; this.player.repaint() }, LINGER)
   }
 
-  /** Where nothing came to be pulled, tell what was told before. */
+  /** If nothing was pulled, restore the previous message. */
   unsay() {
     const told = this.player.buttons.part("said")
     if (told.textContent === FINDING) told.textContent = this.said
@@ -130,7 +130,7 @@ export class Grab {
     else if (this.contact !== null) this.resting = setTimeout(() => this.rest(), REST)
   }
 
-  /** Back to the states: nothing is pulled any more. */
+  /** Return to the states and drop all pulls. */
   free() {
     if (this.active) this.player.plots.move(false)
     this.contact = null
@@ -156,19 +156,19 @@ export class Grab {
     if (this.player.look) this.player.look.before = this.replay?.held ? this.before : null
   }
 
-  // What the server made
+  // Messages from the server
 
   hear({ rail, fan, held }) {
     if (rail !== undefined) this.ride(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))
-    const pushed = !held && this.player.pushed.held // which came after what is no longer pulled
+    const pushed = !held && this.player.pushed.held // meanwhile it was no longer pulled
     if (held !== undefined && !this.active && !pushed) this.keep(held && plain(held))
   }
 
   ride(rail) {
     if (!rail) { this.contact = null; this.unsay(); this.player.plots.move(false); return this.player.again() }
     if (rail.contact !== this.contact) return
-    const { mixed } = this.replay, more = this.rail !== null // the ends, of a rail that was there in part
+    const { mixed } = this.replay, more = this.rail !== null // the ends of a rail that was there in part
     this.rail = rail
     if (more) return this.arrived()
     this.begun = mixed.normal[this.contact]
@@ -177,16 +177,16 @@ export class Grab {
     this.arrived()
   }
 
-  /** The hand goes on along a rail that has come; one that let go before stays where it was going. */
+  /** Continue the drag along a rail that arrived; after an early release, move to the target. */
   arrived() {
     this.move()
     if (this.flung && this.rail.whole) this.leave()
   }
 
-  /** Changes are coloured against the network on screen. */
+  /** Changes are coloured relative to the network on screen. */
   remember() { this.before = this.player.look.before = this.replay.mixed.normal.slice() }
 
-  /** The network that the pulls have led to. */
+  /** The network after the pulls. */
   keep(held) {
     const { player, replay } = this
     if (!replay) return
@@ -202,7 +202,7 @@ export class Grab {
     player.again()
   }
 
-  /** The network of this value, by straight lines between those of the rail. */
+  /** The network with this value, by linear interpolation on the rail. */
   set(value) {
     const { rail } = this, { values } = rail
     this.value = Math.max(values[0], Math.min(values[values.length - 1], value))
@@ -210,7 +210,7 @@ export class Grab {
     this.show(networkAt(rail, this.value))
   }
 
-  /** Put a network on screen with the next painted frame. */
+  /** Show a network with the next painted frame. */
   show(held) {
     const { replay, player } = this
     replay.held = held
@@ -223,14 +223,14 @@ export class Grab {
     })
   }
 
-  /** −1 or 1 where the hand is at the lower or upper end of the rail, else 0. */
+  /** −1 or 1 at the lower or upper end of the rail, otherwise 0. */
   get end() {
     if (!this.rail) return 0
     const { lower, upper } = this.rail, near = AT_END * (upper - lower)
     return this.value >= upper - near ? 1 : this.value <= lower + near ? -1 : 0
   }
 
-  /** Contacts that opened, and that slide, at the end where the hand is. */
+  /** Contacts that opened or slide at the present end of the rail. */
   get holding() {
     const { rail, end, before, slid } = this, size = this.replay.walk.contacts
     const from = end > 0 ? size : 0
@@ -274,7 +274,7 @@ export class Grab {
 
   // In the packing
 
-  /** Take the contact under a point of the scene, on a rail that goes upwards through the point. */
+  /** Take the contact under a point of the scene, on a vertical rail through the point. */
   takeInScene(contact, px, py) {
     this.point = [px, py]
     this.grip = [px, py]
@@ -286,7 +286,7 @@ export class Grab {
     this.move()
   }
 
-  /** Ends of the rail on the scene, px from above. */
+  /** Ends of the rail in the scene, px from the top. */
   ends() {
     const { rail, begun, grip } = this, { size } = this.player.scene
     const part = (begun - rail.lower) / (rail.upper - rail.lower || 1)
@@ -300,7 +300,7 @@ export class Grab {
     return lower + ((bottom - py) / (bottom - top)) * (upper - lower)
   }
 
-  /** Rail, handle and what holds it, on the canvas of marks. */
+  /** Rail, handle and limiting contacts, on the canvas of marks. */
   draw(context, scene) {
     if (this.contact === null && !this.lingers) return
     const { palette, ratio } = scene
@@ -340,7 +340,7 @@ export class Grab {
     context.stroke()
   }
 
-  /** Contacts at a limit: open ones ring-shaped, sliding ones as squares. */
+  /** Contacts at a limit: open ones as rings, sliding ones as squares. */
   drawHolding(context, scene, contacts, opened) {
     if (!contacts.length) return
     const chosen = new Set(contacts), { scale, palette } = scene, r = 4.5 / scale

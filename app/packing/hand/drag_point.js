@@ -1,6 +1,6 @@
-// The point in force space in the hand: it goes where the hand goes inside the outline, and the
-// network with it. The server sends networks at corners all around (a fan); the triangle between two
-// of them and the network that was taken is shown, and all of it is admissible, since S is convex.
+// Dragging of the point in force space: it follows the pointer inside the outline, and the network
+// follows it. The server sends networks at corners all around (a fan); shown is a point of the
+// triangle between two of them and the initial network, which is admissible, since S is convex.
 
 import { FORCES } from "../replay/live.js"
 
@@ -14,10 +14,10 @@ export class PointHand {
 
   drop() {
     this.target = this.fan = this.from = null
-    this.flung = false // whether it was let go before its networks were there
+    this.flung = false // whether it was released before its networks arrived
   }
 
-  // The hand
+  // Dragging
 
   take(x, y) {
     if (!this.hand.begin()) return
@@ -40,7 +40,7 @@ export class PointHand {
     this.hand.still()
   }
 
-  // What the server made
+  // Messages from the server
 
   spread(fan) {
     const { hand } = this, { mixed, walk } = hand.replay ?? {}
@@ -80,7 +80,7 @@ export class PointHand {
   }
 }
 
-/** A point, or the nearest one of the polygon's edge where it lies outside (corners run left about). */
+/** A point, or the nearest point of the polygon's edge if it is outside (corners are anticlockwise). */
 function inside({ x, y }, [px, py]) {
   let out = false, best = null, least = Infinity
   for (let k = 0; k < x.length; k++) {
@@ -94,7 +94,7 @@ function inside({ x, y }, [px, py]) {
   return out ? best : [px, py]
 }
 
-/** In which triangle of `here` and corners k, next a point lies, and its weights there. */
+/** The triangle of `here` and corners k, next that contains a point, and the point's weights in it. */
 function triangle({ x, y }, [hx, hy], [px, py]) {
   let best = { k: 0, next: 0, a: 0, b: 0 }, most = -Infinity
   const dx = px - hx, dy = py - hy

@@ -1,14 +1,16 @@
-// What a pointer, a wheel or fingers do over the packing: they point, select, take a force, or move the view.
+// Pointer, wheel and touch over the packing: they highlight, select, drag a force, or move the
+// view.
 
-/** Hear them over a Scene. */
+/** Listen over a Scene. */
 export function listen(scene) {
   const { root } = scene, fingers = new Map()
   let moved = 0, taken = null
-  // By touch only the selected contact is taken: else the page scrolls under the finger.
+  // By touch only the selected contact is dragged; otherwise the page scrolls under the finger.
   root.addEventListener("touchstart", (event) => {
     if (event.touches.length === 1 && scene.takenAt(event.touches[0], true) !== null) event.preventDefault()
   }, { passive: false })
-  // Without a key or a click the wheel scrolls the page, which would stop over the packing else.
+  // Without a key or a click the wheel scrolls the page, which would otherwise stop over the
+  // packing.
   root.addEventListener("wheel", (event) => {
     if (!event.ctrlKey && !event.metaKey && !root.matches(":focus-within")) return
     event.preventDefault()

@@ -1,6 +1,6 @@
-// A push on the two disks of a contact: arrows that grow with the load, and the network, which follows along
-// networks that the server made. Between two of them the straight line balances the load in between (S under
-// all loads is convex, too). Where the last of them is reached, disks set off.
+// A push on the two disks of a contact: arrows that grow with the load, and the network,
+// interpolated between networks from the server. Between two of them the straight line balances the
+// load in between (S under all loads is convex too). At the last of them, disks start to move.
 
 import { networkAt } from "../replay/replay.js"
 
@@ -10,22 +10,22 @@ export class Pushed {
     this.end()
   }
 
-  /** Nothing is pushed any more. */
+  /** Stop pushing. */
   end() {
     this.load = this.part = 0
-    this.there = false // whether disks set off
+    this.there = false // whether disks start to move
     const { player } = this, held = this.held
     this.held = null
     player.sway?.take(null)
     if (held && player.replay?.held === held) player.hand.forget()
   }
 
-  /** path: networks under loads up to the largest one that is held; part: of the longest arrow. */
+  /** path: networks under loads up to the largest one with equilibrium; part: fraction of the longest arrow. */
   take(path, load, part) {
     const { player } = this, { replay, scene } = player
     if (!player.pushable || player.live.moves || player.grows) return
     if (load > 0 && player.playing) player.play(false)
-    if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // what was pulled
+    if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // a pulled network
     Object.assign(this, { load, part, there: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
     this.tellMotion()
     if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
@@ -37,6 +37,6 @@ export class Pushed {
     player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
   }
 
-  /** Disks move only where they are pushed hard enough. */
+  /** Disks move only under a sufficient push. */
   tellMotion() { this.player.sway.take(this.there ? this.player.model.displacement : null) }
 }

@@ -1,1 +1,1 @@
-"""What is played."""
+"""The animation of states."""

@@ -1,22 +1,22 @@
-// What is seen while it is computed: a packing under compression, then a walk that grows.
+// Computations in progress: a packing under compression, then a growing walk.
 
 import { CARRYING } from "../drawing/chain_style.js"
 import { plain } from "../../browser/to_object.js"
 
-const GLIDE = 250 // ms in which the view goes over from the moving packing to the finished one
+const GLIDE = 250 // ms of the transition from the view of the moving packing to that of the finished one
 const STRIP = 1 // width of the strip around the box in which images are drawn, in largest radii
-export const CATCH_UP = 0.6 // s that the player stays behind the newest state
-const WIDEST = 0.7 // of a chain in a moving packing, in largest radii: collisions carry most of the force
+export const CATCH_UP = 0.6 // s by which the player stays behind the newest state
+const WIDEST = 0.7 // widest chain in a moving packing, in largest radii: collisions carry most of the force
 export const FORCES = ["normal", "tangential"]
 const TOLD = ["residual", "acceptance", "eta1", "eta2", "eta3"]
 
-/** A moving packing as the scene draws it, its periodic images included. */
+/** A moving packing for the scene, including its periodic images. */
 function moving({ box, tilt, x, radius, i, j, reach }) {
   const made = { box, tilt, radius, touching: [], i: [], j: [], contact: [] }
   for (const name of ["x", "y", "r", "grain", "kind", "x0", "y0", "x1", "y1"]) made[name] = []
   const margin = STRIP * radius.reduce((most, r) => Math.max(most, r), 0)
   const [wide, high] = box
-  // Across a tilted cell: distances from its sides b and a; x and y where it is straight.
+  // In a tilted cell: distances from its sides b and a; x and y in a straight one.
   const narrow = high / Math.hypot(tilt, high), across = (px, py) => (px - (tilt * py) / high) * narrow
   const seen = (low, up, side) => up > -margin && low < side + margin
   const touching = new Int32Array(radius.length)
@@ -56,7 +56,7 @@ function flickering({ normal, tangential, radius, mu }, palettes, scales) {
   return { width, bin, colours }
 }
 
-/** A walk of one frame with room for those to come: `number` tells how many there are. */
+/** A walk of one frame with room for more: `number` counts them. */
 export function roomy(walk) {
   const { room } = walk, whole = { ...walk, low: walk.low.slice(), high: walk.high.slice() }
   const wide = (values, count) => {
@@ -87,7 +87,7 @@ export function extend(walk, states) {
 }
 
 export class Live {
-  /** tell(message): to the server. */
+  /** tell(message): send to the server. */
   constructor(player, tell) {
     this.player = player
     this.tell = tell
@@ -103,13 +103,14 @@ export class Live {
   /** Whether a moving packing is on screen. */
   get moves() { return this.window !== null }
 
-  /** Take what the server sends of a computation. */
+  /** Handle messages about a computation. */
   hear(message) {
     const { picture, states, bounds, number } = message, { loaded, model } = this.player
     if (states) this.player.grow(plain(states))
     if (bounds) this.player.arrive(plain(bounds))
-    requestAnimationFrame(() => { // never in a hidden tab, which thus is sent no more
-      // Neither over the finished packing nor, once it was cancelled, over the old one, which stays then.
+    requestAnimationFrame(() => { // never in a hidden tab, which thus receives no more
+      // Neither over the finished packing nor, after cancelling, over the old one, which stays
+      // then.
       if (picture && model.live && this.player.loaded === loaded) this.show(plain(picture))
       this.tell({ painted: number })
     })
@@ -125,9 +126,9 @@ export class Live {
     scene.palette ??= plain(plain(model.palettes).scene)
     scene.frozen = true
     scene.selected = null
-    scene.pair = [] // of the packing before
+    scene.pair = [] // of the previous packing
     scene.show(geometry)
-    // As large as at first while it shrinks, larger where it tilts out of that.
+    // Keep the initial size while it shrinks, and enlarge it if the tilt exceeds it.
     const half = Math.max(this.window[1] - this.window[0], right - left) / 2
     scene.view = { x: (left + right) / 2, y: (low + high) / 2, half }
     scene.style = flickering(picture, plain(model.palettes), plain(model.scales))
@@ -140,7 +141,7 @@ export class Live {
       `${Number(picture.mu.toPrecision(4))}: packing fraction φ = ${picture.fraction.toFixed(4)}${unbalance}`)
   }
 
-  /** The moving packing is finished or given up; the view that it was seen in, or null. */
+  /** The moving packing is finished or abandoned; returns its view, or null. */
   leave() {
     const { scene } = this.player, view = this.moves ? scene.view : null
     this.window = null
@@ -148,13 +149,13 @@ export class Live {
     return view
   }
 
-  /** Go over from a view to the one that is set. */
+  /** Move from a view to the one that is set. */
   glide(from) {
     const { scene } = this.player, to = scene.view, begin = performance.now()
     if (!from || matchMedia("(prefers-reduced-motion: reduce)").matches) return
     const step = (now) => {
       const part = Math.min(1, Math.max(0, (now - begin) / GLIDE)), mix = (a, b) => a + part * (b - a)
-      if (scene.frozen || (scene.view !== to && scene.view !== this.between)) return // moved by hand
+      if (scene.frozen || (scene.view !== to && scene.view !== this.between)) return // moved by the user
       this.between = { x: mix(from.x, to.x), y: mix(from.y, to.y), half: mix(from.half, to.half) }
       scene.view = part < 1 ? this.between : to
       scene.repaint()

@@ -1,27 +1,27 @@
-// Playing: the replay advances from painted frame to painted frame, and a pause comes to rest at a network.
+// Playing: the replay advances with every painted frame, and a pause comes to rest at a network.
 
 import { CATCH_UP } from "./live.js"
 
-const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
-const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
-const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
-const LONGEST_S = 6 // but no longer than this
-const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
+const PLOTS_MS = 30 // shortest time between two repaints of the plots while playing,
+const PLOTS_FRAMES = 1.5 // also in frames, for slow frames
+const CROSSING = 20 // duration of a step between two states, relative to a normal step, so that the eye can follow,
+const LONGEST_S = 6 // with an upper limit
+const REST_MS = 400 // duration of a whole step when a pause moves to the nearest network
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 
 export class Playback {
   /**
-   * stage: what is played on: `replay` or null, `grows` (whether more networks are to come), `speed` (rows a
-   * second), `shown` (whether it is on the page), paint(), paintPlots(now), show(position), and
-   * changed(running), called as it begins and ends.
+   * stage: the object that plays: `replay` or null, `grows` (whether more networks are expected), `speed` (rows
+   * per second), `shown` (whether it is on the page), paint(), paintPlots(now), show(position), and
+   * changed(running), called at the start and the end.
    */
   constructor(stage) {
     this.stage = stage
     this.running = false
-    this.resting = null // where a pause comes to rest, while it is on its way
-    this.newest = false // whether it stays close behind the newest network of a walk under way
-    this.turns = 0 // how often it has turned back, going to and fro
-    this.painted = 0 // when plots were
+    this.resting = null // target of a pause, while it is being approached
+    this.newest = false // whether it stays close behind the newest network of a walk in progress
+    this.turns = 0 // number of reversals during motion to and fro
+    this.painted = 0 // time at which plots were painted
   }
 
   /** Begin or end. */
@@ -39,17 +39,17 @@ export class Playback {
     requestAnimationFrame((now) => this.tick(now))
   }
 
-  /** End without a word: another replay takes the place of this one. */
+  /** Stop silently: another replay replaces this one. */
   halt() { this.running = false }
 
-  /** What rests is a network that has a name: the nearest one, but between two that are compared. */
+  /** Rest at a named network, the nearest one, except between two compared ones. */
   settle(replay) {
     if (replay.held || replay.swinging || !(replay.position % 1)) return
     replay.go(Math.round(replay.position))
     this.stage.paint()
   }
 
-  /** Playing ends at the nearest network, to which it goes over; whether it is on its way there. */
+  /** Stop playing at the nearest network after a transition; returns whether it is still under way. */
   pause() {
     const { replay } = this.stage
     if (replay.held || replay.swinging || STILL.matches) { this.run(false); return false }
@@ -57,10 +57,10 @@ export class Playback {
     return true
   }
 
-  /** Go on after all. */
+  /** Resume after all. */
   resume() { this.resting = null }
 
-  /** One step of the way to where it comes to rest; whether it is there. */
+  /** One step towards the resting position; returns whether it is reached. */
   rest(replay, took) {
     const way = this.resting - replay.position, step = (took / REST_MS) * Math.sign(way)
     if (Math.abs(way) <= Math.abs(step)) { this.run(false); return true }
@@ -68,7 +68,7 @@ export class Playback {
     return false
   }
 
-  /** Rows to go on in a time, s. */
+  /** Rows to advance in a time, s. */
   steps(replay, took) {
     const behind = this.newest ? (replay.last - replay.position) / CATCH_UP : 0
     const speed = Math.max(this.stage.speed, behind)

@@ -1,7 +1,7 @@
-// What is replayed: the frames of a walk, and how far the page has come among them.
-// Between two states the straight line is shown: S is convex, so every point of it is admissible too.
+// The replay: the frames of a walk, and the present position among them. Between two states the
+// straight line is shown: S is convex, so every point of it is also admissible.
 
-/** Forces a part of the way from network a to network b of `all`, one after the other. */
+/** Forces at a fraction of the way from network a to network b of `all`, one after the other. */
 function between(all, a, b, part, out) {
   const size = out.length, from = a * size, to = b * size
   for (let c = 0; c < size; c++) {
@@ -9,7 +9,7 @@ function between(all, a, b, part, out) {
   }
 }
 
-/** The network at a value, by straight lines between those of a path (flat), whose values ascend. */
+/** The network at a value, by linear interpolation on a path (flat) with ascending values. */
 export function networkAt({ values, normal, tangential, residual }, value) {
   const size = normal.length / values.length
   let k = 0
@@ -25,7 +25,7 @@ export class Replay {
   constructor(walk, between) {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
-    this.held = null // a network that was pulled, on screen in place of the states
+    this.held = null // a pulled network, shown instead of the states
     this.forget()
     this.follow(between)
   }
@@ -44,19 +44,19 @@ export class Replay {
   /** Whether the position is an end of the track. */
   get atEnd() { return this.position >= this.last }
 
-  /** Frames before and after the position, and the part of the way. */
+  /** Frames before and after the position, and the fraction of the way. */
   get spot() {
     const { track, position, last } = this, k = Math.min(Math.floor(position), last - 1)
     return last < 1 ? [track[0], track[0], 0] : [track[k], track[k + 1], position - k]
   }
 
-  /** Of the walk's networks every so many are here. */
+  /** The stride of the stored networks in the walk. */
   get stride() {
     const { walk } = this, count = walk.room ? walk.room - 1 : walk.number.length - 1
     return Math.max(1, Math.round(walk.states / Math.max(1, count)))
   }
 
-  /** The position on the track of all networks of the one with this number, or of the nearest. */
+  /** The track position of the network with this number, or of the nearest one. */
   positionOf(number) {
     const away = Array.from(this.walk.number, (other) => Math.abs(other - number))
     return away.indexOf(Math.min(...away))
@@ -77,7 +77,7 @@ export class Replay {
     for (const [name, out] of Object.entries(this.mixed)) between(this.walk[name], ...this.spot, out)
   }
 
-  // What was passed; the original network (frame 0) is no state of the walk
+  // Passed states; the original network (frame 0) is not a state of the walk
 
   forget() {
     this.seen = 0
@@ -85,7 +85,7 @@ export class Replay {
     this.high = new Float32Array(this.walk.contacts).fill(-Infinity)
   }
 
-  /** The range of each f_n in the states up to a frame: going on costs one frame, back all. */
+  /** The range of each f_n in the states up to a frame: going forward costs one frame, going back all of them. */
   passed(frame) {
     const { contacts, normal } = this.walk
     if (frame < this.seen) this.forget()
@@ -99,7 +99,7 @@ export class Replay {
     }
   }
 
-  // What is told
+  // Text and numbers
 
   /** From the centre: |(1−t) a + t b|² = (1−t) a² + t b² − t (1−t) |a − b|². */
   get distance() {
@@ -128,7 +128,7 @@ export class Replay {
     return this.walk.residual[portion > 0.5 ? b : a]
   }
 
-  /** Where the position is, in words that follow the number of the network. */
+  /** The position in words, following the number of the network. */
   get place() {
     const { walk, frame } = this, [a, b, portion] = this.spot
     const name = (k) => (k ? `network ${walk.number[k]}` : "that as packed")
@@ -137,6 +137,6 @@ export class Replay {
     return frame ? `of ${walk.states}` : `of ${walk.states}, as packed`
   }
 
-  /** The number of the network, and where it is. */
+  /** The number of the network, and its position. */
   get title() { return this.swinging ? this.place : `network ${this.walk.number[this.frame]} ${this.place}` }
 }

@@ -1,4 +1,4 @@
-"""What is being computed, sent to one page's player as fast as its browser paints it."""
+"""Results in progress, sent to one page's player as fast as its browser paints them."""
 
 from functools import partial
 from typing import Any
@@ -10,15 +10,15 @@ from ...browser.panel_patches import together
 from ...state.app_state import AppState
 from ..player import Player
 
-TICK_MS = 40  # how often it is looked for something new
-AHEAD = 2  # messages that the browser may have got and not yet painted
+TICK_MS = 40  # interval of polling
+AHEAD = 2  # messages that the browser may have received but not yet painted
 
 
 class Stream:
-    """Sends what a page's `state.follow()` has to show to its player; nothing to hidden tabs."""
+    """Sends results of a page's `state.follow()` to its player, but not to hidden tabs."""
 
     def __init__(self, state: AppState, player: Player, document: Document | None = None) -> None:
-        """document: on which the time is kept; without one, call `tick` yourself."""
+        """document: provides the timer; without one, call `tick` yourself."""
         self.state, self.work, self.player = state, state.work, player
         self._document = document
         self._sent = self._painted = 0
@@ -30,7 +30,7 @@ class Stream:
         self._follow()
 
     def heard(self, message: Message) -> None:
-        """The browser tells that it draws anew, what it has painted, and whether it is seen."""
+        """The browser reports a redraw, painted messages, or whether it is visible."""
         if "anew" in message:
             self._sent = self._painted = 0
             if self.work.live is not None:
@@ -55,7 +55,7 @@ class Stream:
             self._ticking = None
 
     def tick(self) -> None:
-        """Send what is new, if the browser waits for it."""
+        """Send new results if the browser is ready for them."""
         following = self.state.follow()
         while following and self._awake and self._sent - self._painted < AHEAD:
             news = following.next()
@@ -69,4 +69,4 @@ class Stream:
             self._sent += 1
             self.player.tell(news | {"number": self._sent})
             if "states" in news:
-                self.work.fourfold = following.fourfold  # type: ignore[union-attr]  # no Arriving
+                self.work.fourfold = following.fourfold  # never Arriving here
