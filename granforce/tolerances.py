@@ -51,6 +51,10 @@ FLAT = 1e-12
 # Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
 INTERVAL_GAP = 1e-8
 
+# Bounds are in the wrong order if the least value exceeds the largest by more than this part of the
+# largest force: by rounding they may differ by a few INTERVAL_GAP.
+REVERSED = 1e-6
+
 # Feasibility tolerance of the linear and quadratic programs (forces in ⟨f_n⟩).
 PROGRAM = 1e-10
 

@@ -9,7 +9,8 @@ import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
 
-from granforce.records import InputError, moderate, refuse_hidden
+from granforce.records import InputError, float_array, moderate, real_array, refuse_hidden, whole
+from granforce.tolerances import REVERSED
 from granforce.types import Floats, Integers
 
 
@@ -67,23 +68,49 @@ def _alike(one: Floats, other: Floats) -> None:
         )
 
 
+def _bounds(low: Any, high: Any) -> tuple[Floats, Floats]:
+    """Smallest and largest values as arrays (N_c, 2); NaN where a bound is missing.
+
+    InputError for arrays of different shapes, and for the largest values given first.
+    """
+    _alike(low, high)
+    low, high = real_array(low, "the smallest values"), real_array(high, "the largest values")
+    if low.ndim != 2 or low.shape[1] != 2 or not low.size:
+        raise InputError(f"bounds must be two arrays (N_c, 2), low and high, got shape {low.shape}")
+    largest = max(np.nanmax(np.abs(both), initial=0.0) for both in (low, high))
+    if np.isinf(largest):
+        raise InputError("bounds must be finite; remove contacts without a bound")
+    if np.any(low - high > REVERSED * largest):
+        contact = int(np.argmax(np.nanmax(low - high, axis=1, initial=-np.inf)))
+        raise InputError(
+            f"the smallest value exceeds the largest on contact {contact} of the arrays; give low "
+            "before high"
+        )
+    return low, high
+
+
 def eta3(low: Floats, high: Floats) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
 
     low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact. Raises InputError if
-    their shapes differ.
+    their shapes differ, and where low exceeds high.
     """
-    _alike(low, high)
+    low, high = _bounds(low, high)
     return float((high - low).mean() / ((high + low) / 2).mean())
 
 
 def intervals_seen(states: Floats) -> tuple[Floats, Floats]:
     """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
-    return _some(states).min(axis=0), states.max(axis=0)
+    states = _some(states)
+    return states.min(axis=0), states.max(axis=0)
 
 
 def normal_extent(low: Floats, high: Floats) -> Floats:
-    """ΔF_n (N_c,), the length of the interval of f_n of each contact, from low, high (N_c, 2)."""
+    """ΔF_n (N_c,), the length of the interval of f_n of each contact, from low, high (N_c, 2).
+
+    Raises InputError as `eta3` does.
+    """
+    low, high = _bounds(low, high)
     return high[:, 0] - low[:, 0]
 
 
@@ -108,15 +135,23 @@ def correlation_range(states: Floats, extent: Floats) -> tuple[float, float]:
 
 
 def distances(states: Floats, centre: Floats) -> Floats:
-    """Distance |F − centre| of each of the states (S, N_c, 2) in force space, (S,)."""
+    """Distance |F − centre| of each of the states (S, N_c, 2) in force space, (S,).
+
+    centre (N_c, 2). Raises InputError for states and a centre of different numbers of contacts.
+    """
+    states = _some(states)
+    centre = float_array(centre, states.shape[1:], "centre")
     return np.sqrt(((states - centre) ** 2).sum(axis=(1, 2)))
 
 
 def principal_axes(states: Floats, count: int = 2) -> tuple[Floats, Floats]:
     """Directions along which states vary most: axes (count, N_c, 2), and their share of variance.
 
-    Axes have length 1 and a positive largest component; axes without variation are zero.
+    Axes have length 1 and a positive largest component; axes without variation are zero. Raises
+    InputError for a count below 1 or above the number of components 2 N_c.
     """
+    states = _some(states)
+    count = whole(count, "the number of axes", 1, states[0].size)
     flat = (states - mean_network(states)).reshape(len(states), -1)
     # States are usually fewer than components, so their Gram matrix is smaller.
     value, left = np.linalg.eigh(flat @ flat.T)
@@ -167,9 +202,12 @@ def growing(states: Floats) -> dict[str, Floats]:
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
     """Position of each f_n in its interval, from 0 (least) to 1 (largest); nan if ΔF_n = 0.
 
-    normal_forces (N_c,); low, high (N_c, 2).
+    normal_forces (N_c,); low, high (N_c, 2). Raises InputError as `eta3` does, and for another
+    number of forces.
     """
-    extent = normal_extent(low, high)
+    low, high = _bounds(low, high)
+    normal_forces = float_array(normal_forces, (len(low),), "normal forces")
+    extent = high[:, 0] - low[:, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(extent > 0, (normal_forces - low[:, 0]) / extent, np.nan)
 
@@ -181,9 +219,16 @@ def undetermined_clusters(
 
     i, j (N_c,) grains; extent (N_c, 2) lengths of the intervals of f_n and f_t; a contact is
     undetermined if one of them exceeds the tolerance. Returns the cluster of each contact (N_c,),
-    −1 for determined ones, and the number of contacts of each cluster, largest first.
+    −1 for determined ones, and the number of contacts of each cluster, largest first. Raises
+    InputError for arrays of different numbers of contacts.
     """
-    loose = np.asarray(extent).max(axis=1) > tolerance
+    extent = real_array(extent, "lengths of intervals")
+    if extent.shape != (len(i), 2) or len(i) != len(j):
+        raise InputError(
+            f"{len(i)} and {len(j)} grains and lengths of shape {extent.shape} are not of one list "
+            "of contacts: i and j must have shape (N_c,), lengths (N_c, 2)"
+        )
+    i, j, loose = np.asarray(i), np.asarray(j), extent.max(axis=1) > tolerance
     label = np.full(len(i), -1)
     if not loose.any():
         return label, np.zeros(0, dtype=int)

@@ -103,3 +103,46 @@ def test_position_in_the_interval():
     position = measures.position_in_interval(np.array([1.5, 1.0, 2.0]), low, high)
     assert position[:2].tolist() == [0.25, 1.0]
     assert np.isnan(position[2])
+
+
+def test_bounds_in_the_wrong_order_are_refused():
+    low, high = np.array([[1.0, -1.0], [0.0, 0.0]]), np.array([[3.0, 1.0], [2.0, 0.0]])
+    for call in (
+        lambda: measures.eta3(high, low),
+        lambda: measures.normal_extent(high, low),
+        lambda: measures.position_in_interval(low[:, 0], high, low),
+    ):
+        with pytest.raises(InputError, match="give low before high"):
+            call()
+    rounded = high + 1e-8  # of a determined force both bounds are one, to rounding
+    assert measures.eta3(rounded, high) == pytest.approx(0, abs=1e-6)
+    assert np.isnan(measures.eta3(low * [[np.nan, 1]], high))  # not all were computed
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda m, s: m.eta3(1.0, 2.0), "two arrays"),
+        (lambda m, s: m.eta3(s[:0, 0], s[:0, 0]), "two arrays"),
+        (lambda m, s: m.normal_extent(s, s), "two arrays"),
+        (lambda m, s: m.eta3(s[0], s[0] * np.inf), "finite"),
+        (lambda m, s: m.distances(s[0], s), "states must have shape"),
+        (lambda m, s: m.distances(s, s[0, 0]), "centre must have shape"),
+        (lambda m, s: m.position_in_interval(s[0, :2, 0], s[0], s[0]), "normal forces"),
+        (lambda m, s: m.principal_axes(s, -1), "number of axes must be at least 1"),
+        (lambda m, s: m.principal_axes(s, 10**9), "number of axes must be at most 10"),
+        (lambda m, s: m.principal_axes(s, 1.5), "whole number"),
+        (lambda m, s: m.undetermined_clusters([0, 1], [1, 2], s[0], 1e-6), "one list"),
+        (lambda m, s: m.undetermined_clusters([0, 1], [1, 2], s[0, :2, 0], 1e-6), "one list"),
+    ],
+)
+def test_arrays_of_other_shapes_are_refused_in_one_line(states, call, words):
+    with pytest.raises(InputError, match=words):
+        call(measures, states)
+
+
+def test_intervals_seen_in_lists_are_those_in_arrays(states):
+    for one, other in zip(
+        measures.intervals_seen(states.tolist()), measures.intervals_seen(states), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
