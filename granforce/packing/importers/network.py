@@ -105,16 +105,15 @@ def find(packing: Packing, **info: Any) -> Packing:
 
 
 @takes(Packing)
-def report(packing: Packing, ens: Ensemble | None = None) -> dict[str, Any]:
+def report(packing: Packing) -> dict[str, Any]:
     """Properties of a packing, as a dict of plain numbers (None if a quantity is undefined).
 
-    ens: the packing's ensemble if known. Lengths in largest radii, residual and violation of the
-    packing's own network in ⟨f_n⟩, mean normal force (over the backbone) and pressure in the
-    packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts,
+    Lengths are in largest radii, residual and violation of the packing's own network in ⟨f_n⟩, mean
+    normal force (over the backbone) and pressure in the packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts,
     undefined for soft disks (overlaps beyond RIGID_OVERLAP). Raises NotJammedError if no admissible
     network exists.
     """
-    ens = ensemble(packing) if ens is None else ens
+    ens = ensemble(packing)
     loaded = bool(packing.forces.any())
     verdict = judged(packing) if loaded else {"residual": None, "violation": None}
     closed = np.isfinite(packing.volume)
