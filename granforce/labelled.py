@@ -8,7 +8,9 @@ import pandas as pd
 import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.nearest import starting_network
 from granforce.records import InputError, Packing
+from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
 COMPONENTS = ["f_n", "f_t"]
@@ -193,7 +195,22 @@ def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers
         return result, np.arange(len(result.contacts.i))
     if not isinstance(ensemble, Ensemble):
         raise InputError("labels require the ensemble of the result: gf.to_dataset(result, S)")
+    _refuse_foreign(result, ensemble)
     return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
+
+
+def _refuse_foreign(result: Any, ensemble: Ensemble) -> None:
+    """InputError for a result that cannot be this ensemble's."""
+    kind = type(result).__name__
+    if hasattr(result, "contacts"):
+        ensemble.positions(result.contacts)
+    if kind in ("Walk", "Pull", "UniformSample"):
+        ensemble.refuse_foreign(result.states, result.residual, "the result")
+    if kind == "Intervals":
+        forces = starting_network(ensemble)[ensemble.positions(result.contacts)]
+        outside = np.maximum(result.low - forces, forces - result.high)
+        if np.nanmax(outside, initial=0.0) > AT_REST * ensemble.force_scale:
+            raise InputError("the result is of another ensemble: its own forces are outside")
 
 
 def _corners(dataset: xr.Dataset) -> pd.DataFrame:

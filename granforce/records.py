@@ -143,37 +143,50 @@ class Relaxation(NamedTuple):
     seconds: float  # wall time
 
 
-# The call that makes the first argument of a function.
+# The call that makes an argument of a function.
 _MADE_BY = {
+    "CriticalForce": "critical = gf.critical_force(S, contact)",
     "Ensemble": "S = gf.ensemble(packing)",
     "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
+    "Snapshots": "snapshots = gf.open_lammps(…), or gf.open_mercury(…)",
+    "UniformSample": "sample = gf.sample_uniform(S, 1000)",
+    "Walk": "done = gf.walk(S, 1000)",
 }
 
 
-def takes(kind: type) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """A decorator: the function raises InputError unless its first argument has this type.
 
-    The message names the call that makes such an object.
+    kinds: {argument: type} of other arguments, which may be None. The message names the call that
+    makes such an object.
     """
 
     def checked(function: Callable[P, T]) -> Callable[P, T]:
-        first = next(iter(inspect.signature(function).parameters))
+        signature = inspect.signature(function)
+        expected = ({} if kind is None else {next(iter(signature.parameters)): kind}) | kinds
 
         @functools.wraps(function)
         def inside(*arguments: P.args, **options: P.kwargs) -> T:
-            given = arguments[0] if arguments else options.get(first, function)
-            if given is not function and not isinstance(given, kind):
-                name, plain = kind.__name__, isinstance(given, (str, int, float))
-                raise InputError(
-                    f"{function.__name__} takes a record of type {name}, not "
-                    f"{brief(given) if plain else type(given).__name__}; make one first: "
-                    f"{_MADE_BY[name]}"
-                )
+            given = dict(zip(signature.parameters, arguments, strict=False)) | options
+            for name in expected.keys() & given.keys():
+                if given[name] is not None or name not in kinds:
+                    _check_kind(function.__name__, given[name], expected[name])
             return function(*arguments, **options)
 
         return inside
 
     return checked
+
+
+def _check_kind(function: str, given: Any, kind: type) -> None:
+    if isinstance(given, kind):
+        return
+    plain = isinstance(given, (str, int, float))
+    raise InputError(
+        f"{function} takes a record of type {kind.__name__}, not "
+        f"{brief(given) if plain else type(given).__name__}; make one first: "
+        f"{_MADE_BY[kind.__name__]}"
+    )
 
 
 def refuse_hidden(values: T, name: str) -> T:

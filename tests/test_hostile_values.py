@@ -55,7 +55,7 @@ def of(S):
     return [
         (gf.response, (c,), {"critical": gf.critical_force(S, c)}),
         (gf.walk, (4, 0), {"begun": gf.walk(S, 3, 0)}),
-        (gf.sample_uniform, (16,), {"previous": sample}),
+        (gf.sample_uniform, (16, 2, 0), {"previous": sample}),
         (gf.informative, (1,), {"sample": sample, "check": 0}),
     ]
 
@@ -75,6 +75,69 @@ def test_a_critical_force_of_another_contact_is_refused(S):
     assert gf.response(S, d, critical=critical).contact == d
     with pytest.raises(InputError, match=f"contact {d}, not of {c}"):
         gf.response(S, c, critical=critical)
+
+
+def test_results_with_other_arguments_are_not_continued(S):
+    walk, sample = gf.walk(S, 3, 0), gf.sample_uniform(S, 8, 2, 0)
+    for wrong in ({"seed": 1}, {"seed": 0, "relax": gf.gauss_seidel, "rest": None}):
+        with pytest.raises(InputError, match="give the same arguments"):
+            gf.walk(S, 4, begun=walk, **wrong)
+    right = {"chains": 2, "seed": 0, "method": "billiard"}
+    for wrong in ({"chains": 4}, {"seed": 1}, {"method": "hit_and_run"}):
+        with pytest.raises(InputError, match=f"drawn with {next(iter(wrong))} = "):
+            gf.sample_uniform(S, 16, previous=sample, **right | wrong)
+
+
+def test_walks_of_one_point_and_of_no_states_are_continued(S):
+    point = gf.ensemble(gf.scene("groove", 0.0))
+    again = gf.walk(point, 5, 0, begun=gf.walk(point, 3, 0))
+    assert point.dimension == 0 and again.counts["skipped"] == 5
+    none = gf.walk(S, 3, 0, whole=False, max_attempts=1, tolerance=1e-300)
+    assert not len(none.states)
+    np.testing.assert_array_equal(gf.walk(S, 3, 0, begun=none).states, gf.walk(S, 3, 0).states)
+
+
+def test_records_of_another_kind_are_named(S, tmp_path):
+    walk, sample, c = gf.walk(S, 3, 0), gf.sample_uniform(S, 8, 2, 0), S.index[0]
+    for call, kind in (
+        (lambda: gf.walk(S, 4, 0, begun=sample), "Walk, not UniformSample"),
+        (lambda: gf.sample_uniform(S, 9, 2, 0, previous=walk), "UniformSample, not Walk"),
+        (lambda: gf.informative(S, sample=walk), "UniformSample, not Walk"),
+        (lambda: gf.response(S, c, critical=walk), "CriticalForce, not Walk"),
+        (lambda: gf.evolution(tmp_path / "s.zarr", [1, 2]), "Snapshots, not list"),
+        (lambda: gf.infer_series(tmp_path / "s.zarr", ["a.txt"], mu=0.3), "frames_of"),
+    ):
+        with pytest.raises(InputError, match=kind):
+            call()
+
+
+def test_conditions_beside_an_ensemble_are_refused(S):
+    c = S.index[0]
+    for call in (
+        lambda: gf.critical_force(S, c, mu=0.1),
+        lambda: gf.response(S, c, mu=0.1),
+        lambda: gf.rest(S, mu=0.1),
+        lambda: gf.rest(S, prescribed="stress"),
+    ):
+        with pytest.raises(InputError, match="an ensemble has its own"):
+            call()
+
+
+def test_limit_loads_of_other_contacts_are_refused(S):
+    contacts = S.index[:3]
+    loads = gf.limit_loads(S, contacts)
+    assert len(set(np.round(loads, 6))) > 1
+    gf.critical_forces(S, contacts, limit_loads=loads)
+    with pytest.raises(InputError, match=r"the limit load of contact \d+ is"):
+        gf.critical_forces(S, contacts, limit_loads=0.1 * loads)
+
+
+def test_labels_of_another_ensemble_are_refused(S):
+    other = gf.ensemble(packed(12, 0.3, seed=3))
+    bounds = gf.intervals(S)
+    assert gf.to_dataset(bounds, S).sizes["contact"] == len(S.index)
+    with pytest.raises(InputError, match="of another ensemble"):
+        gf.to_dataset(bounds, other)
 
 
 def test_networks_of_another_packing_are_refused_by_every_method(S, others):

@@ -33,7 +33,7 @@ class Informative(NamedTuple):
         return notebook.table("Which measurement next", lines)
 
 
-@takes(Ensemble)
+@takes(Ensemble, sample=UniformSample)
 @cancelling.cancellable
 def informative(
     ensemble: Ensemble,

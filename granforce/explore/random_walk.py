@@ -29,7 +29,7 @@ from granforce.records import (
 from granforce.records import whole as whole_number
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
-from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED
 from granforce.types import Cancel, Floats, Integers, Progress
 
 # Number of chains from which a thread vectorises them: eight lanes cost as much as three chains.
@@ -88,7 +88,7 @@ def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
     return "accepted" if admitted else "rejected"
 
 
-@takes(Ensemble)
+@takes(Ensemble, begun=Walk)
 @cancelling.cancellable
 def walk(
     ensemble: Ensemble,
@@ -114,15 +114,16 @@ def walk(
     threads, each of which vectorises many chains. Neither changes the states of a chain. relax,
     options: the relaxation and its options. max_attempts: per chain, by default 20 per state.
     whole: whether fewer states than requested are an error; otherwise there may be fewer, or none.
-    begun: a Walk of one chain with the same arguments and fewer states, which is continued.
+    begun: a Walk of one chain with the same arguments and fewer states, which is continued; its
+    last state is computed again and must agree.
     enough(): called after each state of a single chain; True ends it with the states so far.
     progress(done, total); watch(Found) receives each state as it is accepted, from the worker
     thread; neither changes the result. cancel() returning True raises Cancelled.
 
     If S is a single point (h = 0), every state is that point and no relaxation is done, unless skip
     is False: sweeps end at a small residual, not exactly at that point. Raises InputError for sizes
-    below 1, and for several chains with `begun` or `enough`; NotJammedError if max_attempts yield
-    too few states of a whole walk.
+    below 1, for several chains with `begun` or `enough`, and if `begun` has other arguments;
+    NotJammedError if max_attempts yield too few states of a whole walk.
     """
     states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)
@@ -139,15 +140,17 @@ def walk(
         _Chain(ensemble, k, states // chains + (k < states % chains), own, max_attempts, whole)
         for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
     ]
-    if begun is not None:
-        ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
-        all_chains[0].go_on(begun, watch)
 
     def tell() -> None:
         if progress is not None:
             progress(sum(chain.counts["accepted"] for chain in all_chains), states)
 
-    if ensemble.dimension == 0 and skip:
+    point = ensemble.dimension == 0 and skip
+    if begun is not None:
+        ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
+    if begun is not None and len(begun.states) and not point:
+        all_chains[0].go_on(begun, lambda start: relax(ensemble, start, **options), watch)
+    if point:
         for chain in all_chains:
             chain.stay()
     else:
@@ -265,18 +268,30 @@ class _Chain:
         ended = not self.whole and sum(self.counts.values()) >= self.limit
         return ended or self.ended or self.counts["accepted"] == len(self.walk.states)
 
-    def go_on(self, begun: Walk, watch: Callable[[Found], object] | None) -> None:
+    def go_on(
+        self,
+        begun: Walk,
+        relaxed: Callable[[Floats], Relaxation],
+        watch: Callable[[Found], object] | None,
+    ) -> None:
         """Continue from the states of an earlier walk, at its place in the random stream."""
-        tried = int(begun.attempts.sum())
-        if len(begun.states) > len(self.walk.states) or tried != sum(begun.counts.values()):
+        tried, count = int(begun.attempts.sum()), len(begun.states)
+        if count > len(self.walk.states) or tried != sum(begun.counts.values()):
             raise InputError("the walk to continue has more states, or ended between two")
+        for _ in range(tried - 1):  # each attempt drew so many numbers
+            self.rng.uniform(size=self.forces.shape)
+        if count > 1:
+            self.forces = begun.states[-2]
+        again = relaxed(self.kicked()).forces
+        if not np.abs(again - begun.states[-1]).max() <= AT_REST * self.ensemble.force_scale:
+            raise InputError(
+                "the walk to continue was made with another seed, relaxation or ensemble: its last "
+                "state is another one; give the same arguments"
+            )
         self.counts.update(begun.counts)
-        count = len(begun.states)
         self.walk.states[:count], self.walk.residual[:count] = begun.states, begun.residual
         self.walk.violation[:count], self.walk.sweeps[:count] = begun.violation, begun.sweeps
         self.walk.attempts[:count] = begun.attempts
-        for _ in range(tried):  # each attempt drew so many numbers
-            self.rng.uniform(size=self.forces.shape)
         self.forces = begun.states[-1]
         if watch is not None:
             for k in range(len(begun.states)):

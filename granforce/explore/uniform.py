@@ -22,7 +22,17 @@ from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
-from granforce.records import Cancelled, choice, positive, random_seed, takes, whole, worker_count
+from granforce.records import (
+    Cancelled,
+    InputError,
+    brief,
+    choice,
+    positive,
+    random_seed,
+    takes,
+    whole,
+    worker_count,
+)
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
@@ -200,7 +210,7 @@ def _chords(made: Walls, ends: list[ChainState]) -> Flown:
     return ends, slacks[:, None], np.zeros((len(ends), 2), dtype=int)
 
 
-@takes(Ensemble)
+@takes(Ensemble, previous=UniformSample)
 @cancelling.cancellable
 def sample_uniform(
     ensemble: Ensemble,
@@ -222,11 +232,11 @@ def sample_uniform(
     tail, of every component): more states are drawn, up to MOST_STATES times the larger of both
     numbers, until it is reached; ``reached`` says whether it was. method: "billiard", or
     "hit_and_run", a slow independent check. previous: a UniformSample of this ensemble to continue,
-    with its chains and method. progress(done, total) counts states; cancel() → True ends early with
-    the states so far, or raises Cancelled before sampling has begun.
+    drawn with the same chains, seed and method. progress(done, total) counts states; cancel() →
+    True ends early with the states so far, or raises Cancelled before sampling has begun.
 
-    If S is one point (h = 0), every state is that point. Raises InputError for sizes below 1 or
-    unbounded forces, NotJammedError if S is empty.
+    If S is one point (h = 0), every state is that point. Raises InputError for sizes below 1,
+    unbounded forces, and another sample than asked for to continue; NotJammedError if S is empty.
     """
     states, chains = whole(states, "states", 1), whole(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)
@@ -239,6 +249,7 @@ def sample_uniform(
         sample, stores = _start(ensemble, chains, seed, method, workers)
     else:
         ensemble.refuse_foreign(previous.states, previous.residual, "the sample to continue")
+        _check_same(previous, chains, seed, method)
         sample, stores = previous, stores_for(previous.walls, len(previous.ends), workers)
     most = MOST_STATES * max(states, effective or 0)
     while True:
@@ -252,6 +263,22 @@ def sample_uniform(
             return sample._replace(reached=bool(good), counts=counts)
         growth = 1.1 * (effective or 0.0) / max(sample.effective, 1.0)
         states = int(min(most, int(done * min(2.0, max(1.1, growth))) + 1))
+
+
+def _check_same(previous: UniformSample, chains: int, seed: int, method: str) -> None:
+    """InputError unless a sample was drawn with these arguments."""
+    streams: Any = previous.ends[0].rng.bit_generator.seed_seq
+    drawn = {
+        "chains": (len(previous.ends), chains),
+        "seed": (streams.entropy, seed),
+        "method": (previous.method, method),
+    }
+    for name, (had, asked) in drawn.items():
+        if had != asked:
+            raise InputError(
+                f"the sample to continue was drawn with {name} = {brief(had)}, not {brief(asked)}; "
+                "give the same arguments"
+            )
 
 
 def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:

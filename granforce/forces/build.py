@@ -7,7 +7,7 @@ other contacts; both are counted.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +73,19 @@ def ensemble(
     pruned = _pruned(full, conditions)
     _check_idle_and_known(pruned, bounds)
     return pruned
+
+
+def ensemble_at(packing: Packing | Ensemble, **conditions: Any) -> Ensemble:
+    """The Ensemble itself, or that of a Packing under these conditions, as for `ensemble`.
+
+    Raises InputError for conditions beside an Ensemble, which has its own.
+    """
+    if not isinstance(packing, Ensemble):
+        return ensemble(packing, **conditions)
+    given = [name for name, value in conditions.items() if value is not None]
+    if given:
+        raise InputError(f"an ensemble has its own {given[0]}: leave it out, or give the packing")
+    return packing
 
 
 class _Conditions(NamedTuple):

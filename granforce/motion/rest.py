@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce import notebook
-from granforce.forces.build import ensemble
+from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
 from granforce.motion.flow import Outcome, Push
@@ -56,11 +56,12 @@ def rest(
 
     packing: a Packing with forces, of any origin, or its Ensemble. noise: standard deviations of
     the normal noise on every component, in ⟨f_n⟩; draws: number of draws of each, from seed.
-    conditions: as for `ensemble`. cancel() returning True raises Cancelled.
+    conditions: of a Packing, as for `ensemble`. cancel() returning True raises Cancelled.
 
-    Raises NotJammedError if S is empty, InputError if the packing has no forces.
+    Raises NotJammedError if S is empty, InputError if the packing has no forces, and for conditions
+    with an Ensemble.
     """
-    S = packing if isinstance(packing, Ensemble) else ensemble(packing, **conditions)
+    S = ensemble_at(packing, **conditions)
     draws = whole(draws, "draws", least=1)
     if not S.original.any():
         raise InputError("the packing has no forces to check for rest")

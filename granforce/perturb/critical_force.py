@@ -22,7 +22,7 @@ import numpy as np
 
 from granforce import notebook
 from granforce.explore.intervals import limit_load_bounds
-from granforce.forces.build import ensemble
+from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.motion import flow
@@ -123,13 +123,14 @@ def critical_force(
 ) -> CriticalForce:
     """F_crit of one contact (its number in the packing) with its bracket.
 
-    packing: a Packing, or its Ensemble. mu: friction coefficient, by default the packing's.
+    packing: a Packing, or its Ensemble. mu: friction coefficient for a Packing, by default its own.
     limit_load: force, computed if not given. protocol: fields of Protocol. cancel() returning True
     raises Cancelled.
 
-    Raises InputError for a contact without force in any state of S.
+    Raises InputError for a contact without force in any state of S, for mu with an Ensemble, and if
+    the search ends at a given limit load that is below the exact one.
     """
-    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    S = ensemble_at(packing, mu=mu)
     loads = None if limit_load is None else [limit_load]
     (found,) = critical_forces(S, [contact], limit_loads=loads, **protocol)
     return found
@@ -153,7 +154,8 @@ def critical_forces(
     number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
     ends. Other options and errors as for `critical_force`.
 
-    Raises UndecidedError if a limit load cannot be certified, or is given as NaN.
+    Raises UndecidedError if a limit load cannot be certified, or is given as NaN; InputError if the
+    search ends at a given limit load that is below the exact one.
     """
     S, protocol = ensemble, Protocol(**protocol)
     precision = positive(
@@ -169,6 +171,7 @@ def critical_forces(
         limit_loads = real_array(limit_loads, "limit loads")
         if limit_loads.shape != positions.shape or np.any(limit_loads < 0):
             raise InputError(f"give one limit load ≥ 0 for each of the {len(positions)} contacts")
+    given = limit_loads is not None
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # cancelling leaves limit loads uncomputed
@@ -192,7 +195,24 @@ def critical_forces(
             finished(k, critical)
 
     follow(step, works, ended, workers)
+    if given:
+        _check_limits(S, list(found.values()), precision, workers)
     return [found[k] for k in range(len(works))]
+
+
+def _check_limits(
+    S: Ensemble, found: Sequence[CriticalForce], precision: float, workers: int
+) -> None:
+    """InputError if a search ended at a limit load that lies below the exact one."""
+    ended = {one.contact: one for one in found if one.moving is None}
+    exact = limit_load_bounds(S, list(ended), workers=workers)
+    for number, load in zip(exact.contacts, exact.load, strict=True):
+        one = ended[int(number)]
+        if load - one.limit_load > precision * S.force_scale:
+            raise InputError(
+                f"the limit load of contact {number} is {load:.9g}, not {one.limit_load:.9g}; omit "
+                "it to have it computed"
+            )
 
 
 def _raised(
@@ -276,6 +296,7 @@ def _relaxed(asked: Push, counts: dict[str, float]) -> Asking[Outcome]:
     return outcome
 
 
+@takes(critical=CriticalForce)
 @cancelling.cancellable
 def response(
     packing: Packing | Ensemble,
@@ -297,7 +318,7 @@ def response(
 
     Raises InputError if the grains come to rest under this load.
     """
-    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    S = ensemble_at(packing, mu=mu)
     precision = positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
     position, scale = S.position(contact), S.force_scale
     if critical is None:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, takes
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, get
 from granforce.study.scan import run
@@ -37,6 +37,7 @@ SCALARS = {
 _FORCES = {"forces": "of the simulation", "low": "least in S", "high": "largest in S"}
 
 
+@takes(snapshots=Snapshots)
 def evolution(
     path: str | Path,
     snapshots: Snapshots,

@@ -23,7 +23,7 @@ from granforce.experiment.remeasured import remeasured
 from granforce.experiment.repair import KINDS
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
-from granforce.records import InputError, friction, positive, random_seed, whole
+from granforce.records import InputError, brief, friction, positive, random_seed, whole
 from granforce.study import entries
 from granforce.study.cells import Kind, StudyCell, get
 from granforce.study.keys import Parameters
@@ -164,6 +164,7 @@ def infer_series(
     path: str | Path,
     frames: Sequence[Frame],
     *,
+    mu: Any,
     workers: int = 2,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -172,14 +173,17 @@ def infer_series(
     """All frames inferred into the store at path, or loaded from it: (dataset, failed).
 
     frames: from `frames_of`. workers: processes; scheduler: address of a dask scheduler to use
-    instead. progress(done, total) counts frames. options: mu, states (draws for each frame, at
-    least 2, or 0 for no error bars), seed and unmeasured as for `infer`, others as for `read_pegs`.
-    The dataset has a row for each frame; failed: (frame, message) of frames that failed, which are
-    not in the dataset.
+    instead. progress(done, total) counts frames. options: states (draws for each frame, at least 2,
+    or 0 for no error bars), seed and unmeasured as for `infer`, others as for `read_pegs`. The
+    dataset has a row for each frame; failed: (frame, message) of frames that failed, which are not
+    in the dataset.
 
-    Raises InputError if the store cannot be written.
+    Raises InputError if the store cannot be written, and for frames of another kind.
     """
-    cells = [StudyCell(FRAME, parameters(frame, **options)) for frame in frames]
+    for frame in frames:
+        if not isinstance(frame, Frame):
+            raise InputError(f"frames must be those of `frames_of`, got {brief(frame)}")
+    cells = [StudyCell(FRAME, parameters(frame, mu=mu, **options)) for frame in frames]
     failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)
     lost = {id(cell): message for cell, message in failed}
     store = open_store(path)

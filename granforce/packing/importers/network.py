@@ -109,9 +109,9 @@ def report(packing: Packing) -> dict[str, Any]:
     """Properties of a packing, as a dict of plain numbers (None if a quantity is undefined).
 
     Lengths are in largest radii, residual and violation of the packing's own network in ⟨f_n⟩, mean
-    normal force (over the backbone) and pressure in the packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts,
-    undefined for soft disks (overlaps beyond RIGID_OVERLAP). Raises NotJammedError if no admissible
-    network exists.
+    normal force (over the backbone) and pressure in the packing's units. largest_contact_gap and
+    least_other_gap: the `margin` of its contacts, undefined for soft disks (overlaps beyond
+    RIGID_OVERLAP). Raises NotJammedError if no admissible network exists.
     """
     ens = ensemble(packing)
     loaded = bool(packing.forces.any())
