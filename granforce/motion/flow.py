@@ -50,7 +50,8 @@ LONGEST, SHORTEST = 1e7, 1e-2
 NEWTON, HALVINGS = 12, 8
 # Fraction by which a full Newton step must reduce the squared unbalance.
 DECREASE = 0.1
-# Error of velocities relative to the fastest; contacts convert it into forces τ times as large.
+# Error of velocities relative to the fastest, which contacts turn into forces τ times as large, and
+# of balance relative to the load, which is large where overlaps are closed.
 ROUNDING = 1e-14
 # Steady motion: remaining violation of Coulomb's law, relative to the fastest contact.
 STEADY = 1e-7
@@ -286,7 +287,7 @@ def _search(step, flows, lanes):
             if settled[lane]:
                 continue
             whole = flows.length[0, lane] == 1.0
-            if whole and flows.changed[0, lane] == 0.0 and _is_solved(flows, lane):
+            if whole and flows.changed[0, lane] == 0.0 and _is_solved(step, flows, lane):
                 flows.found[lane] = SOLVED
             elif flows.least[0, lane] < _wanted(flows, lane):
                 flows.found[lane] = FELL
@@ -306,14 +307,16 @@ def _wanted(flows, lane):
 
 
 @within
-def _is_solved(flows, lane):
-    """Whether only rounding of the velocities is left."""
-    fastest, rows, border = 0.0, flows.velocity.rows, flows.velocity.border
-    for k in range(len(rows)):
-        fastest = max(fastest, abs(rows[k, lane]))
-    for k in range(len(border)):
-        fastest = max(fastest, abs(border[k, lane]))
-    left = BALANCED / 10 + ROUNDING * flows.pace[0, lane] * fastest
+def _is_solved(step, flows, lane):
+    """Whether rounding of the velocities and of the load, and no more, is left."""
+    fastest, loaded, velocity, b = 0.0, 0.0, flows.velocity, flows.load
+    for k in range(len(step.mass)):
+        fastest = max(fastest, abs(velocity.rows[k, lane]))
+        loaded += b.rows[k, lane] ** 2 / step.mass[k]
+    for k in range(len(step.mass_border)):
+        fastest = max(fastest, abs(velocity.border[k, lane]))
+        loaded += b.border[k, lane] ** 2 / step.mass_border[k]
+    left = BALANCED / 10 + ROUNDING * (flows.pace[0, lane] * fastest + np.sqrt(loaded))
     return flows.least[0, lane] <= left**2
 
 

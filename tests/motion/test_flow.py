@@ -1,0 +1,23 @@
+"""The exact step of contact dynamics, as a flow."""
+
+import numpy as np
+import pytest
+
+from granforce.forces.build import ensemble
+from granforce.motion.flow import STEADY, Push
+from granforce.motion.inertia import make_step
+from granforce.motion.works import relax
+from granforce.packing.compaction import pack
+
+N = 60
+
+
+@pytest.mark.parametrize("times", [1.0, 1e3, 1e6])
+def test_the_size_of_the_load_does_not_decide_whether_a_step_is_solved(times):
+    """Gaps of 10⁻⁶ close under any load: what is left unbalanced is measured against the load."""
+    S = ensemble(pack(N, 0.0, 1))
+    step, forces = make_step(S), times * S.original / S.force_scale
+    gap = 1e-6 * np.random.default_rng(0).standard_normal(len(forces))
+    step = step._replace(b=times * step.b, b_border=times * step.b_border, closing=gap)
+    outcome = relax(step, Push(forces, 0, 0.0, 60, STEADY))
+    assert outcome.converged and outcome.iterations < 60
