@@ -298,7 +298,7 @@ def add_scheduler(command: argparse._ActionsContainer) -> None:
         type=str,
         metavar="ADDRESS",
         help="run on the workers of this dask scheduler, such as tcp://head:8786, instead of "
-        "local processes; workers must see the same store",
+        "local processes; workers must see the same store; ends after 10 minutes without a worker",
     )
 
 

@@ -34,8 +34,8 @@ from granforce.study.store import open_store
 from granforce.system.terminal import one_line
 from granforce.types import Progress
 
-# Time between two queries of dask, and time without workers before a message, s.
-LOOK, WORKERLESS = 0.2, 5.0
+# Time between two queries of dask, and time without workers before a message and before an end, s.
+LOOK, WORKERLESS, GIVEN_UP = 0.2, 5.0, 600.0
 
 CELL_BYTES = 2000  # of memory, per cell that is not yet computed
 
@@ -329,9 +329,10 @@ def _over_dask(
                     dead = isinstance(future.exception(), KilledWorker)
                     finished(waiting.pop(future), _lost if dead else future.result)
                 try:
-                    workers.count(client.nthreads())
+                    present = client.nthreads()
                 except OSError:
                     raise gone from None
+                workers.count(present)
                 time.sleep(LOOK)
         except BaseException:
             client.cancel(list(waiting))
@@ -359,21 +360,28 @@ def _without_tracebacks() -> Iterator[None]:
 
 
 class _Workers:
-    """Reports, once each time, that a scheduler has been without workers for some seconds."""
+    """Reports, once each time, that a scheduler has no workers, and ends after GIVEN_UP."""
 
     def __init__(self, scheduler: str) -> None:
         self._scheduler = scheduler
         self._since, self._told = time.monotonic(), False
 
     def count(self, workers: Collection[Any]) -> None:
-        """Update with its present workers."""
+        """Update with its present workers; InputError after GIVEN_UP without any."""
         if workers:
             self._since, self._told = time.monotonic(), False
-        elif not self._told and time.monotonic() >= self._since + WORKERLESS:
+            return
+        missed, minutes = time.monotonic() - self._since, f"{GIVEN_UP / 60:g} minutes"
+        if missed >= GIVEN_UP:
+            raise InputError(
+                f"the dask scheduler {self._scheduler} had no worker for {minutes}: start one with "
+                f"dask worker {self._scheduler}; finished entries are saved"
+            )
+        if missed >= WORKERLESS and not self._told:
             self._told = True
             warnings.warn(
-                f"no worker at the dask scheduler {self._scheduler}: waiting for one to come "
-                "(Ctrl-C ends)",
+                f"no worker at the dask scheduler {self._scheduler}: waiting up to {minutes} for "
+                "one (Ctrl-C ends)",
                 stacklevel=2,
             )
 

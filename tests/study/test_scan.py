@@ -350,6 +350,12 @@ def test_each_time_without_workers_is_told_once(monkeypatch):
         workers.count(())
 
 
+def test_a_scheduler_that_stays_without_workers_is_given_up(tmp_path, monkeypatch, empty_cluster):
+    monkeypatch.setattr(scan, "GIVEN_UP", 0)
+    with pytest.raises(InputError, match=r"had no worker for .*start one with dask worker tcp:"):
+        scan.run(tmp_path / "s", small_cells()[:1], scheduler=empty_cluster.scheduler_address)
+
+
 def test_what_is_no_scheduler_is_one_line(tmp_path):
     """What an HTTP server answers, dask takes for the size of a message that no memory holds."""
     pytest.importorskip("dask.distributed")
