@@ -19,10 +19,10 @@ def page() -> Any:
     mend_late_views(document)
     answer_with_lock()
     query = (pn.state.location.search if pn.state.location else "") or ""
-    asked = small_scenes.asked(query)
-    if learns(query) or asked.scene != small_scenes.MANY:
+    request = small_scenes.request_of(query)
+    if learns(query) or request.scene != small_scenes.MANY:
         return learn_page(document, query)
-    return explore_page(document, asked.query)
+    return explore_page(document, request.query)
 
 
 def learns(query: str) -> bool:

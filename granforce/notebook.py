@@ -39,20 +39,20 @@ def _short(record: Any) -> str:
     fields = getattr(record, "_fields", None) or [
         name for name in record.__dataclass_fields__ if not name.startswith("_")
     ]
-    said = []
+    parts = []
     for name in fields:
         value = getattr(record, name)
         if isinstance(value, np.ndarray):
-            said.append(f"{name}{list(value.shape)}")
+            parts.append(f"{name}{list(value.shape)}")
         elif value is None or isinstance(value, (bool, str)):
-            said.append(
+            parts.append(
                 f"{name}={str(value)[:40]!r}" if isinstance(value, str) else f"{name}={value}"
             )
         elif isinstance(value, (int, float, np.number)):
-            said.append(f"{name}={value:.6g}")
+            parts.append(f"{name}={value:.6g}")
         else:
-            said.append(f"{name}: {type(value).__name__}")
-    return f"{type(record).__name__}({', '.join(said)})"
+            parts.append(f"{name}: {type(value).__name__}")
+    return f"{type(record).__name__}({', '.join(parts)})"
 
 
 def table(title: str, lines: Mapping[str, Any]) -> str:

@@ -275,7 +275,7 @@ class Job:
                     "command)"
                 )
         except BaseException as error:  # reported on the page, where it would otherwise be lost
-            self.error = told(error)
+            self.error = error_line(error)
         self._end()
 
     def _end(self) -> None:
@@ -289,7 +289,7 @@ class Job:
             _log.exception("the end of a job could not be reported")
 
 
-def told(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """An error in one line for the page."""
     line = " ".join(str(error).split())[:LONGEST_LINE]
     if isinstance(error, InputError):
@@ -328,7 +328,7 @@ class Task(param.Parameterized):
         **params: Any,
     ) -> None:
         """wake(function): call a function soon on the page's thread; without it, call `poll`."""
-        super().__init__(**params)  # param has no type hints
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param has no type hints
         self._pool, self._wake, self._visitor = pool, wake, visitor
         self.job: Job | None = None  # the running job
         self._done: Callable[[Any], object] | None = None
@@ -377,7 +377,7 @@ class Task(param.Parameterized):
                     done(job.result)
                 except Exception as error:
                     _log.exception("a result could not be shown")
-                    self.message = told(error)
+                    self.message = error_line(error)
 
     def cancel(self) -> None:
         """Request the end of the job; its result is dropped."""

@@ -32,12 +32,12 @@ class Limits(NamedTuple):
         """Whether the server is for others than its owner."""
         return self.seconds is not None
 
-    def check(self, **asked: Any) -> None:
+    def check(self, **values: Any) -> None:
         """InputError if a number is outside its limits, or radii differ by more than SIZE_RATIO.
 
-        asked: any of NAMES.
+        values: any of NAMES.
         """
-        for name, value in asked.items():
+        for name, value in values.items():
             if name == "radii":
                 _check_radii(value)
                 continue
@@ -47,7 +47,7 @@ class Limits(NamedTuple):
             most = getattr(self, name) if most is None else most
             if not least <= value <= most:  # also refuses NaN
                 raise InputError(
-                    f"{words} must lie between {least:g} and {most}, got {_told(value)}"
+                    f"{words} must lie between {least:g} and {most}, got {_plain(value)}"
                 )
 
 
@@ -93,7 +93,7 @@ def _check_radii(text: Any) -> None:
         )
 
 
-def _told(number: float) -> str:
+def _plain(number: float) -> str:
     """A number as people write it: 1e+09, not 1000000000.0."""
     return f"{number:g}" if isinstance(number, float) else _short(number)
 

@@ -88,7 +88,7 @@ class Scripted(JSComponent):
         cls._stylesheets = [SHARED, path.with_suffix(".css").read_text()]
 
     def __init__(self, **params: Any) -> None:
-        super().__init__(**params)  # param has no type hints
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param has no type hints
 
     def _get_properties(self, doc: Document | None) -> dict[str, Any]:
         properties = super()._get_properties(doc)

@@ -11,7 +11,7 @@ from bokeh.models import CustomJS
 from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
-from panel.util import edit_readonly  # not exported by panel
+from panel.util import edit_readonly  # type: ignore[attr-defined]  # not exported by panel
 
 # Fetch and run Material UI as soon as possible, not after the page's contents: saves 0.13 s. Its
 # address must be the one that Panel requests, or it would run twice. On navigation the old page
@@ -69,7 +69,7 @@ def answer_with_lock() -> None:
     """Handle browser events while holding Bokeh's lock, as Panel does for changes of parameters."""
     # Panel handles them without the lock while earlier changes are still queued; Bokeh, through
     # which plots are changed, then refuses, and the whole change is lost.
-    Syncable._event_coroutine.lock = True  # the attribute acts as a mark
+    Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # the attribute acts as a mark
 
 
 def send_what_waits(document: Document) -> None:

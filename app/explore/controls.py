@@ -170,20 +170,20 @@ class Controls:
         state = self.state
         if state.selection is None:
             return
-        asked, packing = state.selection, state.selection.packing
+        selection, packing = state.selection, state.selection.packing
         self._following = True
-        self.mu.param.update(stored=[cell.mu for cell in state.cells()], mu=asked.mu)
-        if not asked.imported:
+        self.mu.param.update(stored=[cell.mu for cell in state.cells()], mu=selection.mu)
+        if not selection.imported:
             self.n.value, self.seed.value = packing["n"], packing["seed"]
         known = state.cell is not None and state.cell.selection.packing == packing
-        if asked.imported and known:
+        if selection.imported and known:
             self.n.value = state.replay.summary["n"]
-        self.n.param.update(disabled=asked.imported, visible=known or not asked.imported)
-        self.seed.visible = self.packed.visible = not asked.imported
-        self.packed.value = SAME if asked.same_mu else f"{packing['mu']:g}"
-        self.states.value = asked.states
-        self.kind.value, self.relax.value = asked.kind, asked.relax
-        self.relax.visible = asked.kind == "walk"
+        self.n.param.update(disabled=selection.imported, visible=known or not selection.imported)
+        self.seed.visible = self.packed.visible = not selection.imported
+        self.packed.value = SAME if selection.same_mu else f"{packing['mu']:g}"
+        self.states.value = selection.states
+        self.kind.value, self.relax.value = selection.kind, selection.relax
+        self.relax.visible = selection.kind == "walk"
         self.series.param.update(**offered(state))
         self._following = False
         self._rest()

@@ -12,23 +12,23 @@ from ..widgets.hints import term
 QUESTION = "What am I seeing? Why more than one force network?"
 
 
-def told(replay: Replay) -> str:
+def summary_html(replay: Replay) -> str:
     """What the picture shows, and why there is more than one network, as HTML."""
     summary = replay.summary
     n, free = summary["n"], summary["dimension"]
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
-        said = f"No number is free: there is just one {term('network', 'force network')}."
-        said += " Choose μ > 0 to see more." if summary["mu"] == 0 else ""
+        text = f"No number is free: there is just one {term('network', 'force network')}."
+        text += " Choose μ > 0 to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can vary."
-        said = (
+        text = (
             "Lines are the forces between touching disks: the thicker, the stronger. Balance "
             f"leaves {term('h', f'{free} numbers')} free, so infinitely many sets of forces hold "
             f"the same disks in place. Play goes through some such {term('network', 'networks')}, "
             "sampled at random: alternatives, not moments in time."
         )
-    return f"<h2>{found}</h2><p>{said}</p>"
+    return f"<h2>{found}</h2><p>{text}</p>"
 
 
 def rest(replay: Replay) -> str:
@@ -97,7 +97,7 @@ def follow(state: AppState, header: Header) -> None:
 
     def tell(*events: Any) -> None:
         if state.replay is not None:
-            header.help = told(state.replay) + rest(state.replay)
+            header.help = summary_html(state.replay) + rest(state.replay)
 
     state.param.watch(tell, "replay")
     tell()

@@ -43,8 +43,8 @@ class Sampling(NamedTuple):
 
     def __str__(self) -> str:
         mixed = f"<b>{term('r_hat', self.verdict)}</b>: {self.mixing}"
-        told = mixed if self.verdict else self.mixing
-        return ", ".join(filter(None, (self.sampler, self.networks, told)))
+        value = mixed if self.verdict else self.mixing
+        return ", ".join(filter(None, (self.sampler, self.networks, value)))
 
 
 def measures(state: AppState) -> list[Quantity]:

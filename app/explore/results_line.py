@@ -43,16 +43,18 @@ def tables(state: AppState, volume: Volume) -> str:
     """All numbers as HTML, and what they leave out."""
     known = " under what is held" if state.knowledge.known else ""
     measures = result_values.measures(state)
-    told = result_values.sampling(state)
+    sampling = result_values.sampling(state)
     seen = f"seen in {state.replay.summary['states']} networks"
-    if told and told.verdict:
-        seen += f", {term('r_hat', told.verdict)}"
+    if sampling and sampling.verdict:
+        seen += f", {term('r_hat', sampling.verdict)}"
     rows = [[seen, *_values(measures, "seen")]]
     if any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume.found)
     values = [one.exact or (MEASURE if volume.offered else "–") for one in packing]
-    doubt = f'<p class="flag" role="note">⚠ {told.doubt}</p>' if told and told.doubt else ""
+    doubt = (
+        f'<p class="flag" role="note">⚠ {sampling.doubt}</p>' if sampling and sampling.doubt else ""
+    )
     left = f'<p class="left">{left_out(state.replay.summary)}</p>'
     return (
         _table(["How undetermined", *_titles(measures)], rows)

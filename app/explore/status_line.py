@@ -51,10 +51,10 @@ class StatusLine(Progress):
         self._tell()
 
     def _tell(self, *events: Any) -> None:
-        told = list(facts(self._state))
+        lines = list(facts(self._state))
         if self._rest is not None and self._rest[0] == self._state.cell:
-            told.append("at rest: certified" if self._rest[1] else "at rest: not certified")
-        self.facts = told
+            lines.append("at rest: certified" if self._rest[1] else "at rest: not certified")
+        self.facts = lines
 
     def _fail(self, *events: Any) -> None:
         self.failed = self._state.work.message

@@ -24,19 +24,19 @@ KEYS = [
 
 def learn_page(document: Document, query: str) -> Any:
     """The page for an address of Learn: chapters, or with `scene` the workbench."""
-    asked = small_scenes.asked(query)
+    request = small_scenes.request_of(query)
     wake, visitor = visit.turns(document), visit.visitor(document)
     given = parse_qs(query.lstrip("?"), keep_blank_values=True)
     alone = given.get("embed") == ["1"]
-    header = None if alone else Header(door="learn", dark=asked.dark, keys=KEYS)
+    header = None if alone else Header(door="learn", dark=request.dark, keys=KEYS)
     if "learn" in given:
         packings = pn.state.as_cached("packings of the lesson", partial(Packings, visit.library()))
-        view: Any = Lesson(packings, wake, visitor, dark=asked.dark, alone=alone)
+        view: Any = Lesson(packings, wake, visitor, dark=request.dark, alone=alone)
         visit.at_end(view.close)
     else:
         task = Task(computing, wake, visitor)
-        view = Workbench(asked, task, dark=asked.dark)
+        view = Workbench(request, task, dark=request.dark)
         visit.at_end(task.close)
     if header is not None:
         header.link(view, dark="dark")
-    return framed(header, [view], dark=asked.dark)
+    return framed(header, [view], dark=request.dark)

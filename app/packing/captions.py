@@ -39,10 +39,10 @@ def origin(cell: Cell) -> str:
 def known_words(state: AppState) -> Iterator[str]:
     """The known forces as a line of a caption, or nothing."""
     number = state.replay.backbone
-    told = [one.words(number[one.contact]) for one in state.knowledge.known]
-    if told:
-        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
-        yield f"Known: {'; '.join(told[:NAMED])}{more}."
+    statements = [one.words(number[one.contact]) for one in state.knowledge.known]
+    if statements:
+        more = f" and {len(statements) - NAMED} more" if len(statements) > NAMED else ""
+        yield f"Known: {'; '.join(statements[:NAMED])}{more}."
 
 
 def stem(selection: Selection) -> str:

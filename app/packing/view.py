@@ -204,10 +204,10 @@ def normal_extent(replay: Replay, exact: Bounds) -> Any:
     return replay.high[:, 0] - replay.low[:, 0]
 
 
-def full_extent(replay: Replay, exact: Bounds, asked: float | None = None) -> float:
+def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> float:
     """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested."""
-    if asked is not None:
-        return asked
+    if chosen is not None:
+        return chosen
     extent = normal_extent(replay, exact)
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
@@ -262,9 +262,9 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
-    told = colour_words(looks, pulled)
+    meaning = colour_words(looks, pulled)
     if pulled and looks.tab == "perturb" and not state.hand.pulls:
-        told = "change by the push"
+        meaning = "change by the push"
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
     return LEGEND.format(
         width=_chosen(state, "thickness", WIDTHS),
@@ -273,7 +273,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=told if pulled else _chosen(state, "colour", COLOURS),
+        colour=meaning if pulled else _chosen(state, "colour", COLOURS),
         bar=bar,
         full="" if looks.full is None else f"{looks.full:g}",
         full_least=full_least,

@@ -53,7 +53,7 @@ def states(library: Library, selection: Selection) -> Work:
             if cell is None:
                 _make_packing(job, library, selection.packing)
                 job.begin("finding the contacts that carry force")
-                with _told_of_friction(selection):
+                with _naming_friction(selection):
                     dataset, _ = study.get(
                         library.own,
                         kind,
@@ -92,7 +92,7 @@ def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) ->
 
 
 @contextmanager
-def _told_of_friction(selection: Selection) -> Iterator[None]:
+def _naming_friction(selection: Selection) -> Iterator[None]:
     """If no forces balance, name a friction smaller than that of the packing as the cause."""
     try:
         yield

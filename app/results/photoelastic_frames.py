@@ -99,8 +99,8 @@ def infer(
 
 def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame:
     """The Frame of a dataset of `series.infer_frame`."""
-    told = json.loads(dataset.attrs["account"])
-    report, walls = told["report"], len(told["walls"])
+    account = json.loads(dataset.attrs["account"])
+    report, walls = account["report"], len(account["walls"])
     unit, count = report["mean_measured_normal_force"], dataset.sizes["grain"] - walls
     of = {name: dataset[name].values for name in dataset.data_vars}
     i, j = of["contact_i"], of["contact_j"]
@@ -111,9 +111,9 @@ def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame
     certain &= of["inferred"][:, 0] > CERTAIN * of["standard_error"][:, 0]
     order = np.argsort(-of["inferred"][:, 0], kind="stable")
     left_open, at_wall = np.zeros((2, count + walls), dtype=bool)
-    left_open[told["left_open"]] = True
-    at_wall[told["at_wall"]] = True
-    mended = [one for one in told["findings"] if KINDS[one["kind"]][2]]
+    left_open[account["left_open"]] = True
+    at_wall[account["at_wall"]] = True
+    mended = [one for one in account["findings"] if KINDS[one["kind"]][2]]
     places = np.array([[one["x"], one["y"]] for one in mended]).reshape(-1, 2)
     pressure = np.abs(of["regional_stress"][:, :2].mean()) or 1.0
     return Frame(
@@ -170,8 +170,8 @@ def table(frame: Frame) -> bytes:
     ]
     for k, (values, errors) in enumerate(zip(frame.stress, frame.stress_error, strict=True)):
         parts = zip(("xx", "yy", "xy"), values, errors, strict=True)
-        told = (f"{part} {value:.4g} ± {error:.2g}" for part, value, error in parts)
-        head.append(f"region {k}: {', '.join(told)}")
+        stresses = (f"{part} {value:.4g} ± {error:.2g}" for part, value, error in parts)
+        head.append(f"region {k}: {', '.join(stresses)}")
     return files.csv(columns, "".join(f"# {line}\n" for line in head))
 
 

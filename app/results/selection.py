@@ -103,26 +103,26 @@ class Selection(NamedTuple):
         return _plain(self) == _plain(other)
 
 
-def differing(asked: Selection, shown: Selection | None) -> str:
+def differing(wanted: Selection, shown: Selection | None) -> str:
     """The differences of a Selection from another one (None: everything), in words."""
-    if shown is None or asked.imported or shown.imported:
-        return f"the packing at μ = {asked.mu:g}" if asked.imported else f"μ = {asked.mu:g}"
+    if shown is None or wanted.imported or shown.imported:
+        return f"the packing at μ = {wanted.mu:g}" if wanted.imported else f"μ = {wanted.mu:g}"
     words, other = [], shown.packing
-    if asked.mu != shown.mu:
-        words.append(f"μ = {asked.mu:g}")
-    if asked.packing["n"] != other["n"]:
-        words.append(f"N = {asked.packing['n']}")
-    if asked.packing["seed"] != other["seed"]:
-        words.append(f"seed {asked.packing['seed']}")
-    if not asked.same_mu and asked.packing["mu"] != other["mu"]:
-        words.append(f"packed at μ = {asked.packing['mu']:g}")
-    if asked.kind != shown.kind:
-        words.append(f"states {KINDS[asked.kind]}" if asked.kind == "uniform" else KINDS["walk"])
-    if asked.states != shown.states:
-        words.append(f"{asked.states} states")
-    if asked.kind == shown.kind == "walk" and asked.relax != shown.relax:
-        words.append(SOLVERS[asked.relax])
-    return ", ".join(words) or f"μ = {asked.mu:g}"
+    if wanted.mu != shown.mu:
+        words.append(f"μ = {wanted.mu:g}")
+    if wanted.packing["n"] != other["n"]:
+        words.append(f"N = {wanted.packing['n']}")
+    if wanted.packing["seed"] != other["seed"]:
+        words.append(f"seed {wanted.packing['seed']}")
+    if not wanted.same_mu and wanted.packing["mu"] != other["mu"]:
+        words.append(f"packed at μ = {wanted.packing['mu']:g}")
+    if wanted.kind != shown.kind:
+        words.append(f"states {KINDS[wanted.kind]}" if wanted.kind == "uniform" else KINDS["walk"])
+    if wanted.states != shown.states:
+        words.append(f"{wanted.states} states")
+    if wanted.kind == shown.kind == "walk" and wanted.relax != shown.relax:
+        words.append(SOLVERS[wanted.relax])
+    return ", ".join(words) or f"μ = {wanted.mu:g}"
 
 
 def _plain(selection: Selection) -> Selection:

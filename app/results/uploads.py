@@ -211,7 +211,7 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
     return work
 
 
-def told(report: dict[str, Any]) -> list[tuple[str, str]]:
+def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The report as rows (name, value) of texts for the page."""
     known = ((label, report[name], form, unit) for label, name, form, unit in _ROWS)
     rows = [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]

@@ -63,7 +63,7 @@ class AppState(param.Parameterized):
 
         query: of the address that opened the page; None: show nothing yet.
         """
-        super().__init__()  # param has no type hints
+        super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.library, self.work = library, Work(wake, visitor)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
         # A refusal is shown until the next action; watched before the parts that may refuse.
@@ -92,12 +92,12 @@ class AppState(param.Parameterized):
     def open(self, query: str = "") -> None:
         """Show the selection of a link, computing it if necessary, or a good one to begin with."""
         try:
-            wanted, told = read_link(query)
+            wanted, texts = read_link(query)
             self.work.message = ""
         except InputError as error:
-            wanted, told = None, {}
+            wanted, texts = None, {}
             self.work.message = str(error)
-        view = read_view(told, self._viewed)
+        view = read_view(texts, self._viewed)
         self.looks.dark = view.get("dark", self.looks.dark)  # before anything is visible
         self._look_up(
             wanted, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
@@ -219,16 +219,18 @@ class AppState(param.Parameterized):
 
         def done(found: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = found
-            message, asked = damage or self.work.message, meant(cells)
+            message, selection = damage or self.work.message, meant(cells)
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
-            there = shown is not None and (asked is None or shown.cell.selection.names(asked))
+            there = shown is not None and (
+                selection is None or shown.cell.selection.names(selection)
+            )
             # The old view stays until the requested states exist; Cancel returns to it.
             if shown is not None and (there or self.cell is None):
                 self._show(shown, view)
-            if asked is not None and not there:
-                dear = LIMITS.shared and asked.dear
-                self._ask(asked, at_once=not dear)
+            if selection is not None and not there:
+                dear = LIMITS.shared and selection.dear
+                self._ask(selection, at_once=not dear)
                 if dear and self.missing:
                     self.work.message = (
                         "this link needs a long computation, which a link does not start on this "
@@ -280,8 +282,8 @@ class AppState(param.Parameterized):
         if cell is None:
             return ""
         shipped = cell.store is self.library.shipped
-        told = brief(cell.selection, cell.series)
-        return f"μ = {cell.mu:g}, {told} ({PRECOMPUTED if shipped else COMPUTED})"
+        label = brief(cell.selection, cell.series)
+        return f"μ = {cell.mu:g}, {label} ({PRECOMPUTED if shipped else COMPUTED})"
 
     def _is_grown(self, replay: Replay) -> bool:
         """Whether a Replay is the final version of the growing walk on screen."""
@@ -291,18 +293,18 @@ class AppState(param.Parameterized):
 
     def compute(self) -> None:
         """Compute the selected states in the background, and show them as they are found."""
-        asked = self.selection
-        if asked is None or self.work.computes(asked):
+        selection = self.selection
+        if selection is None or self.work.computes(selection):
             return
         self.work.message = ""
         try:
-            asked.parameters()
+            selection.parameters()
         except InputError as error:
             self.work.message = str(error)
             return
         with as_one(self.work, self):
             self.seen = self.replay
-            self.work.compute(self.library, asked, self._computed)
+            self.work.compute(self.library, selection, self._computed)
 
     def _computed(self, shown: Shown) -> None:
         """Show states that were just computed, then their exact intervals if they are quick."""
@@ -343,9 +345,9 @@ class AppState(param.Parameterized):
 
     def grow(self, replay: Replay) -> None:
         """Show the Replay of a walk that begins."""
-        asked = self.work.live.selection
-        told = brief(asked, self.library.series(asked))
-        source = f"μ = {asked.mu:g}, {told} (as they are sampled)"
+        selection = self.work.live.selection
+        label = brief(selection, self.library.series(selection))
+        source = f"μ = {selection.mu:g}, {label} (as they are sampled)"
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
             self.param.update(seen=replay, plane=None, source=source, displacement=None)
@@ -405,10 +407,10 @@ class AppState(param.Parameterized):
     @property
     def command(self) -> str:
         """The commands that compute the requested states, and intervals given the known forces."""
-        made, told = command(self.selection), self.knowledge.known
-        if told and self.replay is not None and not self.missing:
-            made += "\n" + known.commands(self.selection, self.replay, told)
-        return made
+        lines, statements = command(self.selection), self.knowledge.known
+        if statements and self.replay is not None and not self.missing:
+            lines += "\n" + known.commands(self.selection, self.replay, statements)
+        return lines
 
     def link(self) -> str:
         """The query of an address that reopens this view."""
@@ -418,8 +420,10 @@ class AppState(param.Parameterized):
         if view["beside"] == self.selection.mu:
             # Between the choice of another μ and its states, the old comparison is still on screen.
             view["beside"] = None
-        told = {name: value for name, value in view.items() if value != self._viewed[name].default}
-        return link(self.selection, spelled(told, self.numbers))
+        changed = {
+            name: value for name, value in view.items() if value != self._viewed[name].default
+        }
+        return link(self.selection, spelled(changed, self.numbers))
 
     @property
     def numbers(self) -> Numbers | None:

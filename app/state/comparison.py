@@ -23,7 +23,7 @@ class Beside(param.Parameterized):
     twin = param.Parameter(doc="the Shown of that μ, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # param has no type hints
+        super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.looks, self.task = state, state.looks, state.work.task()
         state.param.watch(self._follow, ["cell", "missing"])
         self.looks.param.watch(self._follow, ["split", "beside"])

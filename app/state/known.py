@@ -142,7 +142,7 @@ class Knowledge(param.Parameterized):
     ranked = param.Parameter(doc="the Ranked contacts to measure next, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # param has no type hints
+        super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.work = state, state.work
         self.task, self.ranking = self.work.task(told=False), self.work.task()
         self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
@@ -244,9 +244,9 @@ class Knowledge(param.Parameterized):
 
     def _follow(self, *events: Any) -> None:
         """Update intervals for the known forces; statements belong to one packing."""
-        (before, told), replay = self._followed, self.state.replay
+        (before, statements), replay = self._followed, self.state.replay
         self._followed = replay, tuple(self.known)
-        if before is replay and told == tuple(self.known):
+        if before is replay and statements == tuple(self.known):
             return  # both changed at once
         self.ranked = None
         self.ranking.cancel()

@@ -29,7 +29,7 @@ class Work(param.Parameterized):
         visitor: Visitor | None = None,
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task."""
-        super().__init__()  # param has no type hints
+        super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self._wake, self._visitor = wake, visitor
         self.tasks: list[Task] = []
         self._ahead: list[Job] = []

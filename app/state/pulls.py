@@ -65,7 +65,7 @@ class Hand(param.Parameterized):
     held = param.Parameter(doc="the Held that pulls have led to, or None")
 
     def __init__(self, state: Any) -> None:
-        super().__init__()  # param has no type hints
+        super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.work, self._task = state, state.work, state.work.task(reading)
         self.tell: Callable[[Message], object] = lambda message: None
         self._made: list[tuple[Pull, Held]] = []  # one for each pull
@@ -151,16 +151,16 @@ class Hand(param.Parameterized):
         replay, cell, frame = state.replay, state.cell, state.looks.frame
         if replay is None or cell is None:
             return
-        told = tuple(state.knowledge.known)
-        base = cell.name, frame, told
+        statements = tuple(state.knowledge.known)
+        base = cell.name, frame, statements
         made = self._made if self._base == base else []
         first = Held(_forces(replay, frame), float(replay.residual[frame]))
         library = state.library
 
         def work(job: Job) -> tuple[Any, ...]:
-            ours = puller_of(library, cell, known.rows(replay, told))
+            ours = puller_of(library, cell, known.rows(replay, statements))
             pulled = partial(_pulled, library, cell, replay, ours)
-            held, refusal = _networks(pulled, _held(told), made, pulls, first)
+            held, refusal = _networks(pulled, _held(statements), made, pulls, first)
             ready: Iterator[Message] = iter(())
             if grabbed is not None and not refusal:
                 last = held[-1][1] if held else first
@@ -203,9 +203,9 @@ def _forces(replay: Replay, frame: int) -> Floats:
     return np.stack([replay.normal[frame], replay.tangential[frame]], axis=1).astype(np.float64)
 
 
-def _held(told: Iterable[known.Statement]) -> dict[int, float]:
+def _held(statements: Iterable[known.Statement]) -> dict[int, float]:
     """{contact: f_n} of exactly held forces."""
-    return {one.contact: one.value for one in told if not one.error}
+    return {one.contact: one.value for one in statements if not one.error}
 
 
 def _networks(

@@ -32,18 +32,18 @@ class Progress(Scripted):
             task.param.watch(self._follow, [*FOLLOWED, "stage", "seconds_left"])
 
     @property
-    def _told(self) -> Task:
+    def _shown(self) -> Task:
         """The task to show."""
         return next((task for task in self._tasks if task.running), self._tasks[0])
 
     def _heard(self, message: Message) -> None:
         if "cancel" in message:
-            self._told.dismiss()
+            self._shown.dismiss()
         if "stop" in message:
-            self._told.stop()
+            self._shown.stop()
 
     def _follow(self, *events: Any) -> None:
-        task = self._told
+        task = self._shown
         left = task.seconds_left
         words = task.stage + ("" if left is None else f" — about {_duration(left)} more")
         followed = {name: getattr(task, name) for name in FOLLOWED}

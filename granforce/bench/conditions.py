@@ -87,8 +87,8 @@ def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
     common = {"task": task, "programs": found.low.size + found.high.size}
     return [
-        common | _told("granforce", ours, theirs) | {"gap": found.max_gap},
-        common | _told("HiGHS", theirs, theirs) | {"off": float(outside.max())},
+        common | _times("granforce", ours, theirs) | {"gap": found.max_gap},
+        common | _times("HiGHS", theirs, theirs) | {"off": float(outside.max())},
     ]
 
 
@@ -96,13 +96,13 @@ def _pulls(S: Ensemble, contacts: Integers, repeats: int) -> list[dict[str, Any]
     note("knowledge: pulls")
     found = intervals(S, contacts)
     ends = zip(contacts, found.low[:, 0], found.high[:, 0], strict=True)
-    asked = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
+    targets = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
 
     def ours() -> Floats:
-        return np.concatenate([pull(S, c, values, S.original).states for c, values in asked])
+        return np.concatenate([pull(S, c, values, S.original).states for c, values in targets])
 
     def theirs() -> Floats:
-        return np.array([_pulled_by_piqp(S, c, v) for c, values in asked for v in values])
+        return np.array([_pulled_by_piqp(S, c, v) for c, values in targets for v in values])
 
     def squares(states: Floats) -> Floats:
         return np.sum((states - S.original) ** 2, axis=(1, 2))
@@ -165,11 +165,11 @@ def _beside(
     for k, (name, times, forces) in enumerate(
         (("granforce", taken, found[0]), ("PIQP", taken_by, beside[0]))
     ):
-        row = {"task": task, "programs": len(forces), **_told(name, min(times), min(taken_by))}
+        row = {"task": task, "programs": len(forces), **_times(name, min(times), min(taken_by))}
         errors = {"off": off, "residual": float(np.max(S.residual(forces)))}
         rows.append(row | errors | {"above": float(above[k])})
     return rows
 
 
-def _told(method: str, seconds: float, baseline: float) -> dict[str, Any]:
+def _times(method: str, seconds: float, baseline: float) -> dict[str, Any]:
     return {"method": method, "seconds": seconds, "ratio": baseline / seconds}

@@ -107,8 +107,8 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
                 rows["cobra FVA"] = _timed(cobra_loop, system, data)
         plain = rows["plain loop"]["seconds"]
         for method, row in rows.items():
-            told = {"packing": name, "method": method, "seconds": row["seconds"]}
-            found.append(told | {"ratio": plain / row["seconds"]} | row)
+            timing = {"packing": name, "method": method, "seconds": row["seconds"]}
+            found.append(timing | {"ratio": plain / row["seconds"]} | row)
     return found
 
 

@@ -90,9 +90,9 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
     )
     off = np.abs(true - drawn.forces)[inner] / np.maximum(drawn.error[inner], 1e-9 * unit)
     row["cover"] = np.mean(off < 1)
-    said = inner & ~listed & (drawn.forces[:, 0] > 2 * drawn.error[:, 0])
-    row["said_to_carry"] = int(said.sum())
-    row["carry"] = np.mean(true[said, 0] > 0) if said.any() else np.nan
+    reported = inner & ~listed & (drawn.forces[:, 0] > 2 * drawn.error[:, 0])
+    row["said_to_carry"] = int(reported.sum())
+    row["carry"] = np.mean(true[reported, 0] > 0) if reported.any() else np.nan
     row["chi"] = drawn.chi_square / max(drawn.freedom, 1)
     return row | _spoilt(S, m, s, here, unit, seed)
 
@@ -118,6 +118,6 @@ def _spoilt(
     chosen = rng.choice(np.flatnonzero(here), _SPOILT, replace=False)
     m = m.copy()
     m[chosen, 0] += _BY * unit
-    told = remeasured(S, m, s, states=2, chains=1, unmeasured=2.0).suspects
-    right = np.isin(told, S.index[chosen])
-    return {"suspected": right.sum() / _SPOILT, "told": right.mean() if len(told) else np.nan}
+    reported = remeasured(S, m, s, states=2, chains=1, unmeasured=2.0).suspects
+    right = np.isin(reported, S.index[chosen])
+    return {"suspected": right.sum() / _SPOILT, "told": right.mean() if len(reported) else np.nan}

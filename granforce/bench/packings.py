@@ -75,8 +75,8 @@ def _keys(kept: Sequence[dict[str, float]]) -> Iterable[str]:
 
 
 def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
-    told = "".join(f", {name} {value:g}" for name, value in options.items())
-    note(f"compaction: N = {n}, μ = {mu:g}{told}")
+    settings = "".join(f", {name} {value:g}" for name, value in options.items())
+    note(f"compaction: N = {n}, μ = {mu:g}{settings}")
     made = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
     kept = [one for one in made if one]
     row = {"n": n, "mu": mu, "seeds": seeds, "failed": len(made) - len(kept)}

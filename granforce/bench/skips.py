@@ -66,8 +66,8 @@ def _tangential(packing: Packing) -> dict[str, Any]:
     S = ensemble(packing)
     few = _seconds(lambda: intervals(S, S.index[:2]))
     every = _seconds(lambda: intervals(without, without.index[:2]))
-    told = "tangential unknowns and torque rows at μ = 0, four bounds"
-    return _row(told, S.skipped["tangential_unknowns"], few, every)
+    what = "tangential unknowns and torque rows at μ = 0, four bounds"
+    return _row(what, S.skipped["tangential_unknowns"], few, every)
 
 
 def _finish(S: Ensemble) -> dict[str, Any]:
@@ -77,8 +77,8 @@ def _finish(S: Ensemble) -> dict[str, Any]:
     long = gauss_seidel(S, start, tolerance=1e-6, rest=None)
     few = _seconds(lambda: gauss_seidel(S, start, tolerance=1e-6), 3)
     every = _seconds(lambda: gauss_seidel(S, start, tolerance=1e-6, rest=None), 3)
-    told = "Gauss–Seidel sweeps after 1e-3, one relaxation"
-    return _row(told, long.iterations - short.iterations, few, every)
+    what = "Gauss–Seidel sweeps after 1e-3, one relaxation"
+    return _row(what, long.iterations - short.iterations, few, every)
 
 
 def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:

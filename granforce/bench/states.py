@@ -182,8 +182,8 @@ def intervals(
         seconds, exact = timed(exact_intervals, S, workers=2)
         row = {"n": n, "mu": mu}
         eta3, extent = _extents(S, exact.low, exact.high)
-        told = {"eta3": eta3, "mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}
-        rows.append({**row, "method": "exact", "states": 0, "seconds": seconds, **told})
+        measured = {"eta3": eta3, "mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}
+        rows.append({**row, "method": "exact", "states": 0, "seconds": seconds, **measured})
         for name in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
             note(f"intervals: N = {n}, μ = {mu:g}, {name}")
             rows += [

@@ -149,9 +149,9 @@ def found(
         *outputs,
     )
     with Bar(kind.title, kind.unit) as progress:
-        told = {"workers": arguments.workers, "progress": progress, **(options or {})}
-        told |= {} if watching is None else {"watch": watching(progress)}
-        dataset, cached = study.get(store, kind, parameters, **told)
+        keywords = {"workers": arguments.workers, "progress": progress, **(options or {})}
+        keywords |= {} if watching is None else {"watch": watching(progress)}
+        dataset, cached = study.get(store, kind, parameters, **keywords)
     ends = {"seconds": dataset["seconds"].item(), "cached": cached}
     return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, ends)
 
@@ -169,11 +169,11 @@ def telling_eta(bar: Any) -> Callable[[Any], None]:
 
 def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
     """The conditions in the options, as parameters of kinds."""
-    asked = {
+    chosen = {
         "prescribed": arguments.prescribe,
         "stress": numbers("--stress", arguments.stress, float),
     }
-    return asked | known_forces(arguments)
+    return chosen | known_forces(arguments)
 
 
 def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -96,10 +96,12 @@ def add_series(command: Parser) -> None:
         if action.dest == "out":  # a folder for all snapshots
             action.metavar = "FILE.{npz,zarr}"
     series = command.options.keys() - others - {"frames"}
-    command.leaves_out("without --frames", lambda asked: asked.frames is None, series)
-    command.leaves_out("with --frames", lambda asked: asked.frames is not None, {"frame"})
+    command.leaves_out("without --frames", lambda arguments: arguments.frames is None, series)
+    command.leaves_out("with --frames", lambda arguments: arguments.frames is not None, {"frame"})
     command.leaves_out(
-        "without --states", lambda asked: asked.frames and not asked.states, {"walk_seed"}
+        "without --states",
+        lambda arguments: arguments.frames and not arguments.states,
+        {"walk_seed"},
     )
 
 
@@ -184,7 +186,7 @@ def add_any_packing(command: Parser) -> None:
     others = set(command.options)
     add_packing(command)
     own = command.options.keys() - others
-    command.leaves_out("with --packing", lambda asked: asked.packing is not None, own)
+    command.leaves_out("with --packing", lambda arguments: arguments.packing is not None, own)
 
 
 def add_conditions(command: Parser, known: bool = True) -> None:
@@ -289,7 +291,7 @@ def add_out(command: argparse._ActionsContainer, what: str) -> None:
 def add_states_out(command: Parser) -> None:
     add_out(command, "the states")
     add_unit(command)
-    command.leaves_out("without --out", lambda asked: asked.out is None, {"unit"})
+    command.leaves_out("without --out", lambda arguments: arguments.out is None, {"unit"})
 
 
 def add_scheduler(command: argparse._ActionsContainer) -> None:
@@ -377,4 +379,4 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         help="measured force of the grains on a wall of a box (left, right, bottom, top), such "
         "as from a load cell; may be given several times",
     )
-    command.leaves_out("with --strict", lambda asked: asked.strict, {"repair"})
+    command.leaves_out("with --strict", lambda arguments: arguments.strict, {"repair"})

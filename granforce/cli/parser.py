@@ -43,12 +43,12 @@ def _main(argv: Sequence[str] | None) -> int:
         try:
             return _run(arguments, parser)
         except KeyboardInterrupt:
-            return _told_interrupted()
+            return _report_interrupt()
         except streams.OutputError:
             raise
         except Exception:
             if interrupts.interrupted():  # raised by a library because of Ctrl-C
-                return _told_interrupted()
+                return _report_interrupt()
             raise
         finally:
             warnings.formatwarning = usual
@@ -89,7 +89,7 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
     except MemoryError as error:
         return refused(f"not enough memory: {str(error) or 'ask for less'}")
     except Cancelled:
-        return _told_interrupted()
+        return _report_interrupt()
 
 
 def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
@@ -111,7 +111,7 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
         raise InputError(strange)
 
 
-def _told_interrupted() -> int:
+def _report_interrupt() -> int:
     print("granforce: interrupted; finished entries are saved", file=sys.stderr)
     return 130
 

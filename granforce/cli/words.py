@@ -55,7 +55,7 @@ def add_pack(commands: Commands) -> None:
         "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
     )
     made = command.options.keys() - {"scene", "mu", "out", "json"}
-    command.leaves_out("with --scene", lambda asked: asked.scene is not None, made)
+    command.leaves_out("with --scene", lambda arguments: arguments.scene is not None, made)
 
 
 def add_walk(commands: Commands) -> None:
@@ -197,10 +197,14 @@ def add_infer(commands: Commands) -> None:
     add_flaws_and_walls(command, series)
     add_scheduler(command)
     many = command.options.keys() - single - {"frames"} | {"files"}
-    command.leaves_out("without --frames", lambda asked: asked.frames is None, many)
-    command.leaves_out("with --frames", lambda asked: asked.frames is not None, single - shared)
+    command.leaves_out("without --frames", lambda arguments: arguments.frames is None, many)
     command.leaves_out(
-        "with --states 0", lambda asked: asked.states == 0, {"sample_seed", "chains", "again"}
+        "with --frames", lambda arguments: arguments.frames is not None, single - shared
+    )
+    command.leaves_out(
+        "with --states 0",
+        lambda arguments: arguments.states == 0,
+        {"sample_seed", "chains", "again"},
     )
 
 
@@ -262,7 +266,7 @@ def add_scan(commands: Commands) -> None:
     command.add_argument("--keep", type=int, help="store only this many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
     add_scheduler(command)
-    command.leaves_out("with --out", lambda asked: asked.out is not None, {"cache"})
+    command.leaves_out("with --out", lambda arguments: arguments.out is not None, {"cache"})
 
 
 def add_figures(commands: Commands) -> None:
@@ -349,12 +353,12 @@ def add_study(commands: Commands) -> None:
     add_scheduler(command)
     computing = {"minutes", "workers", "scheduler"}
     drawing = {"table", "reduce", "documents", "formats"}
-    command.leaves_out("with --status", lambda asked: asked.status, computing | drawing)
+    command.leaves_out("with --status", lambda arguments: arguments.status, computing | drawing)
     reducing = computing | {"paper", "parts"}
-    command.leaves_out("with --reduce", lambda asked: asked.reduce is not None, reducing)
+    command.leaves_out("with --reduce", lambda arguments: arguments.reduce is not None, reducing)
     command.leaves_out(
         "with --table alone",
-        lambda asked: asked.table is not None and asked.reduce is None,
+        lambda arguments: arguments.table is not None and arguments.reduce is None,
         reducing | sized | {"quick"},
     )
 
@@ -432,8 +436,8 @@ def add_perturb(commands: Commands) -> None:
     add_conditions(command, known=False)
     add_store(command)
     drawn = {"random", "draw_seed"}
-    command.leaves_out("with --all", lambda asked: asked.all, drawn)
-    command.leaves_out("with --contacts", lambda asked: asked.contacts is not None, drawn)
+    command.leaves_out("with --all", lambda arguments: arguments.all, drawn)
+    command.leaves_out("with --contacts", lambda arguments: arguments.contacts is not None, drawn)
 
 
 def add_app(commands: Commands) -> None:
@@ -569,7 +573,7 @@ def add_import(commands: Commands) -> None:
     )
     table.leaves_out(
         "with a table of contacts and no walls",
-        lambda asked: asked.contacts is not None and asked.walls is None,
+        lambda arguments: arguments.contacts is not None and arguments.walls is None,
         {"tolerance"},
     )
     pegs = import_format(
@@ -625,7 +629,7 @@ def add_cache(commands: Commands) -> None:
     command.add_argument("action", choices=["list", "size", "clear", "verify", "path"])
     command.add_argument("--kind", type=str, help="only entries of this kind (packing, walk, …)")
     add_store(command)
-    command.leaves_out("with path", lambda asked: asked.action == "path", {"kind"})
+    command.leaves_out("with path", lambda arguments: arguments.action == "path", {"kind"})
 
 
 # In the order of the help text.

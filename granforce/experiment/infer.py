@@ -136,17 +136,17 @@ def infer(
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
-    m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers)
+    m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers)
     draws = None
     if numbers[0]:
         # In ⟨f_n⟩, so that χ² = Σ W (f − m)².
         m, s = m / ensemble.force_scale, s / ensemble.force_scale
         weight = np.where(np.isnan(m), unmeasured, s) ** -2.0
         draws = _draws(ensemble, weight, np.nan_to_num(m), numbers, seed, progress)
-    return told(Inference, ensemble, best, draws, begin)
+    return inference_of(Inference, ensemble, best, draws, begin)
 
 
-def asked(
+def arguments_of(
     ensemble: Ensemble,
     measured: npt.ArrayLike,
     sigma: npt.ArrayLike,
@@ -162,7 +162,7 @@ def asked(
     return m, s, likeliest(ensemble, m, s, unmeasured), (draws, chains, workers)
 
 
-def told(
+def inference_of(
     kind: type[Kind], ensemble: Ensemble, best: Likeliest, draws: Draws | None, begin: float
 ) -> Kind:
     """The Inference (or a subclass) with a likeliest network, draws, and elapsed time."""

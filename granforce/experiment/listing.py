@@ -184,7 +184,7 @@ def read_frames(
         _columns(source, wanted, {name: given[name] for name in wanted if name in given})
         for source, wanted in ((positions, _GRAINS), (adjacency, _CONTACTS))
     )
-    return _told_apart(grains, contacts)
+    return _with_frames(grains, contacts)
 
 
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
@@ -202,7 +202,7 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
     return given
 
 
-def _told_apart(grains: Columns, contacts: Columns) -> TextFrames:
+def _with_frames(grains: Columns, contacts: Columns) -> TextFrames:
     """Both files with a column for the frame; without one, it is derived from restarting ids."""
     if "frame" in grains.values or "id" not in grains.values:
         return TextFrames(grains, contacts)
@@ -278,8 +278,8 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
     else:
         named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
     values = {column: numbers[:, k] for k, column in enumerate(named) if column}
-    told = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
-    return Columns(name, values, np.array([k for k, _ in rows]), told)
+    description = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
+    return Columns(name, values, np.array([k for k, _ in rows]), description)
 
 
 def _number(text: str) -> float:
@@ -296,8 +296,12 @@ def _named(header: Sequence[str], wanted: Sequence[str], width: int) -> list[str
     if header is None or len(header) != width:
         return None
     named = _known(header, wanted)
-    told = [name for name in named if name]
-    return named if _needed(wanted) <= set(told) and len(told) == len(set(told)) else None
+    recognised = [name for name in named if name]
+    return (
+        named
+        if _needed(wanted) <= set(recognised) and len(recognised) == len(set(recognised))
+        else None
+    )
 
 
 def _known(header: Sequence[str], wanted: Sequence[str]) -> list[str]:

@@ -223,7 +223,7 @@ def read_pegs(
         "mean_change_of_f_n": float(change[0]),
         "mean_change_of_f_t": float(change[1]),
         **({"notes": notes} if notes else {}),
-        "findings": _told(account),
+        "findings": _finding_lines(account),
     }
     shorter = np.minimum(*packing.r[np.stack([packing.contacts.i, packing.contacts.j])])
     info = {"source": "pegs", "frame": report["frame"], "walls": len(names)}
@@ -244,15 +244,15 @@ def read_pegs(
     )
 
 
-def _told(account: Account) -> list[str]:
+def _finding_lines(account: Account) -> list[str]:
     """The findings of each kind, in lines of words, only the first ones of many."""
     lines = []
     for kind, (words, *_) in KINDS.items():
         found = account.of(kind)
         if found:
             more = f"; and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
-            told = "; ".join(one.text for one in found[:_LISTED])
-            lines.append(f"{words} ({len(found)}): {told}{more}")
+            text = "; ".join(one.text for one in found[:_LISTED])
+            lines.append(f"{words} ({len(found)}): {text}{more}")
     return lines
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
-from granforce.experiment.infer import Inference, asked, judged, told
+from granforce.experiment.infer import Inference, arguments_of, inference_of, judged
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many
@@ -77,7 +77,7 @@ def remeasured(
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
-    m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers, least=1)
+    m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
     found = _again(ensemble, best.forces, width, *numbers, seed, progress)
@@ -85,7 +85,7 @@ def remeasured(
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
     draws = judged(ensemble, found, worth, True, counts, 0.0, time.perf_counter() - ready)
-    return told(Remeasured, ensemble, best, draws, begin)
+    return inference_of(Remeasured, ensemble, best, draws, begin)
 
 
 def _again(

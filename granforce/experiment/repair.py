@@ -110,7 +110,7 @@ def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing,
         raise InputError(f"repair is a part of the data, from 0 to 1, got {repair}")
     account = Account([], repair is False, most)
     whole = len(listing.ids), len(listing.ends)
-    listing, said = _named(listing, account)
+    listing, note = _named(listing, account)
     for step in (
         _without_unreadable_grains,
         _without_doubled_names,
@@ -125,7 +125,7 @@ def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing,
     _note_friction(listing, account, mu)
     if not np.any(np.all(listing.ends >= 0, axis=1)):
         raise InputError(f"{listing.names[1]}: no contact between two grains")
-    return listing, account, said
+    return listing, account, note
 
 
 def rows_of(listing: Listing) -> Integers:
@@ -254,27 +254,27 @@ def _without_false_detections(listing: Listing, account: Account) -> Listing:
     i, j, gap = overlapping(x, r, OPEN)
     deep = np.flatnonzero(-gap > OVERLAP * np.minimum(r[i], r[j]))
     fit = _fits(listing) if len(deep) else np.zeros(len(r))
-    gone, ends = {}, listing.ends.copy()
+    dropped, ends = {}, listing.ends.copy()
     for c in deep[np.argsort(gap[deep], kind="stable")]:
         a, b = int(i[c]), int(j[c])
-        if a in gone or b in gone:
+        if a in dropped or b in dropped:
             continue
         false, true = (a, b) if (fit[a], r[a]) < (fit[b], r[b]) else (b, a)
         small, large = sorted((r[a], r[b]))
         near = np.hypot(*(x[a] - x[b])) < _SAME[0] * small
         kind = "doubled_grains" if near and large - small < _SAME[1] * large else "false_detections"
-        gone[false] = kind, true, -gap[c]
+        dropped[false] = kind, true, -gap[c]
         if kind == "doubled_grains":
             ends[ends == ids[false]] = ids[true]
     for kind in ("doubled_grains", "false_detections"):
-        those = [g for g in sorted(gone) if gone[g][0] == kind]
+        those = [g for g in sorted(dropped) if dropped[g][0] == kind]
         texts = [
-            f"{listing.place(0, g)}: grains {plain(ids[g])} and {plain(ids[gone[g][1]])} "
-            f"overlap by {gone[g][2]:.3g}, more than {OVERLAP:.0%} of a radius"
+            f"{listing.place(0, g)}: grains {plain(ids[g])} and {plain(ids[dropped[g][1]])} "
+            f"overlap by {dropped[g][2]:.3g}, more than {OVERLAP:.0%} of a radius"
             for g in those
         ]
         account.note(kind, texts, x[those])
-    kept = np.setdiff1d(np.arange(len(r)), list(gone))
+    kept = np.setdiff1d(np.arange(len(r)), list(dropped))
     return listing._replace(ends=ends).with_grains(kept)
 
 
@@ -304,8 +304,8 @@ def _without_unreadable_contacts(listing: Listing, account: Account) -> Listing:
     finite = np.all(np.isfinite(listing.forces), axis=1)
     size = np.abs(np.where(finite[:, None], listing.forces, 0.0)).max(axis=1, initial=0.0)
     usual = np.median(size[size > 0]) if np.any(size > 0) else np.inf
-    told = finite & (size <= HUGE * usual)
-    bad = np.flatnonzero(~(named & told))
+    readable = finite & (size <= HUGE * usual)
+    bad = np.flatnonzero(~(named & readable))
     texts = [
         f"{listing.place(1, k)}: "
         + (
@@ -316,7 +316,7 @@ def _without_unreadable_contacts(listing: Listing, account: Account) -> Listing:
         for k in bad
     ]
     account.note("unreadable_contacts", texts, _places(listing, bad))
-    forces = np.where(told[:, None], listing.forces, np.nan)
+    forces = np.where(readable[:, None], listing.forces, np.nan)
     return listing._replace(forces=forces).with_contacts(np.flatnonzero(named))
 
 

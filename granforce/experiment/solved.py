@@ -192,8 +192,10 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
         spread = single["fitError"] / single["r"] ** 2
         weight = np.nanmedian(spread) / spread if np.isfinite(spread).any() else spread
     weight = np.clip(np.nan_to_num(weight, nan=1.0, posinf=_WEIGHTS), 1 / _WEIGHTS, _WEIGHTS)
-    told = "id, x, y, r, neighbours, forces, alphas"
-    told += "".join(f", {field}" for field in ("betas", "fitError", "edge") if field in columns)
+    description = "id, x, y, r, neighbours, forces, alphas"
+    description += "".join(
+        f", {field}" for field in ("betas", "fitError", "edge") if field in columns
+    )
     return Listing(
         ids=single["id"],
         x=np.column_stack([single["x"], single["y"]]),
@@ -207,7 +209,7 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
         lines=(np.arange(1, count + 1), owner + 1),
         both_ways=True,
         frame=number,
-        said=f"{name}: struct array particle with {told}",
+        said=f"{name}: struct array particle with {description}",
     )
 
 

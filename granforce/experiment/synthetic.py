@@ -109,9 +109,9 @@ def synthetic_frame(
     flag[c.i[~inside]] = flag[c.j[~inside]] = 1.0
     chance = inside / (forces[:, 0] + unit / 2)
     order = rng.exponential(size=len(chance)) / np.maximum(chance, 1e-300)
-    gone = np.zeros(len(chance), dtype=bool)
-    gone[np.argsort(order)[: round(missed * inside.sum())]] = True
-    inner = np.flatnonzero(inside & ~gone)
+    absent = np.zeros(len(chance), dtype=bool)
+    absent[np.argsort(order)[: round(missed * inside.sum())]] = True
+    inner = np.flatnonzero(inside & ~absent)
     ends, values = np.column_stack([c.i, c.j])[inner], forces[inner]
     wrong = _near_pairs(packing, c, round(false * inside.sum()))
     guess = np.abs(rng.normal(0, 0.2 * unit, (len(wrong), 2))) * [1.0, packing.mu]

@@ -142,9 +142,9 @@ def flagged(
         raise InputError(f"flag must be ignore, got {str(flag)[:40]!r}")
     given = listing.flag
     many, shaped = np.mean(given != 0), walls not in (None, "open")
-    told = given.any() or np.any(listing.ends < 0)
+    marked = given.any() or np.any(listing.ends < 0)
     believed = many <= _NEARLY_ALL or len(given) < _FEW
-    if flag is None and believed and (told or not shaped):
+    if flag is None and believed and (marked or not shaped):
         if walls in ("annulus", "auto") and not np.any(given < 0):  # one flag for both walls
             at_hole = (boundary(listing.x, listing.r) < 0) & (given != 0)
             return np.where(at_hole, -1.0, given), None
@@ -193,17 +193,17 @@ def wall_contacts(
     if walls == "open":
         return None
     if walls is None:
-        told = np.isfinite(beta)
-        if not told.any():
+        measured = np.isfinite(beta)
+        if not measured.any():
             return None
-        which = _occurrence(grain[told])
+        which = _occurrence(grain[measured])
         names = tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(which.max() + 1))
         return WallContacts(
-            grain=grain[told],
+            grain=grain[measured],
             wall=which,
-            normal=normal[told],
-            forces=forces[told],
-            factor=factor[told],
+            normal=normal[measured],
+            forces=forces[measured],
+            factor=factor[measured],
             names=names,
             outline=None,
         )

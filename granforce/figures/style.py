@@ -294,8 +294,8 @@ def _picture(figure: Any, form: str, caption: str) -> bytes:
         drawn.savefig(file, format=form, dpi=150, bbox_inches="tight", metadata=metadata)
     content = file.getvalue()
     if form == "svg" and caption:
-        told = f"</title>\n <desc>{escape(caption)}</desc>".encode()
-        content = content.replace(b"</title>", told, 1)
+        description = f"</title>\n <desc>{escape(caption)}</desc>".encode()
+        content = content.replace(b"</title>", description, 1)
     return content
 
 

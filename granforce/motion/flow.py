@@ -167,19 +167,19 @@ def make_flows(step: Step, width: int) -> Flows:
     )
 
 
-def start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
+def start(step: Step, flows: Flows, lane: int, push: Push) -> None:
     """Start a Push in a lane."""
     flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
     pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
     border = np.ascontiguousarray(flows.load.border[:, [lane]])
-    _pushed(step.network, asked.contact, -float(asked.load), pair, border)
+    _pushed(step.network, push.contact, -float(push.load), pair, border)
     flows.load.rows[:, [lane]], flows.load.border[:, [lane]] = pair, border
-    flows.forces[:, lane] = np.asarray(asked.forces).ravel()
+    flows.forces[:, lane] = np.asarray(push.forces).ravel()
     for vector in (flows.velocity, flows.kept):
         vector.rows[:, lane], vector.border[:, lane] = 0.0, 0.0
-    flows.pace[0, lane], flows.lately[0, lane], flows.steady[0, lane] = FIRST, np.inf, asked.steady
+    flows.pace[0, lane], flows.lately[0, lane], flows.steady[0, lane] = FIRST, np.inf, push.steady
     flows.newton[lane] = flows.steps[lane] = flows.iterations[lane] = 0
-    flows.most[lane], flows.going[lane] = asked.max_steps, True
+    flows.most[lane], flows.going[lane] = push.max_steps, True
 
 
 @compiled

@@ -91,8 +91,8 @@ def _from(forces: Floats) -> Push:
     return Push(forces, 0, 0.0, MOST_STEPS, flow.STEADY)
 
 
-def _one(asked: Push) -> Generator[Push, Outcome, Outcome]:
-    return (yield asked)
+def _one(push: Push) -> Generator[Push, Outcome, Outcome]:
+    return (yield push)
 
 
 def _on_all(S: Ensemble, forces: Floats) -> Floats:

@@ -36,11 +36,11 @@ from granforce.tolerances import BALANCED
 Work = Generator[Push, Outcome, Any]
 
 
-def relax(step: Step, asked: Push) -> Outcome:
+def relax(step: Step, push: Push) -> Outcome:
     """The Outcome of the flow for a Push."""
 
     def one() -> Generator[Push, Outcome, Outcome]:
-        return (yield asked)
+        return (yield push)
 
     found: list[Outcome] = []
     follow(step, [one()], lambda _, outcome: found.append(outcome))

@@ -101,7 +101,7 @@ def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
     return rows
 
 
-class _Asked(NamedTuple):
+class _Batch(NamedTuple):
     """Programs that are solved together, with their results so far."""
 
     keys: Sequence[Any]
@@ -150,44 +150,44 @@ class Solver:
         points: a dict to fill with the y (n,) at which each key's value is attained. After
         cancelling, the programs finished so far are returned.
         """
-        asked = _Asked(keys, tasks, {}, points)
+        batch = _Batch(keys, tasks, {}, points)
         with suppress(Cancelled):
-            self._solve(asked, range(len(keys)))
-        return asked.bounds
+            self._solve(batch, range(len(keys)))
+        return batch.bounds
 
-    def _solve(self, asked: _Asked, every: Sequence[int]) -> None:
+    def _solve(self, batch: _Batch, every: Sequence[int]) -> None:
         if self.system.middle.reached:
-            self._carry(asked, every, refined=False)
+            self._carry(batch, every, refined=False)
             # Among thousands of contacts, rounding may leave the bound of one or two too loose.
-            self._carry(asked, asked.open(every), refined=True)
+            self._carry(batch, batch.open(every), refined=True)
         else:
-            for outcome in one_after_another(self.system, asked.tasks):
-                self._take(asked, [outcome])
-        for number in asked.open(every):
+            for outcome in one_after_another(self.system, batch.tasks):
+                self._take(batch, [outcome])
+        for number in batch.open(every):
             cancelling.check()
             self.counts["again"] += 1
-            for outcome in from_scratch(self.system, number, asked.tasks[number]):
-                self._take(asked, [outcome])
-                if not asked.open([number]):
+            for outcome in from_scratch(self.system, number, batch.tasks[number]):
+                self._take(batch, [outcome])
+                if not batch.open([number]):
                     break
 
-    def _carry(self, asked: _Asked, numbers: Sequence[int], refined: bool) -> None:
+    def _carry(self, batch: _Batch, numbers: Sequence[int], refined: bool) -> None:
         """Solve the programs of these numbers by the interior-point method."""
         if len(numbers):
             linear_programs.run(
-                *(self.system.problem, self.system.middle, asked.tasks, numbers),
+                *(self.system.problem, self.system.middle, batch.tasks, numbers),
                 refined=refined,
                 workers=self.workers,
-                finished=partial(self._take, asked),
+                finished=partial(self._take, batch),
             )
 
-    def _take(self, asked: _Asked, outcomes: Sequence[ProgramOutcome]) -> None:
+    def _take(self, batch: _Batch, outcomes: Sequence[ProgramOutcome]) -> None:
         """Certify outcomes, keeping the better value and the better bound of each key."""
-        bounds, points = asked.bounds, asked.points
-        attained, bound = certify(self.system, outcomes, asked.tasks)
+        bounds, points = batch.bounds, batch.points
+        attained, bound = certify(self.system, outcomes, batch.tasks)
         with self.lock:
             for k, outcome in enumerate(outcomes):
-                key = asked.keys[outcome.number]
+                key = batch.keys[outcome.number]
                 if key not in bounds:
                     self.counts["programs"] += 1
                     self.done += 1

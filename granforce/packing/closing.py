@@ -98,10 +98,10 @@ def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int
     return found
 
 
-def _on_backbone(packing: Packing, **asked: Any) -> Packing | None:
+def _on_backbone(packing: Packing, **conditions: Any) -> Packing | None:
     """The packing with forces on its backbone alone, balanced to rounding, or None."""
     try:
-        S = ensemble(packing, **asked)
+        S = ensemble(packing, **conditions)
     except (NotJammedError, UndecidedError):
         return None
     forces = nearest(S, S.original).forces

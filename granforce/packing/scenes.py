@@ -79,8 +79,8 @@ def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     try:
         made = kind.make(mu, **options)
     except TypeError:
-        asked = ", ".join(options)
-        raise InputError(f"the scene {name} has no option {asked}") from None
+        unknown = ", ".join(options)
+        raise InputError(f"the scene {name} has no option {unknown}") from None
     if isinstance(made, Sketch):
         made = assembled(*made[:4], mu, pressing=made.pressing)
     return made._replace(info=made.info | {"scene": name})

@@ -99,12 +99,12 @@ def paper_sampler(table: StudyTable) -> str:
 def captions(table: StudyTable) -> dict[str, str]:
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
-    told = tails.told(table) or "–"
+    fits = tails.described(table) or "–"
     beyond = outside(table, SAMPLERS[paper_sampler(table)])
     if beyond:
         walk += f"; crosses or left out at μ = {', '.join(f'{mu:g}' for mu in beyond)}, where the "
         walk += "networks lie outside of S by more than its extent"
-    return {name: caption.format(walk=walk, tails=told) for name, caption in CAPTIONS.items()}
+    return {name: caption.format(walk=walk, tails=fits) for name, caption in CAPTIONS.items()}
 
 
 def draw(
@@ -120,12 +120,12 @@ def draw(
     """
     make_folder(folder)
     made = all_figures(table) if formats else {}
-    told, paths = captions(table), []
+    texts, paths = captions(table), []
     for done, (name, figure) in enumerate(made.items()):
         for form in formats:
             backend = "bokeh" if form == "html" else "matplotlib"
             paths.append(folder / f"{name}.{form}")
-            figures.save(figure(backend=backend), paths[-1], told[name])
+            figures.save(figure(backend=backend), paths[-1], texts[name])
         if progress is not None:
             progress(done + 1, len(made))
     return paths

@@ -70,8 +70,10 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
         groups = sampled(table, sampler)
         for mu, values in each(groups, lambda values: values / values.mean()).items():
             if mu > 0:
-                told = f"departure of P(ΔF_n/⟨ΔF_n⟩) from a falling density, {sampler}, μ = {mu:g}"
-                yield _told(told, *departure([v for _, v in values], statistics.LEVEL))
+                statement = (
+                    f"departure of P(ΔF_n/⟨ΔF_n⟩) from a falling density, {sampler}, μ = {mu:g}"
+                )
+                yield _measured(statement, *departure([v for _, v in values], statistics.LEVEL))
         for word, span in RANGES:
             chosen = [[v for _, v in g] for g in within(groups, span).values()]
             if chosen:
@@ -131,8 +133,8 @@ def strength(table: StudyTable) -> Iterator[Claim]:
         for row, walk in statistics.paired(rows, table.part("walk"))
         if walk["contacts"]
     ]
-    told = "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
-    yield from _by_range(_values(factors, "factor"), told)
+    statement = "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
+    yield from _by_range(_values(factors, "factor"), statement)
 
 
 def shear(table: StudyTable) -> Iterator[Claim]:
@@ -141,22 +143,22 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     groups = _values(rows, "friction")
     if len(groups) > 2:
         yield _trend("μ where the largest shear stress is largest", peak, groups)
-    told = "shear stress over pressure"
-    yield from _by_range(groups, f"largest {told}")
-    yield from _by_range(_values(rows, "own_shear"), f"{told} of the original network")
+    statement = "shear stress over pressure"
+    yield from _by_range(groups, f"largest {statement}")
+    yield from _by_range(_values(rows, "own_shear"), f"{statement} of the original network")
     for some, name, word in (
         (rows, "own_shear", "of the original network"),
         (uniform, "mean_shear", "of uniform states, mean"),
         (uniform, "largest_shear", "of uniform states, largest"),
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction")
-        yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
+        yield from _by_range(parts, f"{statement} {word}, over the largest of the packing")
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
     """The number of networks: the width of S and the entropy of forces per grain."""
     rows = table.part("volume")
-    for name, told in (
+    for name, statement in (
         ("extent", "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩"),
         ("log_volume_per_grain", "ln V per grain, forces in ⟨f_n⟩"),
     ):
@@ -164,8 +166,8 @@ def volume(table: StudyTable) -> Iterator[Claim]:
         if len(groups) > 2:
             # Logarithms may have either sign: the largest value on the grid.
             top = peak if name == "extent" else _largest
-            yield _trend(f"μ where {told} is largest", top, groups)
-        yield from _by_range(groups, told)
+            yield _trend(f"μ where {statement} is largest", top, groups)
+        yield from _by_range(groups, statement)
     walked = statistics.paired(rows, table.part("walk"))
     wide = [(row, walk) for row, walk in walked if row.get("extent")]
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
@@ -177,9 +179,9 @@ def volume(table: StudyTable) -> Iterator[Claim]:
     ):
         pairs = [(row[name], walk[other]) for row, walk in walked if name in row and other in walk]
         if len(pairs) > 2:
-            told = f"rank correlation over packings of all μ, {what}"
+            statement = f"rank correlation over packings of all μ, {what}"
             yield _finding(
-                told, lambda some: statistics.rank_correlation(*np.transpose(some)), [pairs]
+                statement, lambda some: statistics.rank_correlation(*np.transpose(some)), [pairs]
             )
     for mu in sorted({row["mu"] for row in table.part("volume_size")}):
         sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
@@ -189,8 +191,8 @@ def volume(table: StudyTable) -> Iterator[Claim]:
             for last in (True, False)
         ]
         if all(groups):
-            told = f"ln V per grain of {largest} disks less that of fewer, μ = {mu:g}"
-            yield _finding(told, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
+            statement = f"ln V per grain of {largest} disks less that of fewer, μ = {mu:g}"
+            yield _finding(statement, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
 
 
 def forces(table: StudyTable) -> Iterator[Claim]:
@@ -206,8 +208,8 @@ def forces(table: StudyTable) -> Iterator[Claim]:
                 ("off_exponential", "ln of uniform P(f_n > f) about an exponential, rms"),
                 ("off_gaussian", "ln of uniform P(f_n > f) about a Gaussian, rms"),
             ):
-                told = f"{what}, {case}"
-                yield _finding(told, lambda some, name=name: _part(some, name), [packings])
+                statement = f"{what}, {case}"
+                yield _finding(statement, lambda some, name=name: _part(some, name), [packings])
 
 
 def _part(packings: Any, name: str) -> float:
@@ -257,17 +259,17 @@ def _trend(statement: str, statistic: Callable[..., float], groups: Values) -> C
     keys = np.array(list(groups), dtype=float)
     value = statistic(keys, np.array([np.mean(group) for group in groups.values()]))
     drawn = [statistic(keys, means) for means in statistics.resampled_means(list(groups.values()))]
-    return _told(statement, float(value), *statistics.percentile_ends(np.array(drawn))[0])
+    return _measured(statement, float(value), *statistics.percentile_ends(np.array(drawn))[0])
 
 
 def _finding(
     statement: str, statistic: Callable[..., float], groups: Sequence[Any], **options: Any
 ) -> Claim:
     groups = list(groups.values()) if isinstance(groups, dict) else list(groups)
-    return _told(statement, *statistics.bootstrap(statistic, groups, **options))
+    return _measured(statement, *statistics.bootstrap(statistic, groups, **options))
 
 
-def _told(statement: str, value: float, low: float, high: float) -> Claim:
+def _measured(statement: str, value: float, low: float, high: float) -> Claim:
     return Claim(
         statement=statement,
         sampler="",

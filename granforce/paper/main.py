@@ -65,15 +65,15 @@ def main(arguments: argparse.Namespace) -> int:
         tables.save(reduced, folder / "study.zarr")
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
-    told: dict[str, Any] = {
+    results: dict[str, Any] = {
         "claims": [claim._asdict() for claim in claims.judged(reduced)],
         "findings": [finding._asdict() for finding in findings.found(reduced)],
         "skipped": reduced.skipped,
     }
     with written(folder / "claims.json") as file:
-        file.write(json_text(told, ascii_only=False).encode())
-    documents.renew(renewed, reduced, told["claims"], told["findings"])
-    print_claims(told, arguments.json)
+        file.write(json_text(results, ascii_only=False).encode())
+    documents.renew(renewed, reduced, results["claims"], results["findings"])
+    print_claims(results, arguments.json)
     return 1 if failed else 0
 
 
@@ -175,10 +175,10 @@ def compute(
     return failed
 
 
-def print_claims(told: dict[str, Any], as_json: bool) -> None:
+def print_claims(results: dict[str, Any], as_json: bool) -> None:
     """Print claims with their verdicts, and findings, on stdout."""
     if as_json:
-        print(json_text(told))
+        print(json_text(results))
         return
     for word, names in (
         ("claims", ("claim", "sampler", "from", "measured", "95 %", "criterion", "verdict")),
@@ -194,9 +194,11 @@ def print_claims(told: dict[str, Any], as_json: bool) -> None:
                 "criterion": claim["criterion"],
                 "verdict": claim["verdict"],
             }
-            for claim in told[word]
+            for claim in results[word]
         ]
         table(lines, names, {})
         print()
-    if told["skipped"]["missing_cells"]:
-        print(f"{told['skipped']['missing_cells']} cells of the plan are missing", file=sys.stderr)
+    if results["skipped"]["missing_cells"]:
+        print(
+            f"{results['skipped']['missing_cells']} cells of the plan are missing", file=sys.stderr
+        )

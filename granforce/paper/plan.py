@@ -401,9 +401,9 @@ def _tails(plan: Plan, seed: int) -> list[Task]:
     n, states = plan.tails_n, plan.tails_states
     parts: dict[str, Any] = {"tails": {}, "tails_stress": {"prescribed": "stress"}}
     return [
-        _task(part, kinds.UNIFORM, n, seed, mu, states, **asked)
+        _task(part, kinds.UNIFORM, n, seed, mu, states, **conditions)
         for mu in plan.tails_frictions
-        for part, asked in parts.items()
+        for part, conditions in parts.items()
     ]
 
 

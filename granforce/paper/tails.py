@@ -75,7 +75,7 @@ def fitted(packings: Sequence[Floats]) -> Tail | None:
     )
 
 
-def told(table: StudyTable) -> str:
+def described(table: StudyTable) -> str:
     """All fits in words."""
     fits = (
         (f"{word}, μ = {mu:g}", fitted(packings))

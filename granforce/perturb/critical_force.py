@@ -234,8 +234,8 @@ def _raised(
         if moving is None or moving.breach <= STEADY:
             break
         # Follow the apparent motion further: it may come to rest.
-        asked = Push(moving.forces, position, high, STEADY_STEPS, STEADY)
-        followed = yield from _relaxed(asked, counts)
+        push = Push(moving.forces, position, high, STEADY_STEPS, STEADY)
+        followed = yield from _relaxed(push, counts)
         if not followed.at_rest:
             moving = followed
             break
@@ -274,8 +274,8 @@ def _bracket(
     while high - low > precision:
         load = low + (protocol.rise if moving is None else 0.5) * (high - low)
         load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
-        asked = Push(forces, position, load, protocol.max_steps, flow.STEADY)
-        outcome = yield from _relaxed(asked, counts)
+        push = Push(forces, position, load, protocol.max_steps, flow.STEADY)
+        outcome = yield from _relaxed(push, counts)
         if outcome.at_rest:
             low, forces = load, outcome.forces
         else:
@@ -283,9 +283,9 @@ def _bracket(
     return low, high, forces, moving
 
 
-def _relaxed(asked: Push, counts: dict[str, float]) -> Asking[Outcome]:
+def _relaxed(push: Push, counts: dict[str, float]) -> Asking[Outcome]:
     """The outcome of a flow, counted."""
-    outcome = yield asked
+    outcome = yield push
     counts["flow_steps"] += outcome.steps
     counts["linear_systems"] += outcome.iterations
     counts["seconds"] += outcome.seconds

@@ -20,7 +20,7 @@ from granforce.types import Cancel, Progress
 PACKING_VERSION = 6
 
 
-def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
+def _unchanged(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
     return parameters
 
 
@@ -36,7 +36,7 @@ class Kind(NamedTuple):
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
     # (parameters, dataset) → the parameters of the dataset, which may have ended early
-    reached: Callable[[Parameters, xr.Dataset], Parameters] = _as_asked
+    reached: Callable[[Parameters, xr.Dataset], Parameters] = _unchanged
 
 
 class StudyCell(NamedTuple):

@@ -159,8 +159,8 @@ def _consolidated(arrays: Mapping[str, Any]) -> dict[str, Any]:
 
 def _metadata_checksum(arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> str:
     """sha256 of the attributes that `checksum` leaves out: units, names, origin and time."""
-    told = {key: value for key, value in attrs.items() if key != "metadata_checksum"}
-    return hashlib.sha256(json.dumps([arrays, told], sort_keys=True).encode()).hexdigest()
+    covered = {key: value for key, value in attrs.items() if key != "metadata_checksum"}
+    return hashlib.sha256(json.dumps([arrays, covered], sort_keys=True).encode()).hexdigest()
 
 
 def _by_chunks(variable: xr.Variable) -> Iterator[Any]:

@@ -71,14 +71,14 @@ def inference_dataset(
     found: Inference,
     measured: Floats,
     sigma: Floats,
-    sure: Any = None,
+    certain: Any = None,
     *,
     keep: int | None = None,
     seconds: float = 0.0,
 ) -> xr.Dataset:
     """An Inference and its measurement as a dataset; draws stored as in `walk_dataset`.
 
-    sure: a Carrying of contacts that were not measured, if requested.
+    certain: a Carrying of contacts that were not measured, if requested.
     """
     arrays: dict[str, Any] = {
         "backbone": S.index,
@@ -95,9 +95,9 @@ def inference_dataset(
         **S.skipped,
         "seconds": seconds,
     }
-    if sure is not None:
+    if certain is not None:
         arrays["least_normal"] = np.full(len(S.index), np.nan)
-        arrays["least_normal"][S.positions(sure.contacts)] = sure.least
+        arrays["least_normal"][S.positions(certain.contacts)] = certain.least
     if found.draws is not None:
         pick = _picked(len(found.draws.flat), keep)
         arrays |= {"states": found.draws.flat[pick], **_drawn(found.draws, pick)}

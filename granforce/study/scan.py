@@ -317,7 +317,9 @@ def _over_dask(
         from dask.distributed import Client, KilledWorker, as_completed
     except ImportError:
         raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
-    gone = InputError(f"the dask scheduler at {scheduler} is gone; finished entries are saved")
+    unreachable = InputError(
+        f"the dask scheduler at {scheduler} is gone; finished entries are saved"
+    )
     with _without_tracebacks(), _client_of(scheduler, Client) as client:
         waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
         completed, workers = as_completed(list(waiting)), _Workers(scheduler)
@@ -325,13 +327,13 @@ def _over_dask(
             while waiting:
                 for future in completed.next_batch(block=False):
                     if future.status == "cancelled":  # its fate is unknown
-                        raise gone
+                        raise unreachable
                     dead = isinstance(future.exception(), KilledWorker)
                     finished(waiting.pop(future), _lost if dead else future.result)
                 try:
                     present = client.nthreads()
                 except OSError:
-                    raise gone from None
+                    raise unreachable from None
                 workers.count(present)
                 time.sleep(LOOK)
         except BaseException:

@@ -141,10 +141,10 @@ def infer_frame(
     )
     findings = [one._asdict() for one in found.findings]
     report = found.report if number is None else found.report | {"frame": number}
-    told: dict[str, Any] = {"report": report, "findings": findings}
-    told |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
-    told |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
-    dataset.attrs["account"] = json.dumps(told, default=to_builtin)
+    attrs: dict[str, Any] = {"report": report, "findings": findings}
+    attrs |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
+    attrs |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
+    dataset.attrs["account"] = json.dumps(attrs, default=to_builtin)
     return dataset
 
 
@@ -192,12 +192,12 @@ def infer_series(
         for frame, cell in zip(frames, cells, strict=True)
         if id(cell) not in lost
     ]
-    told = [
+    refused = [
         (frame, lost[id(cell)])
         for frame, cell in zip(frames, cells, strict=True)
         if id(cell) in lost
     ]
-    return (combined(done) if done else None), told
+    return (combined(done) if done else None), refused
 
 
 def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
@@ -213,9 +213,9 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     ]
     pairs, places = over_frames(named)
     shape = (len(done), len(pairs), 2)
-    told = ["measured", "sigma", "inferred"]
-    told += ["standard_error"] if all("standard_error" in one for _, one in done) else []
-    arrays = {name: np.full(shape, np.nan) for name in told}
+    quantities = ["measured", "sigma", "inferred"]
+    quantities += ["standard_error"] if all("standard_error" in one for _, one in done) else []
+    arrays = {name: np.full(shape, np.nan) for name in quantities}
     added = np.zeros(shape[:2], dtype=bool)
     for k, ((_, one), (here, into)) in enumerate(zip(done, places, strict=True)):
         for name, values in arrays.items():

@@ -472,10 +472,10 @@ def _is_alive(pid: int) -> bool:
 def _is_zombie(pid: int) -> bool:
     """Whether the process has ended but was not yet reaped by its parent (Linux)."""
     try:
-        told = Path(f"/proc/{pid}/stat").read_text()
+        status = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
         return False
-    return told.rpartition(")")[2].split()[:1] == ["Z"]
+    return status.rpartition(")")[2].split()[:1] == ["Z"]
 
 
 def _remove(path: Path) -> None:

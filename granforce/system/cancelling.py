@@ -54,8 +54,8 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
     if cancel is None and (outer.cancel is not None or not main):
         yield
         return
-    asked = _either(outer, cancel)
-    scope = _Scope(np.array([_ending.is_set() or interrupted()]), asked)
+    request = _either(outer, cancel)
+    scope = _Scope(np.array([_ending.is_set() or interrupted()]), request)
     ears, mouth = socket.socketpair()
     mouth.setblocking(False)
     ours = main and _wake_by_signals(mouth)
@@ -89,9 +89,9 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:
-    asked = [one for one in (outer.cancel, cancel) if one is not None]
+    requests = [one for one in (outer.cancel, cancel) if one is not None]
     return lambda: (
-        bool(outer.flag[0]) or _ending.is_set() or interrupted() or any(ask() for ask in asked)
+        bool(outer.flag[0]) or _ending.is_set() or interrupted() or any(ask() for ask in requests)
     )
 
 

@@ -37,7 +37,7 @@ def tell_when_compiling(say: Callable[[], object]) -> None:
     """Call say() once, as soon as a kernel is compiled that is not in the cache."""
     from numba.core import event
 
-    class Listener(event.Listener):  # numba has no type hints
+    class Listener(event.Listener):  # type: ignore[misc]  # numba has no type hints
         def on_start(self, happening: Any) -> None:
             event.unregister("numba:compile", self)
             say()

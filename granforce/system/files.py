@@ -102,12 +102,12 @@ def check_apart(
     replaced: files, or whole folders, that will be replaced; folders: those to which files are
     added; stores: those to which entries are added; read: files and folders that are read.
     """
-    for said, path in (*replaced, *folders):
+    for label, path in (*replaced, *folders):
         if not str(path):
-            raise InputError(f"{said}: the name is empty; give one")
-    every = [(said, path, _places(path)) for said, path in (*replaced, *folders, *stores, *read)]
+            raise InputError(f"{label}: the name is empty; give one")
+    every = [(label, path, _places(path)) for label, path in (*replaced, *folders, *stores, *read)]
     first_store, first_read = len(replaced) + len(folders), len(every) - len(read)
-    for k, (said, path, places) in enumerate(every[:first_store]):
+    for k, (label, path, places) in enumerate(every[:first_store]):
         for j, (other, its_path, its_places) in enumerate(every):
             if j == k or not places or not its_places:
                 continue
@@ -115,7 +115,7 @@ def check_apart(
             stored = first_store <= j < first_read and its_places[0] in places
             if places[0] == its_places[0] or within or stored:
                 raise InputError(
-                    f"{said} {path} would overwrite {other} {its_path}; choose another name"
+                    f"{label} {path} would overwrite {other} {its_path}; choose another name"
                 )
 
 

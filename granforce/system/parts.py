@@ -13,7 +13,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 
-class _Part(JITCodeLibrary):  # numba has no type hints
+class _Part(JITCodeLibrary):  # type: ignore[misc]  # numba has no type hints
     """Code that others link, neither optimised nor run separately."""
 
     def _optimize_final_module(self) -> None:

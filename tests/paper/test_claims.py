@@ -540,7 +540,7 @@ def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
     table = tables.StudyTable({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
     told = [finding.statement for finding in findings.forces(table)]
     assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
-    assert tails.told(table).startswith("whole stress prescribed, μ = 0.1: b = ")
+    assert tails.described(table).startswith("whole stress prescribed, μ = 0.1: b = ")
 
 
 def test_volumes_tell_where_they_are_largest_and_what_they_follow():

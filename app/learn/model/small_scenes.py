@@ -23,7 +23,7 @@ DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
 SNAP = 1e-6  # fraction of the largest radius: gaps left by hand are closed up to here
 
 
-class Asked(NamedTuple):
+class Request(NamedTuple):
     """The request in a link."""
 
     scene: str  # MANY for the page of large packings
@@ -33,7 +33,7 @@ class Asked(NamedTuple):
     query: str  # for the page of large packings
 
 
-def asked(query: str) -> Asked:
+def request_of(query: str) -> Request:
     """The request in a link's query; invalid parts are left out.
 
     Older links, from before scenes existed, contain a μ, a tab or similar, and refer to large
@@ -51,7 +51,7 @@ def asked(query: str) -> Asked:
     if named:
         query = f"?{urlencode(given)}" if given else ""
     dark = given.get("dark") == "1"
-    return Asked(name, mu, dark, given.get("built", "")[:LONGEST], query)
+    return Request(name, mu, dark, given.get("built", "")[:LONGEST], query)
 
 
 def titles() -> list[list[str]]:
@@ -118,17 +118,17 @@ def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
 
 def names(packing: Packing, count: int) -> list[str]:
     """The position of each contact, in words."""
-    contacts, said = packing.contacts, []
+    contacts, places = packing.contacts, []
     several, lids = count > 1, len(packing.info.get("pressing", []))
     for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
         if j < count:
-            said.append(f"between disks {i + 1} and {j + 1}")
+            places.append(f"between disks {i + 1} and {j + 1}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
         wall = "left wall" if wall == "right wall" and n_x < 0 else wall
         wall = "press" if j < count + lids else wall
-        said.append(f"disk {i + 1} at the {wall}" if several else f"at the {wall}")
-    return said
+        places.append(f"disk {i + 1} at the {wall}" if several else f"at the {wall}")
+    return places
 
 
 def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:

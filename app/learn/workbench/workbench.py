@@ -22,13 +22,13 @@ class Workbench(Scripted):
     note = param.String(doc="error in the link")
     dark = param.Boolean()
 
-    def __init__(self, asked: small_scenes.Asked, task: Task, **params: Any) -> None:
-        """asked: the request in the link. task: a task of the page, for longer work."""
+    def __init__(self, request: small_scenes.Request, task: Task, **params: Any) -> None:
+        """request: the request in the link. task: a task of the page, for longer work."""
         super().__init__(titles=small_scenes.titles(), **params)
         self._task = task
         self._made = True  # the scene requested last
         task.param.watch(self._failed, "message")
-        self._show(asked.scene, asked.mu, asked.built)
+        self._show(request.scene, request.mu, request.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name == small_scenes.MANY:  # has its own page
@@ -72,8 +72,8 @@ class Workbench(Scripted):
                 case {"scene": name} if name in (*made.SCENES, small_scenes.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
-                    asked = small_scenes.asked(query)
-                    self._show(asked.scene, asked.mu, asked.built)
+                    request = small_scenes.request_of(query)
+                    self._show(request.scene, request.mu, request.built)
                 case {"built": built, "mu": mu}:
                     self._show(small_scenes.OWN, mu, built[: small_scenes.LONGEST])
         except (InputError, NotJammedError, UndecidedError) as error:
@@ -99,7 +99,7 @@ class Workbench(Scripted):
                 case "fall":
                     return {"fall": small_scenes.falling(packing, load).tolist()}
                 case _:
-                    asked = {"scene": scene, "mu": mu, "plane": plane}
-                    return {"measured": small_scenes.measured(packing, load, plane), **asked}
+                    values = {"scene": scene, "mu": mu, "plane": plane}
+                    return {"measured": small_scenes.measured(packing, load, plane), **values}
 
         self._task.start(found, self.tell)

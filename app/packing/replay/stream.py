@@ -69,4 +69,4 @@ class Stream:
             self._sent += 1
             self.player.tell(news | {"number": self._sent})
             if "states" in news:
-                self.work.fourfold = following.fourfold  # never Arriving here
+                self.work.fourfold = following.fourfold  # type: ignore[union-attr]  # never Arriving

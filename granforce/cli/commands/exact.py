@@ -67,8 +67,8 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[
     """The dataset of exact bounds or limit loads, and the last lines of its report."""
     contacts = numbers("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
-    asked = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
-    return found(arguments, kind, arguments.out, **asked)[2:]
+    chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
+    return found(arguments, kind, arguments.out, **chosen)[2:]
 
 
 def intervals(arguments: argparse.Namespace) -> None:
@@ -128,8 +128,8 @@ def limit_loads(arguments: argparse.Namespace) -> None:
 
 def stress(arguments: argparse.Namespace) -> None:
     """Compute or load the outline of stresses, and report it."""
-    asked = {"angles": arguments.angles, **known_forces(arguments)}
-    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **asked)
+    chosen = {"angles": arguments.angles, **known_forces(arguments)}
+    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **chosen)
     own = dataset["stress_own"].values
     lines = {
         **extension(dataset),

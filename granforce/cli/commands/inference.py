@@ -55,7 +55,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         raise InputError(
             "give --measured FILE.csv and a packing, or files of frames with --frames all"
         )
-    asked, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
+    chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
     entry, _, dataset, ends = found(
         *(arguments, kinds.INFERENCE, arguments.csv),
@@ -67,7 +67,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         unmeasured=arguments.unmeasured,
         again=arguments.again,
         certain=arguments.certain,
-        **asked,
+        **chosen,
     )
     forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
     given = measured.forces + measured.sigma
@@ -90,8 +90,8 @@ def infer(arguments: argparse.Namespace) -> int | None:
         columns |= {f"deviation_{part} [sigma]": dataset["deviation"].values[:, k]}
     if arguments.certain:
         least = dataset["least_normal"].values
-        sure = np.flatnonzero(least > CARRYING * scale)
-        order = sure[np.argsort(-least[sure], kind="stable")]
+        certain = np.flatnonzero(least > CARRYING * scale)
+        order = certain[np.argsort(-least[certain], kind="stable")]
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
         columns |= forces.named({"least_f_n": least})

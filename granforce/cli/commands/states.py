@@ -84,8 +84,12 @@ def uniform(arguments: argparse.Namespace) -> int:
 
 def volume(arguments: argparse.Namespace) -> int:
     """Compute or load the volume of S and report it. Returns 1 if its error is too large."""
-    asked = {"accuracy": arguments.accuracy, "seed": arguments.volume_seed, **conditions(arguments)}
-    entry, _, dataset, ends = found(arguments, kinds.VOLUME, **asked)
+    chosen = {
+        "accuracy": arguments.accuracy,
+        "seed": arguments.volume_seed,
+        **conditions(arguments),
+    }
+    entry, _, dataset, ends = found(arguments, kinds.VOLUME, **chosen)
     down, up = dataset["log_volume_ladders"].values
     reached = bool(dataset["reached"].item())
     lines = {

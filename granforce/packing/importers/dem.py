@@ -317,17 +317,17 @@ def _packing(
     on_j, carrying = on_j[left], carrying[left]
     joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
     forces = components(on_j, joined.normal)
-    told: dict[str, Any] = {"forces": "given", "contacts_skipped": skipped}
+    info: dict[str, Any] = {"forces": "given", "contacts_skipped": skipped}
     if on_walls is not None:
-        told["notes"] = [_note_of(on_walls, walls, cell)]
+        info["notes"] = [_note_of(on_walls, walls, cell)]
     if walls and on_walls is not None:
         x, r, of_walls, forces_on_walls = _as_grains(on_walls, x, r)
         joined, forces = joined.joined(of_walls), np.concatenate([forces, forces_on_walls])
-        told["walls"] = len(r) - len(grains.rows)
+        info["walls"] = len(r) - len(grains.rows)
     packing = make_packing(
         x, r, cell.box, joined, forces, mu, info={"source": source}, tilt=cell.tilt
     )
-    packing = adopt(packing, reverse=reverse, **told)
+    packing = adopt(packing, reverse=reverse, **info)
     if walls == "held":
         load = packing.load.copy()
         load[len(grains.rows) :] = np.nan

@@ -24,7 +24,7 @@ def read_known(source: Source) -> Known:
     contacts = table.whole("contact")
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
-    told = False
+    any_bounds = False
     for k, name in enumerate(_COMPONENTS):
         for column, sides in (
             (name, (low, high)),
@@ -32,11 +32,11 @@ def read_known(source: Source) -> Known:
             (f"{name}_high", (high,)),
         ):
             if column in table.header:
-                told = True
+                any_bounds = True
                 given, values = _numbers(table, column)
                 for side in sides:
                     side[given, k] = values
-    if not told:
+    if not any_bounds:
         raise InputError(
             f"{table.name}: no column f_n, f_t, f_n_low, f_n_high, f_t_low or f_t_high"
         )

@@ -153,8 +153,8 @@ def open_lammps(
             info={"source": "lammps"},
             tilt=box.cell.tilt,
         )
-        told = {"timestep": step, "contacts_skipped": skipped}
-        return Snapshot(adopt(packing, reverse=reverse, **told), np.sort(atoms.numbers("id")))
+        info = {"timestep": step, "contacts_skipped": skipped}
+        return Snapshot(adopt(packing, reverse=reverse, **info), np.sort(atoms.numbers("id")))
 
     whole = steps[:-1] if cut else steps
     lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""

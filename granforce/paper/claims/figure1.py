@@ -49,9 +49,9 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
         groups = items(
             rows, lambda r, a=above, b=below: np.log(r[a] / r[b]), positive=(above, below)
         )
-        told = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
+        statement = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
         yield over_all(
-            f"{told}: {word} is constant",
+            f"{statement}: {word} is constant",
             f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.ptp(logs)),
             groups,
@@ -60,7 +60,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
             least=3,
         )
         yield over_all(
-            f"{told}: value of {word}",
+            f"{statement}: value of {word}",
             f"geometric mean of {word} over μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.mean(logs)),
             groups,
@@ -198,7 +198,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ends = [row for row in [*opened, *table.part("exact")] if row["mu"] == widest]
     wide = [row | {"made": row.get("packing_mu", row["mu"])} for row in table.part("widest_exact")]
     wide += [row | {"made": row.get("packing_mu", row["mu"])} for row in ends] if wide else []
-    for told, what, rows, by, good, fair in (
+    for statement, what, rows, by, good, fair in (
         (
             "η rises as cones open around the same contacts",
             "μ of the cones, packings made without friction",
@@ -217,7 +217,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ),
     ):
         yield over_all(
-            told,
+            statement,
             f"rank correlation of mean exact η3 with {what}",
             statistics.rank_correlation,
             items(rows, "eta3", by=by),
@@ -234,9 +234,9 @@ def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
     groups = items(rows, "coordination")
     ends = ({mu: groups[mu]} for mu in (min(groups), max(groups))) if groups else ({}, {})
     for group, word, limit in zip(ends, ("smallest", "largest"), (4, 3), strict=True):
-        told = f"z → {limit} at the {word} μ"
+        statement = f"z → {limit} at the {word} μ"
         good, fair = ((limit - near, limit + near) for near in (NEAR, FAIR))
-        yield at_each(told, "mean z there", group, good=good, fair=fair)
+        yield at_each(statement, "mean z there", group, good=good, fair=fair)
     yield over_all(
         "z falls with μ",
         "rank correlation of mean z with μ",

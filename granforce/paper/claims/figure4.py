@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import (
     each,
     positive_friction,
     sampled,
-    told,
+    span_text,
     within,
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
@@ -109,7 +109,7 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         groups = middle | within(ratio, span)
         yield over_all(
             f"S is more elongated at {word} than at intermediate μ",
-            f"mean std/mean of ΔF_n of μ in {told(span)} over that in {told(MIDDLE)}",
+            f"mean std/mean of ΔF_n of μ in {span_text(span)} over that in {span_text(MIDDLE)}",
             lambda keys, means, span=span: _over_middle(keys, means, span),
             dict(sorted(groups.items())),
             good=(1, np.inf),

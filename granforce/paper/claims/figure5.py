@@ -12,7 +12,7 @@ from granforce.paper.claims.groups import (
     Groups,
     items,
     may_be_judged,
-    told,
+    span_text,
     within,
 )
 from granforce.paper.claims.verdicts import PRL, Claim, at_each
@@ -52,7 +52,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     yield at_each(
         "strong contacts are less determined at intermediate μ",
         "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
-        f"μ in {told(MIDDLE)}",
+        f"μ in {span_text(MIDDLE)}",
         within(groups, MIDDLE),
         good=(1, np.inf),
     )
@@ -127,7 +127,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ):
             yield at_each(
                 f"with frozen boundary forces, {claim} ({word})",
-                f"{measured}, μ in {told(span)}",
+                f"{measured}, μ in {span_text(span)}",
                 within(items(rows, what), span),
                 good=good,
                 fair=fair,

@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import (
     drawn,
     items,
     may_be_judged,
-    told,
+    span_text,
     within,
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
@@ -34,14 +34,14 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         lambda row: row["correlation"] * np.sqrt(row["contacts"] - 1),
     )
     strong, none = ((0.1, np.inf), (0, np.inf)), ((-0.1, 0.1), (-0.2, 0.2))
-    sure, chance = ((3, np.inf), (2, np.inf)), ((-2, 2), (-3, 3))
+    significant, chance = ((3, np.inf), (2, np.inf)), ((-2, 2), (-3, 3))
     for word, span, (good, fair), (limits, wider) in (
-        ("is significant at intermediate", MIDDLE, strong, sure),
+        ("is significant at intermediate", MIDDLE, strong, significant),
         ("vanishes at large", LARGE, none, chance),
     ):
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ",
-            f"mean over packings, μ in {told(span)}",
+            f"mean over packings, μ in {span_text(span)}",
             within(everywhere, span),
             good=good,
             fair=fair,
@@ -56,7 +56,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
-            f"mean of μ in {told(span)} less that in {told(MIDDLE)}",
+            f"mean of μ in {span_text(span)} less that in {span_text(MIDDLE)}",
             lambda keys, means, span=span: _mean_difference(keys, means, span),
             dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
             good=(-np.inf, 0),

@@ -118,7 +118,7 @@ def positive_friction(groups: Groups) -> Groups:
     return {mu: group for mu, group in groups.items() if mu > 0}
 
 
-def told(span: Ends) -> str:
+def span_text(span: Ends) -> str:
     """A range of μ in words."""
     low, high = span
     return f"{low:g} … {high:g}" if np.isfinite(high) else f"{low:g} …"

@@ -217,11 +217,11 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
         return claim._replace(verdict=FEW)
     first, *between, last = values
     level = 1 - (1 - statistics.LEVEL) / (2 * len(between))
-    told = []
+    rises = []
     for middle in between:
         ends = [statistics.difference_interval(middle, end, level) for end in (first, last)]
-        told.append(np.min(ends, axis=0) / middle.mean())
-    value, low, high = max(told, key=lambda one: one[0])
+        rises.append(np.min(ends, axis=0) / middle.mean())
+    value, low, high = max(rises, key=lambda one: one[0])
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
     # With only two ends nothing turns, and an exact zero is undecided.
     verdict = FEW if few else UNDECIDED if low <= 0 <= high else ranges.verdict(low, high)

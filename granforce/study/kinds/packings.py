@@ -95,9 +95,9 @@ def _packing(
 ) -> xr.Dataset:
     if "imported" in parameters:
         raise InputError("the imported packing is not in this store: import it again")
-    told: dict[str, Any] = {"progress": progress, "watch": watch}
-    asked = {name: value for name, value in parameters.items() if name != "version"}
-    return packing_dataset(pack(**asked, max_steps=max_steps, **told))
+    callbacks: dict[str, Any] = {"progress": progress, "watch": watch}
+    arguments = {name: value for name, value in parameters.items() if name != "version"}
+    return packing_dataset(pack(**arguments, max_steps=max_steps, **callbacks))
 
 
 def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:

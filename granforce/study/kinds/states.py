@@ -299,13 +299,13 @@ def _inference(
         workers=workers,
         progress=progress,
     )
-    sure = None
+    certain = None
     if parameters["certain"]:
         options = {"unmeasured": parameters["unmeasured"], "workers": workers}
-        sure = carrying(S, forces, sigma, progress=progress, **options)
+        certain = carrying(S, forces, sigma, progress=progress, **options)
         cancelling.check("inference")
     options = {"keep": parameters["keep"], "seconds": time.perf_counter() - begin}
-    return inference_dataset(S, found, forces, sigma, sure, **options)
+    return inference_dataset(S, found, forces, sigma, certain, **options)
 
 
 def _informative_parameters(

@@ -246,7 +246,7 @@ def test_notes_of_a_packing_are_told(state):
     noted = packing._replace(info=packing.info | {"notes": ["what was seen"]})
     job = SimpleNamespace(begin=lambda stage: None)
     brought = uploads.keep(state.library, noted, "a file")(job)
-    assert uploads.told(brought.report)[-1] == ("note", "what was seen")
+    assert uploads.report_rows(brought.report)[-1] == ("note", "what was seen")
 
 
 def test_damaged_and_hostile_files_are_one_clear_line(state):

@@ -29,10 +29,10 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
     ],
 )
 def test_links_name_a_scene(query, scene, mu):
-    asked = small_scenes.asked(query)
+    asked = small_scenes.request_of(query)
     assert (asked.scene, asked.mu) == (scene, mu)
     assert "scene" not in asked.query
-    assert not asked.dark and small_scenes.asked(f"{query or '?scene=groove'}&dark=1").dark
+    assert not asked.dark and small_scenes.request_of(f"{query or '?scene=groove'}&dark=1").dark
 
 
 def test_every_scene_of_the_library_is_on_the_list():
@@ -163,7 +163,7 @@ def test_what_cannot_be_built_is_refused(text):
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Workbench(small_scenes.asked("?scene=column"), Task())
+    view = Workbench(small_scenes.request_of("?scene=column"), Task())
     told = []
     view.tell = told.append
     _at_rest(view)

@@ -194,7 +194,7 @@ def npz(packing: Packing) -> bytes:
 
 def parameters(cell: Cell, link: str, view: Mapping[str, Any]) -> bytes:
     """All that names what is on screen, as JSON: parameters, link, command, view."""
-    told = {
+    values = {
         "kind": cell.kind,
         "entry": cell.name,
         "parameters": json.loads(canonical(cell.params)),
@@ -202,4 +202,4 @@ def parameters(cell: Cell, link: str, view: Mapping[str, Any]) -> bytes:
         "command": command(cell.selection),
         "view": view,
     }
-    return json.dumps(told, indent=1, ensure_ascii=False).encode()
+    return json.dumps(values, indent=1, ensure_ascii=False).encode()

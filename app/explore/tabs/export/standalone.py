@@ -109,7 +109,7 @@ def html(
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),
-        words=explanation.told(replay) + explanation.more(replay),
+        words=explanation.summary_html(replay) + explanation.more(replay),
         plots="".join(plots),
         script=script,
         command=escape(command),

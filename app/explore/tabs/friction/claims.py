@@ -64,15 +64,15 @@ def _counted(found: list[dict[str, Any]]) -> str:
 
 
 def _cell(claim: dict[str, Any]) -> str:
-    told = f"{claim['verdict']}: {claim['measured']}; criterion {claim['criterion']}"
+    hover = f"{claim['verdict']}: {claim['measured']}; criterion {claim['criterion']}"
     if claim["why"]:
-        told += f"; {claim['why']}"
+        hover += f"; {claim['why']}"
     words = VERDICTS.get(claim["verdict"], claim["verdict"])
     if np.isfinite(claim["value"]):
         words += f" {_number(claim['value'])}"
     if np.isfinite([claim["low"], claim["high"]]).all():
         words += f" <small>({_number(claim['low'])} … {_number(claim['high'])})</small>"
-    title = html.escape(plain(told), quote=True)
+    title = html.escape(plain(hover), quote=True)
     return f'<span title="{title}" aria-label="{title}">{words}</span>'
 
 

@@ -77,7 +77,7 @@ def words(knowledge: Knowledge, number: Integers) -> str:
         return f"Exact bounds, largest change first: {1 - narrowed.left:.0%}."
     (h, less), (mean, left) = narrowed.dimension, narrowed.mean
     free = f"<b>{h} → {less}</b>" if less < h else f"stay <b>{h}</b> (an error bar fixes no number)"
-    told = (
+    text = (
         f"{term('h', 'Free dimensions')} {free}; a contact's {term('exact', 'possible')} fₙ spans "
         f"<b>{mean:.3f} → {left:.3f} × the mean force</b> on average ({_change(mean, left)}); "
         f"{narrowed.carrying} of {len(narrowed.shortened)} contacts "
@@ -87,8 +87,8 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
         most = ", ".join(f"{number[c]} (by {short[c]:.2f})" for c in order)
-        told += f" Shortened most: contacts {most}."
-    return told + " The networks being played are from all of S; pulls keep the held forces."
+        text += f" Shortened most: contacts {most}."
+    return text + " The networks being played are from all of S; pulls keep the held forces."
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:

@@ -150,9 +150,9 @@ class View(TabView):
         lead = one_contact.sentence(replay, contact, found, held)
         if found is None:
             return Shown(lead, told=folded(one_contact.COMPUTED))
-        told = one_contact.decay_sentence(found) + folded(one_contact.COMPUTED)
+        text = one_contact.decay_sentence(found) + folded(one_contact.COMPUTED)
         numbers = one_contact.table(replay, contact, found)
-        return Shown(lead, [one_contact.decay(found)], numbers, told)
+        return Shown(lead, [one_contact.decay(found)], numbers, text)
 
     def _animate(self, *events: Any) -> None:
         """The first motion goes to and fro on the packing while this tab is seen."""

@@ -159,8 +159,8 @@ def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
         at + 0.04 * across, np.full(3, y), np.full(3, 0.08 * across), wide * np.array(SAMPLES),
         color=QUIET, name="width_scale",
     )  # fmt: skip
-    told = [f"{force:g}" for force in SAMPLES[:-1]] + [f"{SAMPLES[-1]:g} ⟨fₙ⟩"]
-    fig.text(at + 0.1 * across, np.full(3, y), told, **words)
+    labels = [f"{force:g}" for force in SAMPLES[:-1]] + [f"{SAMPLES[-1]:g} ⟨fₙ⟩"]
+    fig.text(at + 0.1 * across, np.full(3, y), labels, **words)
     y -= STRIP * across
     fig.text([left], [y], [f"⟨fₙ⟩ = {unit:.3g} (unit of the file)"], **words)
     length, y = _round_length(0.25 * across), y - STRIP * across

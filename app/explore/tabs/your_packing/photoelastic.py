@@ -110,14 +110,14 @@ class Frames:
 
     def _fill(self, frame: Frame) -> None:
         self.frame = frame
-        told = "".join(
+        rows = "".join(
             f"<p style='margin:5px 0'>{html.escape(line)}</p>"
             for line in photoelastic_frames.account(frame.report)
         )
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
         self.picture, self.layers = frame_picture.network(frame, tags=[SAVED])
         self.pictures[:] = self._panes()
-        self.found.object = head + told + found(frame.report)
+        self.found.object = head + rows + found(frame.report)
         self.listed.object = listed(frame)
         self.compared.object = compared(frame)
         self.stresses.object = stresses(frame)
@@ -202,7 +202,7 @@ def listed(frame: Frame) -> str:
         f"{named(c)} ({frame.inferred[c, 0]:.2f} ± {frame.error[c, 0]:.2f} ⟨fₙ⟩)"
         for c in frame.certain[:TOLD]
     ]
-    told = []
+    sentences = []
     for count, words, some in (
         (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
         (
@@ -212,8 +212,8 @@ def listed(frame: Frame) -> str:
         ),
     ):
         more = ", …" if count > len(some) else ""
-        told.append(f"<p>{words} ({count}){': ' if some else ''}{', '.join(some)}{more}.</p>")
-    return "".join(told)
+        sentences.append(f"<p>{words} ({count}){': ' if some else ''}{', '.join(some)}{more}.</p>")
+    return "".join(sentences)
 
 
 def stresses(frame: Frame) -> str:

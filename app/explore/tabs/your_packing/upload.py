@@ -162,7 +162,9 @@ class View:
         self, brought: uploads.Brought, frame: photoelastic_frames.Frame | None = None
     ) -> None:
         """Report, and put the packing on the page; its walk is computed at once."""
-        rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
+        rows = "".join(
+            ROW.format(*map(html.escape, row)) for row in uploads.report_rows(brought.report)
+        )
         self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
         self.state.measured = frame and photoelastic_frames.measured(frame, brought.params)
         mu = brought.params["mu"]
