@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from granforce.cli.asked import PACKING_UNIT, Unit, check_outputs, with_units, write_csv
+from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, with_units, write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots

@@ -9,7 +9,7 @@ of the balance then prove this for all remaining contacts at once: with A y = b 
     Σ f_n = g·y = b·v + (g − Aᵀ v)·y ≤ b·v  where  Aᵀ v ≥ g,
 
 and b·v = 0 to the tolerance of `certificates.proves_small`. As f_n ≥ 0, each of them is 0 in every
-network. The words idle, dead, pressing and trusted are defined in granforce/README.md.
+network. The words idle, dead, pressing and trusted are defined in docs/pages/method.md.
 """
 
 from __future__ import annotations

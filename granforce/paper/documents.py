@@ -242,15 +242,15 @@ def preparation(table: StudyTable) -> str:
             if counted != {0}:
                 word = name.removeprefix("prepared_").replace("_", " ") or "default"
                 lines.append([f"{mu:g}", word, str(max(counted)), *cells])
-    heads = ["μ", "made with", "packings", *(head for head, *_ in columns)]
+    heads = ["μ", "options", "packings", *(head for head, *_ in columns)]
     text = markdown_table(heads, lines)
     if not differences:
         return text
     size = np.abs(differences)
     chance = len(size) * 2 * stats.norm.sf(2)
     return text + (
-        f"\nOf {len(size)} differences {int((size > 2).sum())} exceed two standard errors, "
-        f"where chance makes {chance:.1f}; the largest is {size.max():.1f}.\n"
+        f"\n{int((size > 2).sum())} of {len(size)} differences exceed two standard errors "
+        f"({chance:.1f} expected by chance); the largest is {size.max():.1f}.\n"
     )
 
 

@@ -119,7 +119,7 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     yield from _by_range(_values(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
     for part, word in (
         ("response_long", "four times the implicit steps over 150"),
-        ("perturb", "loads raised by 0.4 of the way over tenths (other contacts)"),
+        ("perturb", "steps of 0.4 of the way over steps of a tenth (other contacts)"),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
             yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
@@ -133,7 +133,7 @@ def strength(table: StudyTable) -> Iterator[Claim]:
         for row, walk in statistics.paired(rows, table.part("walk"))
         if walk["contacts"]
     ]
-    statement = "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
+    statement = "⟨F_crit⟩ with the pair excluded from the pressure over that with it included"
     yield from _by_range(_values(factors, "factor"), statement)
 
 
@@ -191,7 +191,9 @@ def volume(table: StudyTable) -> Iterator[Claim]:
             for last in (True, False)
         ]
         if all(groups):
-            statement = f"ln V per grain of {largest} disks less that of fewer, μ = {mu:g}"
+            statement = (
+                f"ln V per grain of {largest} disks minus that of smaller packings, μ = {mu:g}"
+            )
             yield _finding(statement, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
 
 
@@ -205,8 +207,11 @@ def forces(table: StudyTable) -> Iterator[Claim]:
             case = f"{word}, μ = {mu:g}, f = {tail.low:g} … {tail.high:g} ⟨f_n⟩"
             for name, what in (
                 ("power", "b of exp(−(λ f)^b) for uniform P(f_n > f)"),
-                ("off_exponential", "ln of uniform P(f_n > f) about an exponential, rms"),
-                ("off_gaussian", "ln of uniform P(f_n > f) about a Gaussian, rms"),
+                (
+                    "off_exponential",
+                    "rms deviation of ln of uniform P(f_n > f) from an exponential",
+                ),
+                ("off_gaussian", "rms deviation of ln of uniform P(f_n > f) from a Gaussian"),
             ):
                 statement = f"{what}, {case}"
                 yield _finding(statement, lambda some, name=name: _part(some, name), [packings])

@@ -111,7 +111,7 @@ def weak_first(mu, rng):
         ),
         (
             claims.counts,
-            "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
+            "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about equally many contacts (μ = 0.1)",
             {"normal": np.r_[np.full(20, 3.0), np.full(CONTACTS - 20, 1.0)]},
         ),
         (
@@ -136,7 +136,7 @@ def weak_first(mu, rng):
         ),
         (
             claims.error_bars,
-            "the paper's error bar of corr(f_n, ΔF_n) holds 0 at large μ",
+            "the paper's error bar of corr(f_n, ΔF_n) includes 0 at large μ",
             {"correlation": lambda mu: 0.5},
         ),
         (
@@ -323,7 +323,7 @@ def test_findings_compare_the_same_packings():
     assert told["⟨F_crit⟩ over ⟨limit load⟩, large μ"].value == pytest.approx(0.5)
     # The pair's share of the pressure: one contact of 600.
     left_out = told[
-        "⟨F_crit⟩ with the pair left out of the pressure over the same with it, large μ"
+        "⟨F_crit⟩ with the pair excluded from the pressure over that with it included, large μ"
     ]
     assert 1 < left_out.value < 1.01
     table.rows[:] = table.part(SWEEPS)

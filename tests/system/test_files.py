@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from granforce.cli.asked import radii
 from granforce.cli.parser import main
+from granforce.cli.results import radii
 from granforce.experiment.pegs import read_pegs
 from granforce.packing.importers import load_packing
 from granforce.packing.importers.text import read_text

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.cli.asked import (
+from granforce.cli.results import (
     conditions,
     extension,
     extents,

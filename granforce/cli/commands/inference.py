@@ -5,8 +5,8 @@ import argparse
 import numpy as np
 
 from granforce.cli import frames
-from granforce.cli.asked import conditions, found, unit, write_columns, write_csv
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
+from granforce.cli.results import conditions, found, unit, write_columns, write_csv
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from granforce.cli import frames
-from granforce.cli.asked import (
+from granforce.cli.results import (
     PACKING_UNIT,
     check_outputs,
     get_packing,

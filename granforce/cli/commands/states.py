@@ -5,7 +5,8 @@ import json
 import sys
 from collections.abc import Sequence
 
-from granforce.cli.asked import (
+from granforce.cli.options import RELAXATIONS
+from granforce.cli.results import (
     conditions,
     extension,
     extents,
@@ -17,7 +18,6 @@ from granforce.cli.asked import (
     write_csv,
     write_states,
 )
-from granforce.cli.options import RELAXATIONS
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds

@@ -32,7 +32,7 @@ from granforce.paper.claims.verdicts import (
 )
 from granforce.paper.tables import StudyTable
 
-PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
+PEAK = f"μ of the maximum (parabola in log μ through the means within a factor {NEAR_PEAK:g} of it)"
 # How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
@@ -173,7 +173,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
         for values in [[row["eta2"] for row in rows]]
     ]
     yield at_each(
-        "η is well reproducible: other walks in the same packing give the same",
+        "η is reproducible: other walks in the same packing give the same value",
         "standard deviation of η2 over walks, relative to its mean",
         items(scatter, "part"),
         good=(-np.inf, 0.05),
@@ -183,8 +183,8 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for name, label in (("eta2", "η2"), ("eta3", "η3")):
         ratios = [row | {"ratio": row[name] / other[name]} for row, other in longer]
         yield at_each(
-            f"{label} does not hang on the length of the walk",
-            f"{label} of a walk that is several times as long over that of the usual one",
+            f"{label} does not depend on the length of the walk",
+            f"{label} of a walk several times as long over that of the usual walk",
             items(ratios, "ratio"),
             good=(0.95, 1.05),
             fair=(0.9, 1.1),
@@ -209,7 +209,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ),
         (
             "η falls as contacts vanish within the same cones",
-            f"μ with which packings were made, cones of μ = {widest:g}",
+            f"the μ of preparation, cones at μ = {widest:g}",
             wide,
             "made",
             (-1, -0.95),
@@ -236,7 +236,7 @@ def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for group, word, limit in zip(ends, ("smallest", "largest"), (4, 3), strict=True):
         statement = f"z → {limit} at the {word} μ"
         good, fair = ((limit - near, limit + near) for near in (NEAR, FAIR))
-        yield at_each(statement, "mean z there", group, good=good, fair=fair)
+        yield at_each(statement, "mean z at that μ", group, good=good, fair=fair)
     yield over_all(
         "z falls with μ",
         "rank correlation of mean z with μ",

@@ -40,8 +40,8 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
             yield at_each(
                 f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'}, "
                 f"in {unit}",
-                "part of the contacts that lie too far right for a density that never rises "
-                "(departure; 0 where chance makes as much)",
+                "fraction of the contacts too far right for a falling density "
+                "(departure; 0 if chance could explain it)",
                 within(groups, span),
                 good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
                 fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
@@ -109,7 +109,7 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         groups = middle | within(ratio, span)
         yield over_all(
             f"S is more elongated at {word} than at intermediate μ",
-            f"mean std/mean of ΔF_n of μ in {span_text(span)} over that in {span_text(MIDDLE)}",
+            f"mean of std/mean of ΔF_n at μ in {span_text(span)} over that in {span_text(MIDDLE)}",
             lambda keys, means, span=span: _over_middle(keys, means, span),
             dict(sorted(groups.items())),
             good=(1, np.inf),

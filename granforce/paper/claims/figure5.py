@@ -38,7 +38,7 @@ def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
         table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
     )
     yield at_each(
-        "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
+        "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about equally many contacts (μ = 0.1)",
         "number of the first over that of the second",
         within(groups, (0.1, 0.1)),
         good=(0.8, 1.25),
@@ -51,7 +51,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     groups = _marked(table, sampler, _enriched)
     yield at_each(
         "strong contacts are less determined at intermediate μ",
-        "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
+        "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
         f"μ in {span_text(MIDDLE)}",
         within(groups, MIDDLE),
         good=(1, np.inf),
@@ -63,7 +63,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
     groups = _marked(table, sampler, _enriched)
     yield at_each(
         "strong contacts and undetermined ones form unrelated patterns at μ = 10",
-        "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all",
+        "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all",
         within(groups, (10, 10)),
         good=(0.8, 1.25),
         fair=(0.5, 2),
@@ -80,13 +80,13 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
     rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
     yield at_each(
         "with only the pressure prescribed, indeterminacy is everywhere",
-        "undetermined part of the contacts that carry",
+        "undetermined fraction of the force-carrying contacts",
         items(rows, "undetermined_part"),
         good=(0.9, np.inf),
         fair=(0.5, np.inf),
     )
     yield at_each(
-        "and not in clusters",
+        "with only the pressure prescribed, undetermined contacts form one cluster",
         "number of clusters of undetermined contacts",
         items([row for row in rows if row["undetermined"]], "clusters"),
         good=(-np.inf, 1.1),
@@ -102,7 +102,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         for claim, measured, what, span, good, fair in (
             (
                 "at small μ contacts are undetermined everywhere",
-                "undetermined part of the contacts inside",
+                "undetermined fraction of the contacts inside",
                 "undetermined_part",
                 (0, 0.05),
                 (0.75, np.inf),
@@ -110,15 +110,15 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
             ),
             (
                 "at large μ most contacts are determined",
-                "determined part of the contacts inside",
+                "determined fraction of the contacts inside",
                 lambda row: 1 - row["undetermined_part"],
                 (BARELY_RIGID, np.inf),
                 (0.5, np.inf),
                 (0.25, np.inf),
             ),
             (
-                "at large μ those that are not lie in small clusters",
-                "part of the contacts inside that are in the largest cluster",
+                "at large μ the undetermined ones form small clusters",
+                "fraction of the contacts inside that are in the largest cluster",
                 lambda row: row["largest_cluster"] / row["contacts"],
                 (BARELY_RIGID, np.inf),
                 (-np.inf, 0.25),

@@ -48,7 +48,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         )
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ, against chance",
-            "the same in standard deviations 1/√(N_c − 1) of a packing whose f_n are shuffled",
+            "the same in units of 1/√(N_c − 1), the standard deviation for shuffled f_n",
             within(scores, span),
             good=limits,
             fair=wider,
@@ -56,7 +56,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
-            f"mean of μ in {span_text(span)} less that in {span_text(MIDDLE)}",
+            f"mean of μ in {span_text(span)} minus that in {span_text(MIDDLE)}",
             lambda keys, means, span=span: _mean_difference(keys, means, span),
             dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
             good=(-np.inf, 0),
@@ -74,8 +74,8 @@ def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 found.setdefault(row["mu"], []).append((row["n"], apart))
     yield at_each(
         "corr(f_n, ΔF_n) at intermediate μ is of statistical origin",
-        "what is left of it when contacts exchange the places of f_n within their intervals: the "
-        "correlation less that of places drawn anew",
+        "its remainder when contacts exchange the positions of f_n in their intervals: the "
+        "correlation minus that of permuted positions",
         within({mu: found[mu] for mu in sorted(found)}, MIDDLE),
         good=(-0.1, 0.1),
         fair=(-0.2, 0.2),
@@ -109,11 +109,15 @@ def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (
         ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),
-        ("holds 0 at large", LARGE, lambda r: r["correlation_low"] <= 0 <= r["correlation_high"]),
+        (
+            "includes 0 at large",
+            LARGE,
+            lambda r: r["correlation_low"] <= 0 <= r["correlation_high"],
+        ),
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
-            "part of packings in which the range over all other networks of the walk does so",
+            "fraction of packings in which the range over all other networks of the walk does so",
             within(items(rows, lambda r, test=test: float(test(r))), span),
             good=(0.9, np.inf),
             fair=(0.5, np.inf),

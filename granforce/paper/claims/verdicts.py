@@ -208,7 +208,7 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
     """
     ranges = Ranges((0, np.inf), (0, np.inf))
     span = f"{min(groups):g} to {max(groups):g}" if groups else "the first to the last"
-    measured = f"the smaller of rise and fall, from μ = {span}, in parts of the largest"
+    measured = f"the smaller of rise and fall, from μ = {span}, relative to the largest"
     claim = _missing(statement, source, measured, ranges)
     if len(groups) < 3:
         return claim

@@ -1,4 +1,4 @@
-"""The meaning of options: parameters, conditions, and the dataset, loaded or computed."""
+"""The results of commands: parameters and conditions from options, and their datasets."""
 
 import argparse
 import threading
