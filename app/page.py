@@ -5,7 +5,7 @@ from urllib.parse import parse_qs
 
 import panel as pn
 
-from .browser.panel_patches import answer_with_lock, mend_late_views
+from .browser.panel_patches import answer_with_lock, leave_links_alone, mend_late_views
 from .explore.explore_page import explore_page
 from .learn.learn_page import learn_page
 from .learn.model import small_scenes
@@ -18,6 +18,7 @@ def page() -> Any:
     assert document is not None  # a page always has a document
     mend_late_views(document)
     answer_with_lock()
+    leave_links_alone()
     query = (pn.state.location.search if pn.state.location else "") or ""
     request = small_scenes.request_of(query)
     if learns(query) or request.scene != small_scenes.MANY:

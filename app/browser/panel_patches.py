@@ -9,6 +9,7 @@ import param
 from bokeh.document import Document
 from bokeh.models import CustomJS
 from panel.io import document as panel_document
+from panel.io import location as panel_location
 from panel.io import unlocked
 from panel.reactive import Syncable
 from panel.util import edit_readonly  # type: ignore[attr-defined]  # not exported by panel
@@ -70,6 +71,13 @@ def answer_with_lock() -> None:
     # Panel handles them without the lock while earlier changes are still queued; Bokeh, through
     # which plots are changed, then refuses, and the whole change is lost.
     Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # the attribute acts as a mark
+
+
+def leave_links_alone() -> None:
+    """Keep Panel from parsing the address, which the page reads by itself."""
+    # Panel converts everything that looks like a number, and fails beyond 4300 digits: the page
+    # would stay empty. Other values that it cannot parse go to the log at full length.
+    vars(panel_location)["parse_query"] = lambda query: {}  # not exported by panel
 
 
 def send_what_waits(document: Document) -> None:

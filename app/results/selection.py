@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
 from granforce.cli.options import RELAXATIONS
-from granforce.records import InputError, friction
+from granforce.records import InputError, choice, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 
-from ..background.limits import Limits
+from ..background.limits import Limits, short
 
 # Names on screen of kinds.RELAXATIONS; the first is the default of a new walk.
 SOLVERS = {
@@ -31,7 +32,9 @@ KEPT_BYTES = 64e6
 EASY = 500_000
 _WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
 _WEIGHTS["gauss_seidel_only"] = 10
-LONGEST_REASON = 200  # characters of a message about a link, which may contain anything
+# Characters of a message about a link, which may contain anything, and of a whole number in a link
+# that Python converts.
+LONGEST_REASON, MOST_DIGITS = 200, 4000
 
 
 class Selection(NamedTuple):
@@ -244,37 +247,63 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
 
     InputError for an invalid selection; a link without "mu" selects nothing.
     """
-    given = dict(parse_qsl(query.lstrip("?")))
-    if "mu" not in given:
-        return None, given
+    pairs = parse_qsl(query.lstrip("?"))
+    given = dict(pairs)
     try:
-        return _read_selection(given), given
+        for name, count in Counter(name for name, _ in pairs).items():
+            if count > 1:
+                raise InputError(f"it contains {short(name)} {count} times")
+        return (_read_selection(given) if "mu" in given else None), given
     except (ValueError, TypeError) as error:
         raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
 
 
 def _read_selection(given: dict[str, str]) -> Selection:
-    kind, relax = given.pop("source", "walk"), given.pop("relax", "accelerated")
-    if kind not in KINDS or relax not in SOLVERS:
-        raise InputError("this link names an unknown source of states")
+    kind = choice(given.pop("source", "walk"), KINDS, "source")
+    relax = choice(given.pop("relax", "accelerated"), SOLVERS, "relax")
     mu = friction(given.pop("mu"))
     packed = friction(given.pop("packed", mu))
-    rest = {"states": int(given.pop("states", 200)), "seed": int(given.pop("walkseed", 0))}
+    rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
         return Selection(packing, mu, kind, relax, **rest)
     made = select(
-        int(given.pop("n", 400)),
+        _whole(given, "n", 400),
         mu,
-        int(given.pop("seed", 1)),
+        _whole(given, "seed", 1),
         packed,
         given.pop("box", "square"),
         kind=kind,
         relax=relax,
         **rest,
     )
-    casts = {"radii": str, "sweeps": int}
-    options = {name: casts.get(name, float)(given.pop(name)) for name in OPTIONS if name in given}
-    if ":" not in options.get("radii", ":"):
-        raise InputError("radii in a link must be a named distribution")
+    options: Parameters = {
+        name: (_whole if name == "sweeps" else _number)(given, name)
+        for name in OPTIONS
+        if name in given and name != "radii"
+    }
+    if "radii" in given:
+        options["radii"] = given.pop("radii")
+        if ":" not in options["radii"]:
+            raise InputError("radii in a link must be a named distribution")
     return made._replace(packing=made.packing | options)
+
+
+def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
+    """The whole number of a name, which is taken out; InputError if it is no such number."""
+    text = given.pop(name, str(usual))
+    if not text.lstrip("+-").isdecimal():
+        raise InputError(f"{name} must be a whole number, got {short(text)}")
+    if len(text) > MOST_DIGITS:
+        raise InputError(f"{name} must be a number of few digits, got {short(text)}")
+    return int(text)
+
+
+def _number(given: dict[str, str], name: str) -> float:
+    """The number of a name, which is taken out; InputError if it is none."""
+    try:
+        return float(given[name])
+    except ValueError:
+        raise InputError(f"{name} must be a number, got {short(given[name])}") from None
+    finally:
+        del given[name]

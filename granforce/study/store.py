@@ -77,7 +77,7 @@ def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Sto
         raise InputError(f"there is no store at {path}; check the path or open it for writing")
     store = Store(path, readonly=readonly)
     if not readonly:
-        _refuse_newer(path)
+        refuse_newer(path)
     if _schema(path) is None:
         _refuse_foreign(path)
         # Entries without a root are readable; the first save creates the root.
@@ -119,7 +119,7 @@ def is_store(path: Path) -> bool:
     return _schema(path) is not None
 
 
-def _refuse_newer(path: Path) -> None:
+def refuse_newer(path: Path) -> None:
     """Raise InputError for a store of a newer schema, whose contents are unknown here."""
     schema = _schema(path)
     if schema is not None and schema > keys.SCHEMA_VERSION:
@@ -429,7 +429,7 @@ class Store(Mapping[str, xr.Dataset]):
     def _writing(self) -> Iterator[None]:
         if self.readonly:
             raise InputError(f"the store {self.path} was opened read-only")
-        _refuse_newer(self.path)
+        refuse_newer(self.path)
         try:
             yield
         except OSError as error:

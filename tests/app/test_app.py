@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from types import SimpleNamespace
+from urllib.parse import urlencode
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
 from app.explore.tabs.tabs import TABS
+from app.learn.model import small_scenes
 from app.packing.player import frames
 from app.packing.view import PackingView, exact_intervals
 from app.page import learns
@@ -757,6 +759,37 @@ def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
             line = state.work.message
         assert line and "\n" not in line and len(line) <= 300, value[:20]
         assert not state.work.busy and state.replay is before and state.selection is selection
+
+
+# No number, for any of the keys that take one; and digits of other scripts, which count as digits.
+NO_NUMBER = "9" * 5000 + "x", "²", "0x10", "True", "[1]", "1\n2", "💥", "\0", "1~" * 9000, " "
+
+
+@pytest.mark.parametrize("key", ["n", "seed", "states", "walkseed", "sweeps", "mu", "dt", "packed"])
+def test_a_link_with_what_is_no_number_names_the_key_in_one_line(key):
+    whole = ["1.5", "nan", "1e5", "9" * 5000] if key in ("n", "seed", "states") else []
+    for text in (*NO_NUMBER, *whole):
+        with pytest.raises(InputError) as refused:
+            read_link(urlencode({"mu": "0.2"} | {key: text}))
+        line = str(refused.value)
+        words = "friction coefficient" if key in ("mu", "packed") else key
+        assert line.startswith(f"this link cannot be read: {words} must be a ")
+        assert "\n" not in line and len(line) < 120
+
+
+def test_a_link_with_a_key_twice_is_refused(state):
+    for query in ("mu=0.2&mu=0.3", "mu=0.2&tab=push&tab=friction", "n=20&n=20&n=20"):
+        with pytest.raises(InputError, match=r"it contains '(mu|tab|n)' \d times"):
+            read_link(query)
+    asked = small_scenes.asked("?scene=many&mu=0.2&mu=0.3")
+    assert asked.scene == small_scenes.MANY and asked.query == "?mu=0.2&mu=0.3"
+    state.open(asked.query)
+    assert "contains 'mu' 2 times" in state.work.message and not state.work.computation.running
+
+
+def test_keys_that_others_add_to_a_link_are_ignored():
+    wanted, view = read_link("mu=0.2&n=20&utm_source=%F0%9F%92%A5&fbclid=" + "x" * 9000)
+    assert wanted.packing["n"] == 20 and set(view) == {"utm_source", "fbclid"}
 
 
 def test_all_that_a_link_may_name_is_limited():

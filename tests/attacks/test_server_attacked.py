@@ -257,9 +257,9 @@ def test_limits_hold_whatever_is_said(shared):
     before = {entry.name for entry in kept(folder)}
     statements = "~".join(f"{c}:1" for c in range(33))
     many = f"{HELD}&known={statements}", f"{HELD}&known=0:{'9' * 400}", f"{HELD}&pulls={statements}"
-    # Beyond 4300 digits Panel itself fails on the link: that visitor's page stays empty.
     links = ["?mu=0.2&n=61&states=5", "?mu=0.2&n=30&states=20001", f"?mu=0.2&n={HUGE}&states=5"]
-    links += ["?mu=1e9&n=30&states=5", f"?scene=own&built={'1,1,1;' * 5000}", f"?mu={'9' * 4000}"]
+    links += ["?mu=1e9&n=30&states=5", f"?scene=own&built={'1,1,1;' * 5000}", f"?mu={'9' * 5000}"]
+    links += [f"?mu=0.2&n=30&states=5&seed={'9' * 5000}", "?mu=0.2&mu=0.3", "?x=[" + "9" * 5000]
 
     async def visit():
         for query in (*links, *many):

@@ -286,6 +286,14 @@ def test_cache_commands_make_no_store(run, tmp_path, action):
     assert not (tmp_path / "typo").exists()
 
 
+@pytest.mark.parametrize("action", ["list", "size", "verify", "clear", "path"])
+def test_cache_commands_refuse_a_store_of_a_newer_schema(run, tmp_path, action):
+    root = {"zarr_format": 3, "node_type": "group", "attributes": {"granforce_store": 1000}}
+    (tmp_path / "zarr.json").write_text(json.dumps(root))
+    code, out, err = run("cache", action, "--cache", tmp_path)
+    assert (code, out, err.count("\n")) == (2, "", 1) and "made by a newer granforce" in err
+
+
 def test_a_file_in_the_place_of_a_result_is_told_before_anything_is_computed(run, tmp_path):
     run("walk", *SMALL, "--cache", tmp_path / "s")
     (entry,) = (tmp_path / "s").glob("walk-*")

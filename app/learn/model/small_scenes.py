@@ -39,17 +39,18 @@ def request_of(query: str) -> Request:
     Older links, from before scenes existed, contain a μ, a tab or similar, and refer to large
     packings.
     """
-    given = dict(parse_qsl(query.lstrip("?")))
-    named = "scene" in given
-    name = given.pop("scene", MANY)
+    pairs = parse_qsl(query.lstrip("?"))
+    given = dict(pairs)
+    name = given.get("scene", MANY)
     if name not in (*scenes.SCENES, OWN):
         name = FIRST
     try:
         mu = friction(given["mu"])
     except (KeyError, InputError):
         mu = None
-    if named:
-        query = f"?{urlencode(given)}" if given else ""
+    if "scene" in given:
+        others = [pair for pair in pairs if pair[0] != "scene"]
+        query = f"?{urlencode(others)}" if others else ""
     dark = given.get("dark") == "1"
     return Request(name, mu, dark, given.get("built", "")[:LONGEST], query)
 

@@ -21,7 +21,7 @@ import platformdirs
 from granforce.cli.parsing import ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study import kinds
-from granforce.study.store import Store, open_store
+from granforce.study.store import Store, open_store, refuse_newer
 from granforce.system.files import make_folder
 from granforce.system.plain import json_text
 from granforce.system.terminal import print_list, print_report
@@ -148,6 +148,7 @@ def cache(arguments: argparse.Namespace) -> int:
         print(json_text({"path": path}) if arguments.json else path)
         return 0
     store = open_store(arguments.cache, readonly=True)  # readonly: does not create a missing store
+    refuse_newer(store.path)
     if arguments.kind is not None:
         _check_kind(store, arguments.kind)
     if arguments.action == "clear":
