@@ -1,5 +1,7 @@
 """A packing with one of its force networks, or the mean or spread of many."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import holoviews as hv
@@ -13,6 +15,7 @@ from granforce.types import Floats
 
 COLOURS = ("mobilisation", "force", "spread")
 WIDEST = 4.0  # f_n / ⟨f_n⟩ beyond which lines have constant width
+FILL, EDGE = "#eeeeee", "#aaaaaa"  # of disks
 MOST_DISKS = 4000  # disks are not drawn in larger packings
 _MAPS = {"mobilisation": "coolwarm", "force": "viridis_r", "spread": "magma_r"}
 _WORDS = {
@@ -38,8 +41,8 @@ def plot(
     force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
     there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
     "force", "spread" (standard deviation of f_n over states), or numbers (k,). Walls are drawn
-    where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the
-    first, and .pdf, .png, .svg with the second.
+    as given, or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
+    .html with the first, and .pdf, .png, .svg with the second.
 
     Raises InputError for states that do not match these contacts, and for an unknown colour.
     """
@@ -111,7 +114,12 @@ def _lines(
     )
     wide = {"line_width" if backend == "bokeh" else "linewidth": "w"}
     return segments.opts(
-        backend=backend, color="value", colorbar=True, clabel=label, **wide, **look
+        backend=backend,
+        color="value",
+        colorbar=True,
+        clabel=style.typeset(label, backend),
+        **wide,
+        **look,
     )
 
 
@@ -128,13 +136,19 @@ def _disks(packing: Packing, backend: str) -> list[Any]:
     at, shapes = cell.across(x), []
     for moved, seen in cell.images(at - r[:, None], at + r[:, None]):
         shapes += [x[k] + moved + r[k] * _CIRCLE for k in seen]
-    name = "fill_color" if backend == "bokeh" else "facecolor"
-    edge = "line_color" if backend == "bokeh" else "edgecolor"
-    return [hv.Polygons(shapes).opts(backend=backend, **{name: "#eeeeee", edge: "#aaaaaa"})]
+    # In Matplotlib by `color` too: HoloViews takes Bokeh's default for it where Bokeh came first.
+    if backend == "bokeh":
+        look = {"fill_color": FILL, "line_color": EDGE}
+    else:
+        look = {"color": FILL, "facecolor": FILL, "edgecolor": EDGE}
+    return [hv.Polygons(shapes).opts(backend=backend, **look)]
 
 
 def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[Any]:
-    """Short lines along external supports, at the points of contact."""
+    """Walls as given, else short lines along external supports at the points of contact."""
+    given = packing.info.get("walls")
+    if isinstance(given, list):  # other importers count them
+        return [hv.Segments(given, label="wall").opts(backend=backend, color="#000000")]
     c, held = packing.contacts.picked(numbers), _held(packing)
     touched = np.flatnonzero(held[c.j])
     if not len(touched):
