@@ -255,12 +255,26 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
     return lines
 
 
+LABELS = ("i", "j", "x", "y")  # of a contact: its grains, and the point of contact
+
+
+def contact_labels(
+    arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
+) -> dict[str, Any]:
+    """Columns contact, i, j, x and y of a result per contact."""
+    packing, _ = get_packing(arguments.store, parameters["packing"])
+    numbers = dataset["backbone"].values
+    contacts, at = packing.contacts.picked(numbers), packing.contact_points[numbers]
+    return {"contact": numbers, "i": contacts.i, "j": contacts.j, "x": at[:, 0], "y": at[:, 1]}
+
+
 def write_columns(path: str, columns: Mapping[str, Any]) -> None:
     """Write columns {name: array} in the format given by the suffix."""
     if path.endswith(".zarr"):
-        rows = next(iter(columns))
-        named = {name: (rows, values) for name, values in columns.items() if name != rows}
-        save_series(xr.Dataset(named, {rows: columns[rows]}), path)
+        rows, *others = columns
+        data = {name: (rows, columns[name]) for name in others if name not in LABELS}
+        labels = {name: (rows, columns[name]) for name in others if name in LABELS}
+        save_series(xr.Dataset(data, {rows: columns[rows], **labels}), path)
     elif path.endswith(".npz"):
         write_arrays(path, columns)
     else:
@@ -279,10 +293,7 @@ def write_states(
     path = arguments.out
     if path is None:
         return
-    packing, _ = get_packing(arguments.store, parameters["packing"])
-    numbers, forces = dataset["backbone"].values, unit(arguments, dataset)
-    contacts, at = packing.contacts.picked(numbers), packing.contact_points[numbers]
-    labels = {"contact": numbers, "i": contacts.i, "j": contacts.j, "x": at[:, 0], "y": at[:, 1]}
+    labels, forces = contact_labels(arguments, parameters, dataset), unit(arguments, dataset)
     states = dataset["states"].values.astype(np.float64)
     if path.endswith(".npz"):
         write_arrays(path, {**forces.named({"states": states}), **labels})
@@ -294,7 +305,7 @@ def write_states(
         save_series(xr.Dataset({name: (dims, values)}, coordinates), path)
     else:
         count = len(states)
-        columns = {"state": np.repeat(np.arange(count), len(numbers))}
+        columns = {"state": np.repeat(np.arange(count), dataset.sizes["contact"])}
         columns |= {label: np.tile(column, count) for label, column in labels.items()}
         pair = {"f_n": states[..., 0].ravel(), "f_t": states[..., 1].ravel()}
         write_csv(path, columns | forces.named(pair))

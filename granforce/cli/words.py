@@ -403,7 +403,7 @@ def add_stress(commands: Commands) -> None:
     )
     add_known(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    add_out(group, "write the largest stress for each direction")
+    add_out(group, "the largest stress for each direction")
     add_store(command)
 
 

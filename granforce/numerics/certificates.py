@@ -26,8 +26,10 @@ _BALANCED_DIRECTION = 1e-13
 # Mean of y (in ⟨f_n⟩) up to which a contact is proved to carry no force: the mean is 1 in S.
 _USUAL_MEAN = 2.0
 UNBOUNDED = (
-    "the forces on these contacts are not bounded: prescribe a pressure or a load, give bounds on "
-    "single forces, or freeze the surrounding contacts"
+    "the forces on these contacts are not bounded: some can press against each other without a "
+    "load, such as disks wedged between walls; prescribe a pressure or a load, use a smaller "
+    "friction coefficient, give bounds on single forces (known forces), or freeze the surrounding "
+    "contacts (a slice)"
 )
 
 

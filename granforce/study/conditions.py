@@ -22,7 +22,9 @@ def conditions(
     """
     prescribed = choice(prescribed, PRESCRIBED, "prescribed")
     if stress is not None and prescribed != "stress":
-        raise InputError("a stress is given, but not prescribed: prescribe the stress")
+        raise InputError(
+            "a stress is given, but not prescribed: add --prescribe stress (prescribed='stress')"
+        )
     named = {} if prescribed == "pressure" else {"prescribed": prescribed}
     if stress is not None:
         named["stress"] = float_array(stress, (3,), "stress").tolist()

@@ -2,16 +2,17 @@
 
 import argparse
 import json
-from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from granforce.cli.results import (
+    StoredResult,
     conditions,
+    contact_labels,
     extension,
     extents,
     found,
+    get_packing,
     known_forces,
     numbers,
     unit,
@@ -26,7 +27,7 @@ from granforce.system.terminal import print_report
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
     chosen = numbers("--contacts", arguments.contacts, int)
-    _, _, dataset, ends = found(
+    _, parameters, dataset, ends = found(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
         random=None if arguments.all or chosen is not None else arguments.random,
@@ -57,23 +58,23 @@ def perturb(arguments: argparse.Namespace) -> None:
     print_report(lines, arguments.json)
     if arguments.out is not None:
         names = ("limit_load", "critical_low", "critical_high")
-        columns = {"contact": dataset["backbone"].values}
+        columns = contact_labels(arguments, parameters, dataset)
         columns |= forces.named({name: dataset[name].values for name in names})
         names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
         write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
 
 
-def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[str, Any]]:
-    """The dataset of exact bounds or limit loads, and the last lines of its report."""
+def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
+    """Exact bounds or limit loads."""
     contacts = numbers("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
     chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
-    return found(arguments, kind, arguments.out, **chosen)[2:]
+    return found(arguments, kind, arguments.out, **chosen)
 
 
 def intervals(arguments: argparse.Namespace) -> None:
     """Compute or load exact intervals, and report them."""
-    dataset, ends = _exact(arguments, kinds.INTERVALS)
+    _, parameters, dataset, ends = _exact(arguments, kinds.INTERVALS)
     forces = unit(arguments, dataset)
     position = dataset["position"].values
     cluster = dataset["cluster"].values
@@ -99,13 +100,13 @@ def intervals(arguments: argparse.Namespace) -> None:
             for side in ("low", "high")
             for k, part in enumerate(("f_n", "f_t"))
         }
-        columns = {"contact": dataset["backbone"].values, **forces.named(bounds)}
+        columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
         write_columns(arguments.out, columns | {"cluster": cluster})
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
     """Compute or load limit loads, and report them."""
-    dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
+    _, parameters, dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
     forces, load = unit(arguments, dataset), dataset["limit_load"].values
     reported = {
         "mean_normal_force": dataset["force_scale"].item(),
@@ -122,15 +123,18 @@ def limit_loads(arguments: argparse.Namespace) -> None:
     }
     print_report(lines, arguments.json)
     if arguments.out is not None:
-        columns = {"contact": dataset["backbone"].values}
+        columns = contact_labels(arguments, parameters, dataset)
         write_columns(arguments.out, columns | forces.named({"limit_load": load}))
 
 
 def stress(arguments: argparse.Namespace) -> None:
     """Compute or load the outline of stresses, and report it."""
     chosen = {"angles": arguments.angles, **known_forces(arguments)}
-    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **chosen)
-    own = dataset["stress_own"].values
+    _, parameters, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **chosen)
+    own, carried = dataset["stress_own"].values, dataset["stress_inner"].values
+    packing, _ = get_packing(arguments.store, parameters["packing"])
+    difference, shear = carried.mean(axis=0)
+    middle = packing.pressure * np.array([1 + difference, 1 - difference, shear])
     lines = {
         **extension(dataset),
         "largest_shear_over_pressure": dataset["friction"].item(),
@@ -138,6 +142,9 @@ def stress(arguments: argparse.Namespace) -> None:
         "own_shear_over_pressure": float(np.hypot(*own)),
         "own_normal_difference": float(own[0]),
         "own_shear_stress": float(own[1]),
+        "normal_difference_from_to": np.quantile(carried[:, 0], [0, 1]).tolist(),
+        "shear_stress_from_to": np.quantile(carried[:, 1], [0, 1]).tolist(),
+        "admissible_stress": ",".join(f"{value:.8g}" for value in middle),
         **json.loads(dataset.attrs["counts"]),
         "largest_duality_gap": float(dataset["stress_gap"].max()),
         **ends,

@@ -6,11 +6,18 @@ import numpy as np
 
 from granforce.cli import frames
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
-from granforce.cli.results import conditions, found, unit, write_columns, write_csv
+from granforce.cli.results import (
+    conditions,
+    contact_labels,
+    found,
+    unit,
+    write_columns,
+    write_csv,
+)
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
-from granforce.system.terminal import print_report
+from granforce.system.terminal import print_report, table
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -21,7 +28,7 @@ INFERENCE_LINES = (
 
 def informative(arguments: argparse.Namespace) -> None:
     """Rank contacts worth measuring, or load the ranking, and report them; intervals in ⟨f_n⟩."""
-    entry, _, dataset, ends = found(
+    entry, parameters, dataset, ends = found(
         *(arguments, kinds.INFORMATIVE, arguments.out),
         k=arguments.best,
         check=arguments.check,
@@ -29,19 +36,18 @@ def informative(arguments: argparse.Namespace) -> None:
         seed=arguments.sample_seed,
         **conditions(arguments),
     )
-    columns = {
-        "contact": dataset["backbone"].values,
+    columns = contact_labels(arguments, parameters, dataset) | {
         "part_expected": dataset["part_expected"].values,
         "mean_interval_after [mean]": dataset["mean_after"].values,
     }
-    lines = {
-        "entry": entry,
-        "contacts": columns["contact"].tolist(),
-        "part_expected": columns["part_expected"].tolist(),
-        "mean_interval_now [mean]": dataset["mean_before"].item(),
-        "mean_interval_after [mean]": columns["mean_interval_after [mean]"].tolist(),
-    }
-    print_report(lines | ends, arguments.json)
+    lines = {"entry": entry, "mean_interval_now [mean]": dataset["mean_before"].item(), **ends}
+    ranked = {name: values.tolist() for name, values in columns.items()}
+    if arguments.json:
+        print_report(lines | ranked, True)
+    else:
+        print_report(lines, False)
+        rows = [dict(zip(ranked, row, strict=True)) for row in zip(*ranked.values(), strict=True)]
+        table(rows, list(ranked), {name: name.replace("_", " ") for name in ranked})
     if arguments.out is not None:
         write_columns(arguments.out, columns)
 
@@ -57,7 +63,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         )
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
-    entry, _, dataset, ends = found(
+    entry, parameters, dataset, ends = found(
         *(arguments, kinds.INFERENCE, arguments.csv),
         options={"measured": measured},
         measured=measured,
@@ -84,7 +90,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         **forces.reported({"mean_change_of_f_n": float(np.nanmean(change[:, 0]))}),
         "suspects": dataset["suspect"].values.tolist(),
     }
-    columns = {"contact": dataset["backbone"].values}
+    columns = contact_labels(arguments, parameters, dataset)
     for k, part in enumerate(("f_n", "f_t")):
         columns |= forces.named({part: dataset["inferred"].values[:, k]})
         columns |= {f"deviation_{part} [sigma]": dataset["deviation"].values[:, k]}

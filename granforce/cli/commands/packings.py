@@ -92,9 +92,12 @@ def import_(arguments: argparse.Namespace) -> int | None:
         raise InputError("--pressure applies only to a table without forces or loads: leave it out")
     for note in packing.info.get("notes", []):
         print(f"granforce: {note}", file=sys.stderr)
-    named = ("timestep", "time", "contacts_skipped", "disks", "walls")
+    named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
+    if "disks" in packing.info:  # behind each contact with a wall is a grain of its own
+        disks = packing.info["disks"]
+        lines |= {"grains": disks, "contacts_with_walls": len(packing.r) - disks}
     _report(lines, packing, arguments)
     return None
 

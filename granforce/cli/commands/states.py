@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from granforce.cli.options import RELAXATIONS
 from granforce.cli.results import (
     conditions,
+    contact_labels,
     extension,
     extents,
     found,
@@ -130,9 +131,8 @@ def measure(arguments: argparse.Namespace) -> None:
     if arguments.contacts is not None:
         sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
         columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
-        write_csv(
-            arguments.contacts, {"contact": dataset["backbone"].values, **forces.named(columns)}
-        )
+        labels = contact_labels(arguments, parameters, dataset)
+        write_csv(arguments.contacts, labels | forces.named(columns))
 
 
 def scan(arguments: argparse.Namespace) -> int:

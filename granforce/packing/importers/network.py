@@ -1,5 +1,7 @@
 """The force network of an imported packing: given or computed, checked, and reported."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -166,7 +168,7 @@ def _margin(packing: Packing) -> dict[str, float | None]:
 
 def _largest_overlap(packing: Packing) -> float:
     gap = overlapping(packing.x, packing.r, packing.cell)[2]
-    return float(-gap.min(initial=0.0) / packing.r.max())
+    return float(max(0.0, -gap.min(initial=0.0)) / packing.r.max())
 
 
 def _left_over(packing: Packing) -> Floats:
