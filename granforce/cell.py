@@ -1,5 +1,7 @@
 """The periodic cell: images of points and of vectors between them."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Iterator
 from typing import NamedTuple

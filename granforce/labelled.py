@@ -1,5 +1,7 @@
 """Results as xarray datasets and pandas tables, with labelled contacts and components."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

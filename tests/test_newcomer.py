@@ -27,6 +27,19 @@ def test_tab_and_help_list_the_public_names_and_nothing_else():
     assert "    pack(" in told and "class Packing(" in told and "find_a_place" not in told
 
 
+def test_help_shows_types_by_their_names():
+    spaces = [gf, gf.measures, gf.figures]
+    functions = {
+        function
+        for space in spaces
+        for name in dir(space)
+        if inspect.isfunction(function := getattr(space, name)) and not name.startswith("_")
+    }
+    assert len(functions) > 60
+    for function in functions:
+        assert "numpy." not in str(inspect.signature(function)), function.__name__
+
+
 def test_the_version_is_said_by_library_and_command(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
@@ -95,6 +108,8 @@ def test_other_wrong_first_arguments_name_the_call_too():
     S = gf.ensemble(gf.scene("groove", 0.5))
     with pytest.raises(gf.InputError, match=r"give its `\.states`"):
         gf.measures.eta1(gf.walk(S, 5))
+    with pytest.raises(gf.InputError, match=r"eta3\(exact\.low, exact\.high\)"):
+        gf.measures.eta3(gf.intervals(S))
     with pytest.raises(gf.InputError, match=r"give its `\.flat`"):
         gf.measures.eta2(gf.sample_uniform(S, 8))
     with pytest.raises(gf.NotJammedError, match=r"`granforce stress`.*gf\.stress_outline"):
@@ -158,6 +173,36 @@ def test_report_table_and_library_agree_in_the_unit_that_names_carry(unit, cache
     load = pd.read_csv("table.csv")[f"limit_load [{unit}]"].to_numpy()
     assert load == pytest.approx(loads, abs=1e-7)
     assert told[f"mean_limit_load [{unit}]"] == pytest.approx(loads.mean(), abs=1e-7)
+
+
+def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
+    packing = packed(30, 0.3)
+    gf.save_packing(packing, "p.npz")
+    labels = gf.to_dataframe(gf.intervals(S := gf.ensemble(packing)), S)[["i", "j", "x", "y"]]
+    commands = "intervals --out", "limit-loads --out", "measure --states 4 --contacts"
+    for command in (*commands, "perturb --random 2 --out", "informative --best 3 --out"):
+        words = [*command.split(), "table.csv", "--packing", "p.npz"]
+        assert main(words) == 0, command
+        table = pd.read_csv("table.csv").set_index("contact")
+        expected = labels.set_axis(S.index).loc[table.index]
+        assert table.columns[:4].tolist() == ["i", "j", "x", "y"]
+        assert np.array_equal(table[["i", "j", "x", "y"]], expected)
+    assert main("intervals --packing p.npz --out bounds.csv".split()) == 0
+    assert gf.read_known("bounds.csv").contacts.tolist() == S.index.tolist()
+    assert main("intervals --packing p.npz --out bounds.zarr".split()) == 0
+    assert set(xr.open_zarr("bounds.zarr").coords) == {"contact", "i", "j", "x", "y"}
+
+
+def test_a_stress_that_can_be_prescribed_is_reported(cache, capsys):
+    gf.save_packing(packing := packed(30, 0.3), "p.npz")
+    told = report(capsys, "stress", "--packing", "p.npz")
+    low, high = told["shear_stress_from_to"]
+    assert low < told["own_shear_stress"] < high
+    words = "intervals --packing p.npz --prescribe stress --stress"
+    held = report(capsys, *words.split(), told["admissible_stress"])
+    assert held["dimension"] == gf.ensemble(packing).dimension - 2
+    assert main("intervals --packing p.npz --stress 1,1,0".split()) == 2
+    assert "--prescribe stress" in capsys.readouterr().err
 
 
 def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys):
@@ -266,6 +311,19 @@ def test_a_packing_is_drawn_with_states_and_walls(suffix, colour, tmp_path):
         gf.plot(packing, states[:, :1])
 
 
+def test_pictures_look_the_same_whichever_backend_was_loaded_first():
+    code = (
+        "import granforce as gf, holoviews as hv\n"
+        "packing = gf.scene('groove', 0.5)\n"
+        "gf.plot(packing)\n"
+        "drawn = hv.render(gf.plot(packing, backend='matplotlib'), backend='matplotlib')\n"
+        "disks = drawn.axes[0].collections[0]\n"
+        "print(disks.get_facecolor()[0, 0] > 0.9, disks.get_edgecolor()[0, 0] < 0.7)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.stdout == "True True\n", run.stderr
+
+
 @pytest.mark.parametrize("command", ["walk", "uniform"])
 def test_states_are_written_in_the_format_of_the_suffix(command, cache, capsys):
     gf.save_packing(packed(30, 0.3), "p.npz")
@@ -298,7 +356,8 @@ def test_a_pile_of_own_disks_stands_on_its_floor_from_tables_and_from_arrays(cac
     table.to_csv("grains.csv", index=False)
     words = "import table grains.csv --mu 0.6 --gravity 2 --out pile.npz --walls"
     told = report(capsys, *words.split(), "floor")
-    assert (told["disks"], told["dimension"]) == (5, 5)
+    assert [told[name] for name in ("grains", "contacts_with_walls", "dimension")] == [5, 3, 5]
+    assert str(told["largest_overlap"]) == "0.0"
     packing = gf.from_disks(x, np.ones(5), 0.6, walls="floor", gravity=2)
     assert np.array_equal(gf.load_packing("pile.npz").forces, packing.forces)
     floor = packing.contacts.j >= 5
@@ -339,9 +398,13 @@ def test_what_to_measure_next(cache, capsys):
     told = report(capsys, *words.split())
     S = gf.ensemble(packed(30, 0.3))
     best = gf.informative(S, 4, states=100, check=2)
-    assert told["contacts"] == best.contacts.tolist()
+    assert told["contact"] == best.contacts.tolist()
     assert told["mean_interval_after [mean]"][0] < told["mean_interval_now [mean]"]
-    assert pd.read_csv("next.csv")["contact"].tolist() == told["contacts"]
+    assert main(words.split()) == 0
+    *_, heads, first, _, _, _ = capsys.readouterr().out.splitlines()
+    assert heads.split()[:5] == ["contact", "i", "j", "x", "y"]
+    assert int(first.split()[0]) == best.contacts[0]
+    assert pd.read_csv("next.csv")["contact"].tolist() == told["contact"]
 
 
 def test_the_store_says_where_it_is_and_makes_nothing(cache, capsys):

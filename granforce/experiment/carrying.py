@@ -1,5 +1,7 @@
 """Contacts that certainly carry force: in every network that agrees with a measurement."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The frames of an experiment: their files and their numbers."""
 
+from __future__ import annotations
+
 import itertools
 import re
 from collections.abc import Mapping, Sequence

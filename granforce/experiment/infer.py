@@ -9,6 +9,8 @@ walls of S: the distribution of the forces given the measurement, balance and Co
 from it give the standard error of every force, including those that were not measured.
 """
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from functools import partial

@@ -1,5 +1,7 @@
 """Which measurement next: the contact whose force would say most about all others."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Measured forces of a packing's contacts, as tables (CSV)."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -7,6 +7,8 @@ grains that still cannot be balanced, and their balance is left open. So is that
 unless the directions of their contacts with the walls are known (`walls`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, cast
 

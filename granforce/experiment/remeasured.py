@@ -13,6 +13,8 @@ Introduction to the Bootstrap, 1993). It lies on walls as often as nearest netwo
 components count as 0 with an error of `unmeasured` ⟨f_n⟩, in either measurement.
 """
 
+from __future__ import annotations
+
 import time
 
 import numpy as np

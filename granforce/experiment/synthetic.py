@@ -1,5 +1,7 @@
 """Photoelastic frames made from packings with known forces, with the errors of real frames."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import NamedTuple
 

@@ -8,6 +8,8 @@ a section through the cone; each is then solved for from the sides that meet in 
 ray counts as one where it is certified: A d = 0, d ≥ 0.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 

@@ -10,6 +10,8 @@ Times for 400 disks at μ = 0.1 (h = 232, 2628 programs, one thread of a shared 
     interior point, eight lanes                                            4 s,  16 steps each
 """
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

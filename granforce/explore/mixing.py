@@ -5,6 +5,8 @@ Rank-normalised split R̂ and effective sample sizes as in Vehtari et al., Bayes
 numbers, one component at a time, which for thousands takes longer than sampling.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

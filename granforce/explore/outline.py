@@ -8,6 +8,8 @@ them is still too far, so that the polygons close on each other from both sides 
 Math. Math. Phys. 32, 114, 1992).
 """
 
+from __future__ import annotations
+
 from contextlib import suppress
 from typing import Any, NamedTuple
 

@@ -4,6 +4,8 @@ The contact's f_n is pinned and its f_t is free: a contact program whose polygon
 a segment. Values are solved together (`numerics.contact_program`).
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -5,6 +5,8 @@ the ratio of the largest shear stress to the pressure, whatever the directions o
 linear in the forces, so that the stresses of S fill a convex polygon.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

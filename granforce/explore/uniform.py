@@ -4,6 +4,8 @@ Unlike the paper's walk, whose measure is not known, these walks have the unifor
 stationary one (see `billiard`), for any initial state.
 """
 
+from __future__ import annotations
+
 import copy
 import time
 from collections.abc import Callable, Sequence

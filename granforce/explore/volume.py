@@ -15,6 +15,8 @@ down from the narrowest distribution and one up from uniform states: if chains w
 forget their start, the two would differ.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
 import time

@@ -1,5 +1,7 @@
 """Figure of the benchmark: run time against error, size and friction."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from typing import Any
 

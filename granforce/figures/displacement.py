@@ -1,5 +1,7 @@
 """The first motion of a packing under a local force, drawn on its grains."""
 
+from __future__ import annotations
+
 import holoviews as hv
 import numpy as np
 

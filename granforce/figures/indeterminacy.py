@@ -1,5 +1,7 @@
 """Figures 1, 4 and 6: indeterminacy, its distribution, and its correlation with the force."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Figures 3 and 5: the possible forces of single contacts, and the positions of those contacts."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 

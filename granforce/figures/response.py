@@ -1,5 +1,7 @@
 """Figure 2: the response of a packing to a local force, against its indeterminacy."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The style of figures in either backend: colours, lines, points, frames; and how to save them."""
 
+from __future__ import annotations
+
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence

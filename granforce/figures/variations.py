@@ -1,5 +1,7 @@
 """Beyond the paper's figures: other sizes, boundaries and frictions, and the centre of S."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 

@@ -4,6 +4,8 @@ Bounds on f_n and f_t of a contact cut its cone down to a small convex polygon. 
 bounds coincide is *pinned*; every other bound is a *side*.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -5,6 +5,8 @@ contacts, so the diagnostics also sum variances and covariances over all compone
 thousands of single components would indicate "not mixed" for independent states.
 """
 
+from __future__ import annotations
+
 from functools import partial
 from typing import NamedTuple
 

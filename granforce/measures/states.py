@@ -3,6 +3,8 @@
 States are arrays (S, N_c, 2) of force networks (f_n, f_t) on the same contacts.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -89,12 +91,17 @@ def _bounds(low: Any, high: Any) -> tuple[Floats, Floats]:
     return low, high
 
 
-def eta3(low: Floats, high: Floats) -> float:
+def eta3(low: Floats, high: Floats | None = None) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
 
-    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact. Raises InputError if
-    their shapes differ, and where low exceeds high.
+    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact, both required.
+    Raises InputError if their shapes differ, and where low exceeds high.
     """
+    if high is None:
+        raise InputError(
+            "eta3 takes two arrays (N_c, 2): eta3(exact.low, exact.high) of exact intervals, "
+            "eta3(*intervals_seen(states)) of states"
+        )
     low, high = _bounds(low, high)
     return float((high - low).mean() / ((high + low) / 2).mean())
 

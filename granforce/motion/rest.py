@@ -7,6 +7,8 @@ forces decide between the two. A packing is at rest if the exact step of contact
 again from the resulting network with noise on every force.
 """
 
+from __future__ import annotations
+
 from collections.abc import Generator
 from typing import Any, NamedTuple
 

@@ -5,6 +5,8 @@ linearised non-overlap. A box with a free shape has three strains instead of one
 `box_motion`), and its networks must carry the same pressure along x and y and no shear stress.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np

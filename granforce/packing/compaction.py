@@ -7,6 +7,8 @@ given accuracy; steps grow as grains slow down. Once grains are nearly in balanc
 rest; there, linear programs finish the packing (`closing`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """Force networks in files of other programs: VTK XML for ParaView, dumps of LAMMPS."""
 
+from __future__ import annotations
+
 import base64
 import struct
 from collections.abc import Mapping

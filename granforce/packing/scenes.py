@@ -8,6 +8,8 @@ its forces f_t sum to 0, and it does not tilt, since f_n act on its centre. Such
 like any other, and nothing else in granforce depends on scenes.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple

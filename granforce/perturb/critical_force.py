@@ -15,6 +15,8 @@ F_crit ≤ limit load. They differ because sliding contacts do not dilate (the l
 grains may start to move although an equilibrium exists.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Generator, Sequence
 from typing import Any, NamedTuple, TypeVar
 

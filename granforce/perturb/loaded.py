@@ -9,6 +9,8 @@ under two loads is admissible under the loads in between.
 Such a network exists up to the limit load. Grains may start to move earlier (`critical_force`).
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import NamedTuple
 

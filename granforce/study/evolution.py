@@ -1,5 +1,7 @@
 """The snapshots of a simulation: exact intervals and walks of each, in one dataset over time."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,6 +4,8 @@ A frame is a cell of a study: it is computed in any process, in any order, and s
 Its key contains a digest of its files, so that a changed file is read again.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 import shutil

@@ -16,6 +16,8 @@ Both are three-dimensional; a layer of disks (spheres) is read, in the plane tha
 centres. Forces of walls and gravity on grains become their load.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """Packings from disks alone: contacts where they touch, walls around them, and gravity."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Known forces from a table: bounds on the forces of single contacts."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from granforce.forces.knowledge import Known

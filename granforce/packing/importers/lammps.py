@@ -1,5 +1,7 @@
 """Packings from LAMMPS: ``dump custom`` of the particles, ``dump local`` of the contacts."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple

@@ -1,5 +1,7 @@
 """granforce's file format for one packing: an NPZ of plain arrays, never pickled."""
 
+from __future__ import annotations
+
 import json
 from contextlib import nullcontext
 from pathlib import Path

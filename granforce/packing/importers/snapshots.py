@@ -1,5 +1,7 @@
 """Snapshots of a simulation: their numbers, and the packing of each."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

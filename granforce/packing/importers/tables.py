@@ -1,5 +1,7 @@
 """Packings from tables of grains and contacts (CSV)."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any
 
