@@ -8,7 +8,7 @@ import panel as pn
 from .browser.panel_patches import answer_with_lock, leave_links_alone, mend_late_views
 from .explore.explore_page import explore_page
 from .learn.learn_page import learn_page
-from .learn.model import small_scenes
+from .state import scene_links
 
 
 def page() -> Any:
@@ -20,8 +20,8 @@ def page() -> Any:
     answer_with_lock()
     leave_links_alone()
     query = (pn.state.location.search if pn.state.location else "") or ""
-    request = small_scenes.request_of(query)
-    if learns(query) or request.scene != small_scenes.MANY:
+    request = scene_links.request_of(query)
+    if learns(query) or request.scene != scene_links.MANY:
         return learn_page(document, query)
     return explore_page(document, request.query)
 

@@ -7,15 +7,15 @@ import param
 from granforce.packing.scenes import SCENES
 
 from ..browser.bundle import Scripted
-from ..learn.model import small_scenes
+from ..state import scene_links
 
 
 class SceneList(Scripted):
     """Names of all scenes; choosing one opens it; see scenelist.js."""
 
     titles = param.List(doc="[name, title] of every scene")
-    shown = param.String(default=small_scenes.MANY)
+    shown = param.String(default=scene_links.MANY)
     usual = param.Number(doc="μ of the page as it opens, which is not taken along")
 
     def __init__(self, **params: Any) -> None:
-        super().__init__(titles=small_scenes.titles(), usual=SCENES[small_scenes.MANY].mu, **params)
+        super().__init__(titles=scene_links.titles(), usual=SCENES[scene_links.MANY].mu, **params)

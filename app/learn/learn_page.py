@@ -8,11 +8,10 @@ import panel as pn
 from bokeh.document import Document
 
 from ..background.jobs import Task, computing
-from ..state import visit
+from ..state import scene_links, visit
 from ..widgets.header import Header
 from ..widgets.page_frame import framed
 from .lesson import Lesson
-from .model import small_scenes
 from .model.lesson_data import Packings
 from .workbench.workbench import Workbench
 
@@ -24,7 +23,7 @@ KEYS = [
 
 def learn_page(document: Document, query: str) -> Any:
     """The page for an address of Learn: chapters, or with `scene` the workbench."""
-    request = small_scenes.request_of(query)
+    request = scene_links.request_of(query)
     wake, visitor = visit.turns(document), visit.visitor(document)
     given = parse_qs(query.lstrip("?"), keep_blank_values=True)
     alone = given.get("embed") == ["1"]

@@ -19,8 +19,8 @@ from granforce.study.schema import dataset_packing
 
 from ..background.jobs import Job
 from ..background.limits import LIMITS
-from ..explore.tabs.export import files
 from . import uploads
+from .saved_file import csv
 
 DRAWS = 80  # for error bars in the app
 CERTAIN = 2.0  # standard errors above 0 from which a contact certainly carries force
@@ -172,7 +172,7 @@ def table(frame: Frame) -> bytes:
         parts = zip(("xx", "yy", "xy"), values, errors, strict=True)
         stresses = (f"{part} {value:.4g} ± {error:.2g}" for part, value, error in parts)
         head.append(f"region {k}: {', '.join(stresses)}")
-    return files.csv(columns, "".join(f"# {line}\n" for line in head))
+    return csv(columns, "".join(f"# {line}\n" for line in head))
 
 
 def account(report: dict[str, Any]) -> Iterator[str]:

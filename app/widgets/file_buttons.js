@@ -1,7 +1,7 @@
 // Buttons that request a file from the server and save it.
 
 import { ask } from "../browser/send.js"
-import { composed, plotsSeen, printFigure } from "../explore/tabs/export/figure.js"
+import { composed, plotsSeen, printFigure } from "./composed_figure.js"
 import { button, made } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 import { save } from "../browser/download.js"

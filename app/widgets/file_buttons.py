@@ -7,7 +7,7 @@ import param
 
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
-from ..explore.tabs.export.files import File
+from ..results.saved_file import File
 
 
 class Handover(Scripted):
@@ -23,7 +23,7 @@ class Handover(Scripted):
         self._on_ask = on_ask
 
     def hand_over(self, file: File) -> None:
-        """Make the browser save a files.File."""
+        """Make the browser save a File."""
         self.tell(file._asdict())
 
     def hand_over_picture(

@@ -82,7 +82,7 @@ def test_without_bounds_that_is_said(S):
         lambda S: gf.reach(S, contact),
         lambda S: gf.outline(S, axes),
     ):
-        with pytest.raises(InputError, match="not bounded: prescribe"):
+        with pytest.raises(InputError, match="not bounded: some"):
             call(S)
     for call, words in (
         (gf.body, "dimensions"),

@@ -3,8 +3,7 @@
 import io
 import re
 from collections.abc import Sequence
-from typing import Any, NamedTuple
-from urllib.parse import parse_qsl, urlencode
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,50 +13,13 @@ from granforce.records import InputError, NotJammedError, Packing, float_array, 
 from granforce.study import hulls
 from granforce.types import Floats, Integers
 
-FIRST, MANY, OWN = "groove", "many", "own"
+from ...state.scene_links import OWN
+
 MOST_DISKS, MOST_WALLS = 30, 12
-LONGEST = 4000  # characters of a built scene in a link
 BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builder
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
 DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
 SNAP = 1e-6  # fraction of the largest radius: gaps left by hand are closed up to here
-
-
-class Request(NamedTuple):
-    """The request in a link."""
-
-    scene: str  # MANY for the page of large packings
-    mu: float | None
-    dark: bool
-    built: str  # a visitor's scene, as text
-    query: str  # for the page of large packings
-
-
-def request_of(query: str) -> Request:
-    """The request in a link's query; invalid parts are left out.
-
-    Older links, from before scenes existed, contain a μ, a tab or similar, and refer to large
-    packings.
-    """
-    pairs = parse_qsl(query.lstrip("?"))
-    given = dict(pairs)
-    name = given.get("scene", MANY)
-    if name not in (*scenes.SCENES, OWN):
-        name = FIRST
-    try:
-        mu = friction(given["mu"])
-    except (KeyError, InputError):
-        mu = None
-    if "scene" in given:
-        others = [pair for pair in pairs if pair[0] != "scene"]
-        query = f"?{urlencode(others)}" if others else ""
-    dark = given.get("dark") == "1"
-    return Request(name, mu, dark, given.get("built", "")[:LONGEST], query)
-
-
-def titles() -> list[list[str]]:
-    """[name, title] of every scene, for the list on the page."""
-    return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
 
 
 def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]:

@@ -11,6 +11,7 @@ from granforce.records import InputError, NotJammedError, UndecidedError
 from ...background.jobs import Job, Task
 from ...browser.bundle import Scripted
 from ...browser.messages import Message
+from ...state import scene_links
 from ..model import small_scenes
 
 
@@ -22,16 +23,16 @@ class Workbench(Scripted):
     note = param.String(doc="error in the link")
     dark = param.Boolean()
 
-    def __init__(self, request: small_scenes.Request, task: Task, **params: Any) -> None:
+    def __init__(self, request: scene_links.Request, task: Task, **params: Any) -> None:
         """request: the request in the link. task: a task of the page, for longer work."""
-        super().__init__(titles=small_scenes.titles(), **params)
+        super().__init__(titles=scene_links.titles(), **params)
         self._task = task
         self._made = True  # the scene requested last
         task.param.watch(self._failed, "message")
         self._show(request.scene, request.mu, request.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
-        if name == small_scenes.MANY:  # has its own page
+        if name == scene_links.MANY:  # has its own page
             return
         self._made = name not in made.SCENES or not made.SCENES[name].packed
         if not self._made:
@@ -69,13 +70,13 @@ class Workbench(Scripted):
                     "plane": plane,
                 }:
                     self._find(what, scene, built, mu, load, plane)
-                case {"scene": name} if name in (*made.SCENES, small_scenes.OWN):
+                case {"scene": name} if name in (*made.SCENES, scene_links.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
-                    request = small_scenes.request_of(query)
+                    request = scene_links.request_of(query)
                     self._show(request.scene, request.mu, request.built)
                 case {"built": built, "mu": mu}:
-                    self._show(small_scenes.OWN, mu, built[: small_scenes.LONGEST])
+                    self._show(scene_links.OWN, mu, built[: scene_links.LONGEST])
         except (InputError, NotJammedError, UndecidedError) as error:
             self.tell({"error": str(error)})
 

@@ -33,6 +33,7 @@ from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
 from app.packing.view import PackingView
 from app.results import distributions, planes, study_data, uploads
+from app.results.saved_file import csv
 from app.state import perturbations
 from app.widgets import label_places
 from app.widgets.file_drop import Dropper
@@ -440,7 +441,7 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     replay = state.replay
     state.compute_exact()
     wait_for(state, lambda: state.exact is not None)
-    table = files.csv(files.contacts(replay, state.exact, 3)).decode().splitlines()
+    table = csv(files.contacts(replay, state.exact, 3)).decode().splitlines()
     names = table[0].split(",")
     rows = np.array([line.split(",") for line in table[1:]], dtype=float)
     column = dict(zip(names, rows.T, strict=True))

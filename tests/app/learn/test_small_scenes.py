@@ -9,6 +9,7 @@ import granforce as gf
 from app.background.jobs import Task
 from app.learn.model import small_scenes
 from app.learn.workbench.workbench import Workbench
+from app.state import scene_links
 from granforce.records import InputError
 from granforce.study import hulls
 
@@ -29,15 +30,15 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
     ],
 )
 def test_links_name_a_scene(query, scene, mu):
-    asked = small_scenes.request_of(query)
+    asked = scene_links.request_of(query)
     assert (asked.scene, asked.mu) == (scene, mu)
     assert "scene" not in asked.query
-    assert not asked.dark and small_scenes.request_of(f"{query or '?scene=groove'}&dark=1").dark
+    assert not asked.dark and scene_links.request_of(f"{query or '?scene=groove'}&dark=1").dark
 
 
 def test_every_scene_of_the_library_is_on_the_list():
-    listed = [name for name, _ in small_scenes.titles()]
-    assert listed[0] == small_scenes.FIRST and set(listed) >= {"many", "own", "column"}
+    listed = [name for name, _ in scene_links.titles()]
+    assert listed[0] == scene_links.FIRST and set(listed) >= {"many", "own", "column"}
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_walls_of_a_built_scene_press():
     expected = gf.body(gf.ensemble(made)).intervals
     for end, exact in zip(gf.body(gf.ensemble(built)).intervals, expected, strict=True):
         np.testing.assert_allclose(end, 3.2 * exact, atol=1e-9)
-    drawn = small_scenes.drawn(small_scenes.OWN, 0.4, UNDER_PRESS)
+    drawn = small_scenes.drawn(scene_links.OWN, 0.4, UNDER_PRESS)
     assert (drawn["h"], drawn["equations"], len(drawn["i"])) == (1, 11, 6)
     assert drawn["names"][-1] == "disk 3 at the press"
 
@@ -99,10 +100,10 @@ def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
 
 
 def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
-    drawn = small_scenes.drawn(small_scenes.OWN, 0.4, UNDER_PRESS[:-1])
+    drawn = small_scenes.drawn(scene_links.OWN, 0.4, UNDER_PRESS[:-1])
     assert "b" not in drawn and drawn["idle"]
     alone = small_scenes.drawn(
-        small_scenes.OWN, 0.4, "1,5,1|0,0,8,0"
+        scene_links.OWN, 0.4, "1,5,1|0,0,8,0"
     )  # a weight that falls is no such scene
     assert not alone["idle"] and small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
 
@@ -163,7 +164,7 @@ def test_what_cannot_be_built_is_refused(text):
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Workbench(small_scenes.request_of("?scene=column"), Task())
+    view = Workbench(scene_links.request_of("?scene=column"), Task())
     told = []
     view.tell = told.append
     _at_rest(view)

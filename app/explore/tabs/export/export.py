@@ -15,6 +15,7 @@ from ....packing.view import gone, measured, pins
 from ....results import planes
 from ....results.compute import computed_anew
 from ....results.library import Cell, Library
+from ....results.saved_file import File, csv
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
@@ -48,29 +49,29 @@ class Snapshot:
             "pins": pins(knowledge),
         }
 
-    def file(self, ending: str, mime: str, content: bytes) -> files.File:
+    def file(self, ending: str, mime: str, content: bytes) -> File:
         """A file named like the packing."""
-        return files.File(f"{self.stem}.{ending}", mime, content)
+        return File(f"{self.stem}.{ending}", mime, content)
 
-    def csv(self, job: Job) -> files.File:
+    def csv(self, job: Job) -> File:
         """A table of the contacts."""
-        return self.file("csv", "text/csv", files.csv(self._columns, self._head))
+        return self.file("csv", "text/csv", csv(self._columns, self._head))
 
-    def json(self, job: Job) -> files.File:
+    def json(self, job: Job) -> File:
         """Parameters, link, command and view."""
         content = files.parameters(self.cell, self.link, self._numbered)
         return self.file("json", "application/json", content)
 
-    def npz(self, job: Job) -> files.File:
+    def npz(self, job: Job) -> File:
         """The packing."""
         content = files.npz(self.library.packing(self.cell.params["packing"]))
         return self.file("npz", "application/zip", content)
 
-    def netcdf(self, job: Job) -> files.File:
+    def netcdf(self, job: Job) -> File:
         """All states, as NetCDF."""
         return self.file("nc", "application/x-netcdf", files.netcdf(self._dataset(job)))
 
-    def zarr(self, job: Job) -> files.File:
+    def zarr(self, job: Job) -> File:
         """All states, as a zipped Zarr group."""
         return self.file("zarr.zip", "application/zip", files.zarr_zip(self._dataset(job)))
 
@@ -79,7 +80,7 @@ class Snapshot:
         job.begin("making the file")
         return files.dataset(self.library.packing(self.cell.params["packing"]), states, self.exact)
 
-    def html(self, job: Job) -> files.File:
+    def html(self, job: Job) -> File:
         """The view as a page that needs no server."""
         outlined = None
         if self.replay.summary["dimension"] > 0:
@@ -99,7 +100,7 @@ class Kind(NamedTuple):
     """A kind of file: what its button says, and what makes it; None: the browser draws it."""
 
     words: str
-    make: Callable[[Snapshot, Job], files.File] | None = None
+    make: Callable[[Snapshot, Job], File] | None = None
     long: bool = False  # whether its progress is shown
 
 

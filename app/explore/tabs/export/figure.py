@@ -19,7 +19,7 @@ As on screen, as vector graphics. From 120 mm on, the plots are next to the pack
 
 
 def panel(state: AppState) -> Any:
-    """The width, and a button for each kind of file; the browser makes them, see figure.js."""
+    """The width, and a button for each kind of file; made by composed_figure.js."""
 
     def refuse(line: str) -> None:
         state.work.message = line

@@ -4,7 +4,7 @@ import io
 import json
 import zipfile
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,22 +17,13 @@ from granforce.study.schema import packing_dataset
 
 from ....results.library import Cell
 from ....results.replays import Replay
+from ....results.saved_file import Columns
 from ....results.selection import command
 from ....state.known import Knowledge
 from ....state.pulls import Held
 
-Columns = dict[str, np.ndarray]
-
 # The contact dimension of a packing's own arrays; that of the states holds the backbone only.
 PACKING_CONTACTS = "packing_contact"
-
-
-class File(NamedTuple):
-    """A file to hand over."""
-
-    name: str
-    mime: str
-    content: bytes
 
 
 def contacts(
@@ -141,22 +132,6 @@ def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
     )
     lines = [*filter(None, titles), unit, *(f"{name}: {_meaning(name)}" for name in columns)]
     return "".join(f"# {line}\n" for line in lines)
-
-
-def csv(columns: Columns, head: str = "") -> bytes:
-    """Columns {name: array} as a table below the head; whole numbers stay whole."""
-    file = io.StringIO()
-    file.write(head)
-    whole = [np.issubdtype(values.dtype, np.integer) for values in columns.values()]
-    np.savetxt(
-        file,
-        np.column_stack(list(columns.values())),
-        fmt=["%d" if w else "%.9g" for w in whole],
-        delimiter=",",
-        header=",".join(columns),
-        comments="",
-    )
-    return file.getvalue().encode()
 
 
 def dataset(packing: Packing, states: xr.Dataset, exact: xr.Dataset | None = None) -> xr.Dataset:

@@ -16,11 +16,11 @@ from ....background.jobs import Task
 from ....browser.panel_patches import together
 from ....results import photoelastic_frames
 from ....results.photoelastic_frames import Frame
+from ....results.saved_file import File
 from ....results.uploads import Files
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import PRIMARY, choice, figure, note, saving
 from ....widgets.plot_style import BLUE, ORANGE, corner, hover, legend_above
-from ..export.files import File
 from . import frame_picture
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))

@@ -1,7 +1,7 @@
 // Packing and plots on screen as one figure in a chosen width: all of it lines and letters but for the small marks
 // of legends, which Bokeh draws as pixels.
 
-import { print } from "../../../browser/download.js"
+import { print } from "../browser/download.js"
 
 const SIDE_BY_SIDE_MM = 120 // from this width on the plots are beside the packing, else below it
 const COLUMN = 900 // units across the packing or a plot; so wide is its picture, see sheet.js

@@ -1,0 +1,47 @@
+"""The scenes by name and title, and which of them a link asks for."""
+
+from typing import NamedTuple
+from urllib.parse import parse_qsl, urlencode
+
+from granforce.packing import scenes
+from granforce.records import InputError, friction
+
+FIRST, MANY, OWN = "groove", "many", "own"
+LONGEST = 4000  # characters of a built scene in a link
+
+
+class Request(NamedTuple):
+    """The request in a link."""
+
+    scene: str  # MANY for the page of large packings
+    mu: float | None
+    dark: bool
+    built: str  # a visitor's scene, as text
+    query: str  # for the page of large packings
+
+
+def request_of(query: str) -> Request:
+    """The request in a link's query; invalid parts are left out.
+
+    Older links, from before scenes existed, contain a μ, a tab or similar, and refer to large
+    packings.
+    """
+    pairs = parse_qsl(query.lstrip("?"))
+    given = dict(pairs)
+    name = given.get("scene", MANY)
+    if name not in (*scenes.SCENES, OWN):
+        name = FIRST
+    try:
+        mu = friction(given["mu"])
+    except (KeyError, InputError):
+        mu = None
+    if "scene" in given:
+        others = [pair for pair in pairs if pair[0] != "scene"]
+        query = f"?{urlencode(others)}" if others else ""
+    dark = given.get("dark") == "1"
+    return Request(name, mu, dark, given.get("built", "")[:LONGEST], query)
+
+
+def titles() -> list[list[str]]:
+    """[name, title] of every scene, for the list on the page."""
+    return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
