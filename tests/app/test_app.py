@@ -28,7 +28,6 @@ from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
 from app.explore.tabs.tabs import TABS
-from app.learn.model import small_scenes
 from app.packing.player import frames
 from app.packing.view import PackingView, exact_intervals
 from app.page import learns
@@ -47,7 +46,7 @@ from app.results.selection import (
     select,
     selected,
 )
-from app.state import app_state, comparison, page_tasks
+from app.state import app_state, comparison, page_tasks, scene_links
 from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, read_view, spelled
@@ -781,8 +780,8 @@ def test_a_link_with_a_key_twice_is_refused(state):
     for query in ("mu=0.2&mu=0.3", "mu=0.2&tab=push&tab=friction", "n=20&n=20&n=20"):
         with pytest.raises(InputError, match=r"it contains '(mu|tab|n)' \d times"):
             read_link(query)
-    asked = small_scenes.asked("?scene=many&mu=0.2&mu=0.3")
-    assert asked.scene == small_scenes.MANY and asked.query == "?mu=0.2&mu=0.3"
+    asked = scene_links.request_of("?scene=many&mu=0.2&mu=0.3")
+    assert asked.scene == scene_links.MANY and asked.query == "?mu=0.2&mu=0.3"
     state.open(asked.query)
     assert "contains 'mu' 2 times" in state.work.message and not state.work.computation.running
 
