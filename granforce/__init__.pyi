@@ -61,6 +61,7 @@ from granforce.motion.rest import Rest as Rest
 from granforce.motion.rest import rest as rest
 from granforce.packing.closing import Margin as Margin
 from granforce.packing.closing import margin as margin
+from granforce.packing.assemblies import blocks as blocks
 from granforce.packing.compaction import Glimpse as Glimpse
 from granforce.packing.compaction import pack as pack
 from granforce.packing.exporters import save_lammps as save_lammps
@@ -93,8 +94,10 @@ from granforce.records import InputError as InputError
 from granforce.records import NotJammedError as NotJammedError
 from granforce.records import Packing as Packing
 from granforce.records import Relaxation as Relaxation
+from granforce.records import Shapes as Shapes
 from granforce.records import UndecidedError as UndecidedError
 from granforce.records import make_contacts as make_contacts
+from granforce.records import make_contacts_at as make_contacts_at
 from granforce.records import make_packing as make_packing
 from granforce.study.evolution import evolution as evolution
 from granforce.study.series import infer_series as infer_series

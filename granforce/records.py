@@ -24,6 +24,7 @@ from granforce.tolerances import (
     LARGEST_UNIT,
     MU_DIGITS,
     RIGID_OVERLAP,
+    TOUCHING,
 )
 from granforce.types import Floats, Integers, Mask
 
@@ -68,19 +69,50 @@ class Contacts(NamedTuple):
     gap: Floats  # (N_c,) ℓ − r_i − r_j, negative if grains overlap
     arm_i: Floats  # (N_c,) lever arm a_i from the centre of i to the contact point
     arm_j: Floats  # (N_c,) lever arm a_j
+    # (N_c, 2) b_i, b_j: the contact point lies at x_i + a_i n + b_i t and at x_j − a_j n + b_j t.
+    # None: 0 everywhere, as for disks.
+    levers: Floats | None = None
 
     def picked(self, rows: Integers | Mask) -> Contacts:
         """The contacts of these rows: a mask (N_c,), or positions (k,)."""
-        return Contacts._make(values[rows] for values in self)
+        return Contacts._make(None if values is None else values[rows] for values in self)
 
     def joined(self, others: Contacts) -> Contacts:
         """These contacts, then the others."""
-        return Contacts._make(np.concatenate(both) for both in zip(self, others, strict=True))
+        both = [self, others]
+        if (self.levers is None) != (others.levers is None):
+            both = [one._replace(levers=one.offsets) for one in both]
+        pairs = zip(*both, strict=True)
+        return Contacts._make(None if a is None else np.concatenate([a, b]) for a, b in pairs)
+
+    @property
+    def tangent(self) -> Floats:
+        """Unit vectors t (N_c, 2)."""
+        return np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
+
+    @property
+    def offsets(self) -> Floats:
+        """Levers (N_c, 2), zeros where there are none."""
+        return np.zeros((len(self.i), 2)) if self.levers is None else self.levers
+
+
+@notebook.brief
+class Shapes(NamedTuple):
+    """Shapes and inertia of N bodies: convex polygons, and disks."""
+
+    corners: Floats  # (K, 2) corners of all polygons, anticlockwise, body by body, length
+    sides: Integers  # (N,) corners of each body; 0 for a disk
+    mass: Floats  # (N,)
+    inertia: Floats  # (N,) moment of inertia about the centre of mass
+
+    def polygons(self) -> list[Floats]:
+        """The corners (k, 2) of each body; empty for a disk."""
+        return np.split(self.corners, np.cumsum(self.sides)[:-1])
 
 
 @notebook.brief
 class Packing(NamedTuple):
-    """N disks, their contacts, and one force network on them."""
+    """N disks, or bodies of other shapes, their contacts, and one force network on them."""
 
     x: Floats  # (N, 2) centres, length
     r: Floats  # (N,) radii, length
@@ -92,6 +124,8 @@ class Packing(NamedTuple):
     load: Floats  # (N, 3) external force and torque on each grain; NaN: its balance is left open
     info: dict[str, Any]  # origin: seed, steps, skipped work, … (plain values)
     tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 if a direction is open
+    # of bodies other than disks; x are then centres of mass, and r circumscribed radii of polygons
+    shapes: Shapes | None = None
 
     @property
     def cell(self) -> Cell:
@@ -102,7 +136,8 @@ class Packing(NamedTuple):
     def contact_points(self) -> Floats:
         """Points of contact (N_c, 2), at their image in the cell, length."""
         c = self.contacts
-        return self.cell.wrapped(self.x[c.i] + c.arm_i[:, None] * c.normal)
+        at = self.x[c.i] + c.arm_i[:, None] * c.normal
+        return self.cell.wrapped(at if c.levers is None else at + c.levers[:, :1] * c.tangent)
 
     @property
     def volume(self) -> float:
@@ -380,6 +415,42 @@ def make_contacts(
     return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
 
 
+def make_contacts_at(
+    i: npt.ArrayLike,
+    j: npt.ArrayLike,
+    point: npt.ArrayLike,
+    normal: npt.ArrayLike,
+    x: npt.ArrayLike,
+    gap: npt.ArrayLike | None = None,
+) -> Contacts:
+    """Contacts of bodies of any shape, from the points where they touch.
+
+    i, j (N_c,): bodies, from 0. point (N_c, 2): points of contact. normal (N_c, 2): unit vectors
+    from i to j. x (N, 2): centres of mass. gap (N_c,): distance of the surfaces, by default 0.
+
+    Raises InputError as `make_contacts`, and for normals that point away from body j.
+    """
+    x = float_array(x, (-1, 2), "centres of mass")
+    made = make_contacts(i, j, normal, np.ones(np.shape(i)), np.ones(len(x)))
+    point = float_array(point, made.normal.shape, "points of contact")
+    gap = np.zeros(len(point)) if gap is None else float_array(gap, made.i.shape, "gaps")
+    from_i, from_j = point - x[made.i], point - x[made.j]
+    arms = [np.sum(from_i * made.normal, axis=1), -np.sum(from_j * made.normal, axis=1)]
+    length = arms[0] + arms[1]
+    for c in np.flatnonzero(length <= 0)[:1]:
+        raise InputError(
+            f"the normal of contact {c} points away from body {made.j[c]}: give it from i to j"
+        )
+    levers = np.stack([np.sum(part * made.tangent, axis=1) for part in (from_i, from_j)], axis=1)
+    return made._replace(length=length, gap=gap, arm_i=arms[0], arm_j=arms[1], levers=levers)
+
+
+def refuse_shapes(packing: Packing, what: str) -> None:
+    """InputError naming what supports disks only, for a packing of other bodies."""
+    if packing.shapes is not None or packing.contacts.levers is not None:
+        raise InputError(f"{what} for disks only; this packing has bodies of other shapes")
+
+
 def _numbers_of_grains(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
     """Numbers of grains without a cast to floats, which would round large ones."""
     values = np.asarray(refuse_hidden(values, f"contact list {name}"))
@@ -397,6 +468,7 @@ def make_packing(
     load: npt.ArrayLike | None = None,
     info: Mapping[str, Any] | None = None,
     tilt: float = 0.0,
+    shapes: Shapes | None = None,
 ) -> Packing:
     """A Packing from array-likes, cast and validated once, all in one system of units.
 
@@ -405,10 +477,11 @@ def make_packing(
     f_t of the packing's network, zeros if there is none. pressure: P0, force per length, NaN if
     none is prescribed. load (N, 3): external force and torque on each grain, by default none; a row
     of NaN leaves its balance open. info: plain values to store with the packing. A tilt beyond
-    ±L_x/2 is replaced by the one in this range that spans the same lattice.
+    ±L_x/2 is replaced by the one in this range that spans the same lattice. shapes: of bodies other
+    than disks.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, and grains
-    that touch their own images.
+    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains
+    that touch their own images, and shapes that do not match.
     """
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
@@ -427,9 +500,22 @@ def make_packing(
             f"contacts {twice[0]} and {twice[1]} are one: both join grains {i} and {j}; give each "
             "contact once"
         )
-    return Packing(
-        x, r, box, contacts, forces, friction(mu), float(pressure), load, dict(info or {}), tilt
-    )
+    shapes = None if shapes is None else _shapes(shapes, len(r))
+    info = dict(info or {})
+    pressure = float(pressure)
+    return Packing(x, r, box, contacts, forces, friction(mu), pressure, load, info, tilt, shapes)
+
+
+def _shapes(shapes: Shapes, bodies: int) -> Shapes:
+    sides = np.asarray(shapes.sides)
+    if sides.shape != (bodies,) or not are_whole(sides).all():
+        raise InputError(f"shapes must give the number of corners of {bodies} bodies")
+    corners = float_array(shapes.corners, (int(sides.sum()), 2), "corners of shapes")
+    mass = float_array(shapes.mass, (bodies,), "masses")
+    inertia = float_array(shapes.inertia, (bodies,), "moments of inertia")
+    if np.any(mass <= 0) or np.any(inertia <= 0):
+        raise InputError("masses and moments of inertia must be above 0")
+    return Shapes(corners, sides.astype(np.int64), mass, inertia)
 
 
 def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
@@ -489,12 +575,13 @@ def _loads(load: npt.ArrayLike, count: int) -> Floats:
 def repeated(contacts: Contacts) -> tuple[int, int] | None:
     """The first repeated contact, after the contact that it repeats; None if there is none.
 
-    Two grains touch twice only through different images, whose normals differ by 60° or more. At
+    Two disks touch twice only through different images, whose normals differ by 60° or more. At
     most eight directions are 41° (n·n′ = 0.75) apart, so at most eight contacts of a pair precede
-    its first repetition.
+    its first repetition. Bodies with edges may touch twice with one normal, at different places.
     """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
+    place = np.where(contacts.i > contacts.j, -contacts.offsets[:, 1], contacts.offsets[:, 0])
     order = np.lexsort((high, low))
     found: list[tuple[int, int]] = []
     for apart in range(1, min(len(order), 9)):
@@ -502,6 +589,7 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
         same = (low[a] == low[b]) & (high[a] == high[b])
         if not same.any():
             break
+        same &= np.abs(place[a] - place[b]) <= TOUCHING * contacts.length[a]
         alike = np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75))
         for first in alike[np.argsort(b[alike])][:1]:
             found.append((int(a[first]), int(b[first])))

@@ -125,7 +125,7 @@ def fall(packing: Packing, mu: float | None = None) -> Floats | None:
         return None
     rows, _ = whole.cone_form
     largest = abs(rows).max(axis=1).toarray().ravel()
-    size = 1 + whole.per_contact
+    size = whole.per_grain
     moved = -(ray / np.where(largest > 0, largest, 1.0))[: size * len(whole.grains)]
     motion = np.zeros((len(packing.r), 3))
     motion[whole.grains, :size] = moved.reshape(-1, size)

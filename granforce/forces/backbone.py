@@ -100,7 +100,7 @@ def cannot_balance(full: Ensemble, idle: Mask) -> Mask:
 
     Grains whose contacts are all idle must balance; all others may exert any force.
     """
-    size = 1 + full.per_contact
+    size = full.per_grain
     c = full.contacts
     held_up = np.zeros(len(full.packing.r), bool)
     held_up[c.i[~idle]] = held_up[c.j[~idle]] = True
@@ -180,7 +180,7 @@ def proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
 def _unbalanced_message(full: Ensemble) -> str:
     A, _ = full.cone_form
     _, rest = programs.least_unbalanced(A, full.b / full.force_scale)
-    size = 1 + full.per_contact
+    size = full.per_grain
     load = np.linalg.norm(rest[: size * len(full.grains)].reshape(-1, size), axis=1)
     worst = np.argsort(load)[::-1][:5]
     carries = ""

@@ -1,13 +1,14 @@
 """The equations A x = b of a packing: balance of every grain, and the prescribed stress.
 
 Grain g of a network is pushed by F = ±(f_n n + f_t t) at each of its contacts (+ where it is their
-second grain j, t = (−n_y, n_x)), and turned by −a f_t in either place, a its lever arm. With the
+second grain j, t = (−n_y, n_x)), and turned by −a f_t in either place, a its lever arm. Where the
+contact point lies b beside the end of the arm, along t, f_n turns it by ±b f_n (− on j). With the
 loads e on the grains that gives three rows each, the torque divided by r so that all are forces:
 
-    Σ ±(f_n n + f_t t) = −(e_x, e_y),    −Σ a f_t / r = −e_τ / r.
+    Σ ±(f_n n + f_t t) = −(e_x, e_y),    −Σ (a f_t ± b f_n) / r = −e_τ / r.
 
-At μ = 0 there is no f_t, and no torque that it could balance: two rows a grain. Frozen contacts
-push with known forces, which move to the right-hand side.
+At μ = 0 there is no f_t, and for disks no torque that it could balance: two rows a grain. Frozen
+contacts push with known forces, which move to the right-hand side.
 
 The prescribed quantity is the stress σ_ab = (1/V) Σ F_a ℓ_b over contacts, ℓ from centre to
 centre. Its trace is the pressure, Σ f_n ℓ = 2 P0 V, as f_t is across ℓ; divided by Σ ℓ the row
@@ -51,6 +52,11 @@ def prescribed_stress(
     if stress is not None and prescribed != "stress":
         raise InputError('a stress is given, but not prescribed: add prescribed="stress"')
     closed = np.isfinite(packing.volume) and not np.isnan(packing.pressure)
+    if packing.contacts.levers is not None and (closed or prescribed == "stress"):
+        raise InputError(
+            "pressure and stress can be prescribed for disks only; give these bodies loads, in an "
+            "open box without a pressure"
+        )
     if prescribed == "none" and closed and not held.any() and not packing.load.any():
         raise InputError(
             "without a prescribed pressure or stress, the scale of the forces is undetermined: "
@@ -100,6 +106,11 @@ def left_open_in(packing: Packing) -> Mask:
     return np.any(np.isnan(packing.load), axis=1)
 
 
+def rows_per_grain(contacts: Contacts, mu: float) -> int:
+    """3 (two forces and a torque), or 2 if no force can turn a grain: disks without friction."""
+    return 3 if mu > 0 or contacts.levers is not None else 2
+
+
 def equations(
     packing: Packing, free: Integers, grains: Integers, held: Mask, mu: float, stress: Floats | None
 ) -> tuple[sparse.csr_matrix, Floats, float]:
@@ -117,7 +128,7 @@ def equations(
         A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
         b, scale = np.append(b, values), values[0]
     scale = float(scale) or 1.0
-    A = _without_rounding(A, len(grains) * (3 if mu > 0 else 2), contacts)
+    A = _without_rounding(A, len(grains) * rows_per_grain(contacts, mu), contacts)
     if held.any():
         b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)
     return A, b, scale
@@ -130,7 +141,7 @@ def _balance(
     side."""
     row_of = np.full(len(packing.r), -1)
     row_of[grains] = np.arange(len(grains))
-    size = 3 if mu > 0 else 2
+    size = rows_per_grain(contacts, mu)
     A = _force_matrix(packing, contacts, row_of, len(grains), size)
     b = -packing.load[grains, :size]
     b[:, 2:] /= packing.r[grains, None]
@@ -172,12 +183,16 @@ def _force_matrix(
     columns = 2 * np.arange(len(contacts.i))
     n_x, n_y = contacts.normal.T
     entries = []
-    for grain, sign, arm in ((contacts.i, -1.0, contacts.arm_i), (contacts.j, 1.0, contacts.arm_j)):
+    for side, (grain, sign, arm) in enumerate(
+        ((contacts.i, -1.0, contacts.arm_i), (contacts.j, 1.0, contacts.arm_j))
+    ):
         row = row_of[grain]
         inside = row >= 0
         parts = [(0, 0, sign * n_x), (1, 0, sign * n_y), (0, 1, -sign * n_y), (1, 1, sign * n_x)]
         if size == 3:
             parts.append((2, 1, -arm / packing.r[grain]))
+        if contacts.levers is not None:
+            parts.append((2, 0, -sign * contacts.levers[:, side] / packing.r[grain]))
         for component, tangential, value in parts:
             entries.append(
                 (value[inside], size * row[inside] + component, columns[inside] + tangential)

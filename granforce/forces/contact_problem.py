@@ -47,7 +47,7 @@ def balance_of(
     and the global ones; idle (rows,): 1 for rows that the ensemble lacks: torques at μ = 0, and all
     rows of grains that need not balance.
     """
-    contacts, size = ensemble.contacts, 1 + ensemble.per_contact
+    contacts, size = ensemble.contacts, ensemble.per_grain
     grains = np.union1d(ensemble.grains, np.union1d(contacts.i, contacts.j))
     i, j = (np.searchsorted(grains, which) for which in (contacts.i, contacts.j))
     balanced = np.searchsorted(grains, ensemble.grains)

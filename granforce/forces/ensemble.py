@@ -74,6 +74,11 @@ class Ensemble:
         return 2 if self.mu > 0 else 1
 
     @property
+    def per_grain(self) -> int:
+        """Rows of A per grain: 3, or 2 if no force can turn it."""
+        return balance.rows_per_grain(self.contacts, self.mu)
+
+    @property
     def has_pressure_row(self) -> bool:
         """Whether the pressure is prescribed, alone or with the whole stress.
 
@@ -84,7 +89,7 @@ class Ensemble:
     @property
     def pressure_row(self) -> int:
         """Row of A with the pressure, if it is prescribed: the first below those of the grains."""
-        return (1 + self.per_contact) * len(self.grains)
+        return self.per_grain * len(self.grains)
 
     @cached_property
     def hull(self) -> Hull:

@@ -31,11 +31,18 @@ def make_step(ensemble: Ensemble) -> Step:
 
 
 def _inertia(ensemble: Ensemble) -> Floats:
-    packing, size = ensemble.packing, 1 + ensemble.per_contact
-    longest = float(packing.r.max())
-    # The velocity conjugate to a torque/r is r ω, with inertia I/r² = m/2.
-    grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
-    mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
+    packing, size = ensemble.packing, ensemble.per_grain
+    # The velocity conjugate to a torque/r is r ω, with inertia I/r²: m/2 for a disk.
+    if packing.shapes is None:
+        longest = float(packing.r.max())
+        grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
+        mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
+    else:
+        heaviest = packing.shapes.mass[ensemble.grains].max()
+        grain = packing.shapes.mass[ensemble.grains] / heaviest
+        turning = packing.shapes.inertia[ensemble.grains] / heaviest
+        turning /= packing.r[ensemble.grains] ** 2
+        mass = np.column_stack([grain, grain, turning])[:, :size].ravel()
     if not ensemble.has_pressure_row:
         return mass
     # That conjugate to the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ; with the whole stress
@@ -46,6 +53,6 @@ def _inertia(ensemble: Ensemble) -> Floats:
 
 def grain_velocities(ensemble: Ensemble, velocity: Floats) -> Floats:
     """Velocities (M, 3) of the backbone grains: intrinsic v_x, v_y and r ω."""
-    size = 1 + ensemble.per_contact
+    size = ensemble.per_grain
     grains = velocity[: size * len(ensemble.grains)].reshape(-1, size)
     return np.column_stack([grains, np.zeros((len(grains), 3 - size))])

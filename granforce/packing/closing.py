@@ -26,6 +26,7 @@ from granforce.records import (
     UndecidedError,
     make_contacts,
     make_packing,
+    refuse_shapes,
     takes,
 )
 from granforce.system import cancelling
@@ -72,6 +73,7 @@ def margin(packing: Packing) -> Margin:
     Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs are clearly apart;
     soft or measured disks overlap, and their contacts have no such margin.
     """
+    refuse_shapes(packing, "the margin is defined")
     if not len(packing.r):
         return Margin(0.0, SKIN / 2)
     unit = packing.r.max()

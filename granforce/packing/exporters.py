@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.records import InputError, Packing, float_array, takes
+from granforce.records import InputError, Packing, float_array, refuse_shapes, takes
 from granforce.system.files import written
 from granforce.types import Floats
 
@@ -30,6 +30,7 @@ def save_vtk(
     their ends, for tubes. forces (N_c, 2): f_n, f_t, by default the packing's own. Lengths and
     forces are in the packing's units. Raises InputError if a file cannot be written.
     """
+    refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts
     count, links = len(packing.r), len(c.i)
     ends = np.concatenate([c.i, c.j])
@@ -75,6 +76,7 @@ def save_lammps(
     (when it is read back, the loads balance the forces) and no gaps. Raises InputError if a file
     cannot be written.
     """
+    refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts
     ids = np.arange(1, len(packing.r) + 1)
     tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])

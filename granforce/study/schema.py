@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from granforce.records import Contacts, Packing
+from granforce.records import Contacts, Packing, Shapes
 
 if TYPE_CHECKING:  # no kernels needed to read a store
     from granforce.forces.ensemble import Ensemble
@@ -35,6 +35,7 @@ def _whole(dims: str, long_name: str) -> Variable:
 
 
 _CONTACT_ARRAYS = ("contact_i", "contact_j", *Contacts._fields[2:])
+_SHAPE_ARRAYS = ("corners", "sides", "mass", "inertia")
 _COMPONENT, _SCALE = "components f_n, f_t", "mean normal force"
 
 VARIABLES: dict[str, Variable] = {
@@ -53,7 +54,12 @@ VARIABLES: dict[str, Variable] = {
     "gap": _real("contact", "length", "gap ℓ − r_i − r_j"),
     "arm_i": _real("contact", "length", "lever arm from i to the contact point"),
     "arm_j": _real("contact", "length", "lever arm from j to the contact point"),
+    "levers": _real("contact end", "length", "offset along t of the contact point, from i and j"),
     "forces": _real("contact component", "force", f"original force network, {_COMPONENT}"),
+    "corners": _real("corner axis", "length", "corners of all polygons, body by body"),
+    "sides": _whole("grain", "number of corners of the body, 0 for a disk"),
+    "mass": _real("grain", "mass", "masses of the bodies"),
+    "inertia": _real("grain", "mass*length**2", "moments of inertia of the bodies"),
     # states of the ensemble: the contact dimension is that of the backbone
     "backbone": _whole("contact", "position of the contact in the packing"),
     "states": _real("state contact component", "force", f"admissible networks, {_COMPONENT}"),
@@ -280,7 +286,9 @@ def packing_dataset(packing: Packing) -> xr.Dataset:
     arrays = packing._asdict()
     info, contacts = arrays.pop("info"), arrays.pop("contacts")
     arrays |= zip(_CONTACT_ARRAYS, contacts, strict=True)
-    return labelled(arrays, {"info": json.dumps(info, default=to_builtin)})
+    arrays |= zip(_SHAPE_ARRAYS, arrays.pop("shapes") or (), strict=False)
+    given = {name: values for name, values in arrays.items() if values is not None}
+    return labelled(given, {"info": json.dumps(info, default=to_builtin)})
 
 
 def dataset_packing(dataset: xr.Dataset) -> Packing:
@@ -289,8 +297,11 @@ def dataset_packing(dataset: xr.Dataset) -> Packing:
     Tuples in info are returned as lists.
     """
     arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
+    values = {name: dataset[name].values if name in dataset else None for name in _CONTACT_ARRAYS}
+    shaped = "mass" in dataset
     return Packing(
-        contacts=Contacts(*(dataset[name].values for name in _CONTACT_ARRAYS)),
+        contacts=Contacts._make(values[name] for name in _CONTACT_ARRAYS),
+        shapes=Shapes(*(dataset[name].values for name in _SHAPE_ARRAYS)) if shaped else None,
         mu=float(dataset["mu"]),
         pressure=float(dataset["pressure"]),
         info=json.loads(dataset.attrs["info"]),

@@ -113,7 +113,8 @@ def report(packing: Packing) -> dict[str, Any]:
     Lengths are in largest radii, residual and violation of the packing's own network in ⟨f_n⟩, mean
     normal force (over the backbone) and pressure in the packing's units. largest_contact_gap and
     least_other_gap: the `margin` of its contacts, undefined for soft disks (overlaps beyond
-    RIGID_OVERLAP). Raises NotJammedError if no admissible network exists.
+    RIGID_OVERLAP) and for bodies of other shapes. Raises NotJammedError if no admissible network
+    exists.
     """
     ens = ensemble(packing)
     loaded = bool(packing.forces.any())
@@ -159,7 +160,7 @@ def _held(whole: Ensemble) -> Integers:
 
 def _margin(packing: Packing) -> dict[str, float | None]:
     soft = packing.contacts.gap.min(initial=0.0) < -RIGID_OVERLAP * packing.r.max()
-    apart = None if soft else margin(packing)
+    apart = None if soft or packing.shapes is not None else margin(packing)
     return {
         "largest_contact_gap": apart and apart.contact,
         "least_other_gap": apart and apart.other,
@@ -167,7 +168,10 @@ def _margin(packing: Packing) -> dict[str, float | None]:
 
 
 def _largest_overlap(packing: Packing) -> float:
-    gap = overlapping(packing.x, packing.r, packing.cell)[2]
+    if packing.shapes is None:
+        gap = overlapping(packing.x, packing.r, packing.cell)[2]
+    else:
+        gap = packing.contacts.gap
     return float(max(0.0, -gap.min(initial=0.0)) / packing.r.max())
 
 

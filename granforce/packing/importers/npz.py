@@ -16,6 +16,7 @@ from granforce.records import (
     Contacts,
     InputError,
     Packing,
+    Shapes,
     float_array,
     make_contacts,
     make_packing,
@@ -27,6 +28,7 @@ from granforce.types import Floats
 _GRAINS = ("x", "r", "P", "mu")
 _ARMS = "arm_i", "arm_j"
 _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
+_SHAPES = "corners", "sides", "mass", "inertia"
 
 # Most bytes of the unpacked arrays: a small archive may declare far more than fits into memory.
 _UNPACKED = 10**9
@@ -39,7 +41,8 @@ def load_packing(
 
     source: a path or an open binary file. Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if
     none), mu, i, j, nx, ny, branch, fn, ft; optionally seed, load, tilt, arm_i, arm_j and info
-    (JSON). unpacked: most bytes of all arrays together; most_grains: largest number of grains.
+    (JSON); for bodies other than disks also levers, gap, corners, sides, mass and inertia.
+    unpacked: most bytes of all arrays together; most_grains: largest number of grains.
     Raises InputError naming the error.
     """
     name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
@@ -85,6 +88,8 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
         "fn": packing.forces[:, 0],
         "ft": packing.forces[:, 1],
         "load": packing.load,
+        **({} if contacts.levers is None else {"levers": contacts.levers}),
+        **dict(zip(_SHAPES, packing.shapes or (), strict=False)),
         "info": np.array(info),
         **_seed(packing.info),
     }
@@ -105,7 +110,7 @@ def _arrays(
     source: Source, name: str, unpacked: int, most_grains: int | None
 ) -> dict[str, npt.NDArray[Any]]:
     """The archive's arrays except those that loading ignores, {name: array}."""
-    ignored = {"lo", "hi", "fcrit", "gap"}
+    ignored = {"lo", "hi", "fcrit"}
     try:
         # Opened here: numpy would leave the file open if it cannot read the archive.
         with (
@@ -118,6 +123,8 @@ def _arrays(
                 )
             if "r" in archive.files:
                 check_grains(archive["r"].size, most_grains, name)
+            if "levers" not in archive.files:  # the gaps of disks follow from their radii
+                ignored.add("gap")
             return {key: archive[key] for key in archive.files if key not in ignored}
     except InputError:
         raise
@@ -152,7 +159,15 @@ def _packing(arrays: dict[str, npt.NDArray[Any]]) -> Packing:
         arrays.get("load"),
         info,
         _scalar(arrays, "tilt") if "tilt" in arrays else 0.0,
+        _shapes(arrays),
     )
+
+
+def _shapes(arrays: dict[str, npt.NDArray[Any]]) -> Shapes | None:
+    missing = [key for key in _SHAPES if key not in arrays]
+    if 0 < len(missing) < len(_SHAPES):
+        raise InputError(f"no array {', '.join(missing)}; give all of {', '.join(_SHAPES)}")
+    return None if missing else Shapes(*(arrays[key] for key in _SHAPES))
 
 
 def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, Any]) -> Contacts:
@@ -160,6 +175,8 @@ def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, An
     normal = [float_array(arrays[key], i.shape[:1], key) for key in ("nx", "ny")]
     normal = np.column_stack(normal)
     contacts = make_contacts(i, j, normal, arrays["branch"], r)
+    if "levers" in arrays:
+        return _of_bodies(contacts, normal, arrays)
     check_contacts(contacts, r, "contact {}".format, _gap_allowed(info))
     if not set(_ARMS) <= set(arrays):
         return contacts
@@ -177,6 +194,17 @@ def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, An
     if exact:
         contacts = contacts._replace(normal=normal)
     return contacts._replace(arm_i=arms["arm_i"], arm_j=arms["arm_j"])
+
+
+def _of_bodies(contacts: Contacts, normal: Floats, arrays: dict[str, Any]) -> Contacts:
+    """The contacts with the gaps, arms and levers of a file, whose radii do not give them."""
+    missing = [key for key in ("gap", *_ARMS) if key not in arrays]
+    if missing:
+        raise InputError(f"contacts with levers also need {', '.join(missing)}")
+    count = len(contacts.i)
+    gap, arm_i, arm_j = (float_array(arrays[key], (count,), key) for key in ("gap", *_ARMS))
+    levers = float_array(arrays["levers"], (count, 2), "levers")
+    return contacts._replace(normal=normal, gap=gap, arm_i=arm_i, arm_j=arm_j, levers=levers)
 
 
 def _gap_allowed(info: dict[str, Any]) -> float:

@@ -70,9 +70,11 @@ def _packing_parameters(
 def imported_parameters(packing: Packing) -> Parameters:
     """The parameters of an imported packing: a hash of its arrays."""
     arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
-    # Only if there is a tilt, so that keys of packings in straight cells stay valid.
+    # Only if there are levers, shapes, or a tilt, so that keys of disks in straight cells stay
+    # valid.
+    given = [array for array in (*arrays, *(packing.shapes or ())) if array is not None]
     tilt = [packing.tilt] if packing.tilt else []
-    digest = hash_of(*arrays, np.array([packing.mu, packing.pressure, *tilt]))
+    digest = hash_of(*given, np.array([packing.mu, packing.pressure, *tilt]))
     return {"imported": digest, "mu": packing.mu}
 
 
