@@ -59,9 +59,9 @@ from granforce.labelled import to_dataset as to_dataset
 from granforce.motion.gauss_seidel import gauss_seidel as gauss_seidel
 from granforce.motion.rest import Rest as Rest
 from granforce.motion.rest import rest as rest
+from granforce.packing.assemblies import blocks as blocks
 from granforce.packing.closing import Margin as Margin
 from granforce.packing.closing import margin as margin
-from granforce.packing.assemblies import blocks as blocks
 from granforce.packing.compaction import Glimpse as Glimpse
 from granforce.packing.compaction import pack as pack
 from granforce.packing.exporters import save_lammps as save_lammps

@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.forces.build import ensemble
-from granforce.forces.nearest import nearest
+from granforce.packing import masonry
+from granforce.packing.assemblies import with_network
 from granforce.packing.compaction import pack
 from granforce.records import (
     InputError,
@@ -63,9 +64,9 @@ class _Scene(NamedTuple):
 def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The Packing of a named scene, with the admissible network nearest to equal f_n.
 
-    name: one of SCENES. mu: friction coefficient, by default the scene's. options: angle (degrees)
-    of the opening of the "groove" and of the lines of centres with the vertical in the "pyramid"
-    and the "column"; disks in the "column".
+    name: one of SCENES, or of BLOCKS. mu: friction coefficient, by default the scene's. options:
+    angle (degrees) of the opening of the "groove" and of the lines of centres with the vertical in
+    the "pyramid" and the "column"; disks in the "column"; those of the functions in `masonry`.
 
     Raises InputError for an unknown name, option or geometry, NotJammedError if nothing balances.
     """
@@ -74,9 +75,10 @@ def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
 
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The same Packing even if nothing balances; its forces are 0, or those at another μ."""
-    if not isinstance(name, str) or name not in SCENES:
-        raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(SCENES)}")
-    kind = SCENES[name]
+    every = SCENES | BLOCKS
+    if not isinstance(name, str) or name not in every:
+        raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(every)}")
+    kind = every[name]
     mu = kind.mu if mu is None else friction(mu)
     try:
         made = kind.make(mu, **options)
@@ -138,26 +140,6 @@ def assembled(
         load=np.concatenate([load, behind.load]),
         info={"walls": walls.tolist(), "disks": len(r), "pressing": behind.lids.tolist()},
     )
-
-
-def with_network(packing: Packing) -> Packing:
-    """The Packing with the admissible network nearest to its own forces, or to equal f_n.
-
-    Raises NotJammedError if no network exists, UndecidedError if none was reached.
-    """
-    if not packing.forces.any():
-        equal = np.zeros_like(packing.forces)
-        equal[:, 0] = np.nanmean(np.abs(packing.load[:, :2])) or 1.0
-        packing = packing._replace(forces=equal)
-    S = ensemble(packing)
-    if S.admits(S.original):
-        return packing
-    found = nearest(S, S.original)
-    if not S.admits(found.forces):
-        raise UndecidedError(
-            f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
-        )
-    return packing._replace(forces=S.expand(found.forces))
 
 
 def weights(r: npt.ArrayLike) -> Floats:
@@ -350,3 +332,12 @@ SCENES = {
     ),
     "many": _Scene("Disks under pressure", 0.1, _many),
 }  # fmt: skip
+
+# Scenes of blocks, which need not be disks.
+BLOCKS = {
+    "slope": _Scene("A block on a slope", 0.5, masonry.slope),
+    "ladder": _Scene("A ladder against a wall", 0.4, masonry.ladder),
+    "books": _Scene("Books over the edge of a table", 0.5, masonry.books),
+    "arch": _Scene("An arch of voussoirs", 0.6, masonry.arch),
+    "wall": _Scene("A dry-stone wall", 0.65, masonry.wall),
+}

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import linprog
 
 import granforce as gf
-from granforce.packing.scenes import SCENES, assembled, sketched, weights, with_network
+from granforce.packing.assemblies import with_network
+from granforce.packing.scenes import SCENES, assembled, sketched, weights
 from granforce.records import InputError, NotJammedError
 
 EXACT = 1e-10

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing import importers, scenes
+from granforce.packing import assemblies, importers, scenes
 from granforce.records import InputError, NotJammedError, Packing, float_array, friction
 from granforce.study import hulls
 from granforce.types import Floats, Integers
@@ -196,7 +196,7 @@ def file_of(packing: Packing, load: npt.ArrayLike | None = None) -> bytes:
     """The packing under these loads as an NPZ file, with a network if there is one."""
     packing = _loaded(packing, load)
     try:
-        packing = scenes.with_network(packing)
+        packing = assemblies.with_network(packing)
     except (InputError, NotJammedError):
         pass  # kept unchanged: S is empty, and the library says why
     file = io.BytesIO()

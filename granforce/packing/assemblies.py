@@ -1,0 +1,201 @@
+"""Assemblies of rigid bodies: convex polygons and disks that rest on each other and on fixed ones.
+
+Contacts follow from the geometry (`polygons`). Fixed bodies are those whose load is NaN, so that
+their balance is not required; contacts between two of them are left out, as no equation contains
+them. Each other body carries its weight downwards.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.forces.build import ensemble
+from granforce.forces.nearest import nearest
+from granforce.packing import polygons
+from granforce.packing.neighbours import find_pairs
+from granforce.packing.polygons import Meeting, Touch
+from granforce.records import (
+    InputError,
+    Packing,
+    Shapes,
+    UndecidedError,
+    are_whole,
+    float_array,
+    make_cell,
+    make_contacts_at,
+    make_packing,
+    positive,
+    real_array,
+)
+from granforce.tolerances import TOUCHING
+from granforce.types import Floats, Integers, Mask
+
+# Gaps up to this many tolerances are reported as nearly touching.
+_NEARLY = 100.0
+
+
+def blocks(
+    bodies: Sequence[npt.ArrayLike],
+    mu: Any,
+    *,
+    fixed: npt.ArrayLike = (),
+    weights: npt.ArrayLike | None = None,
+    tolerance: float | None = None,
+) -> Packing:
+    """A Packing of rigid bodies, with the admissible network nearest to equal normal forces.
+
+    bodies: corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for
+    each. mu: friction coefficient of all contacts. fixed: numbers of the bodies that cannot move.
+    weights (N,): by default the areas; masses are in proportion, and gravity points along −y.
+    tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
+    default TOUCHING times the largest body. An edge on an edge touches at both ends of the shared
+    part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
+    contact, and nearly_touching [i, j, gap], up to 100 tolerances apart.
+
+    Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights.
+    """
+    return with_network(assembly(bodies, mu, fixed=fixed, weights=weights, tolerance=tolerance))
+
+
+def assembly(
+    bodies: Sequence[npt.ArrayLike],
+    mu: Any,
+    *,
+    fixed: npt.ArrayLike = (),
+    weights: npt.ArrayLike | None = None,
+    tolerance: float | None = None,
+) -> Packing:
+    """The same Packing without a network, even if nothing balances."""
+    outlines = [_outline(body, k) for k, body in enumerate(bodies)]
+    if not outlines:
+        raise InputError("there is no body; give at least one")
+    held = _fixed(fixed, len(outlines))
+    area, x, polar, r = (np.array(part) for part in zip(*map(_measured, outlines), strict=True))
+    weights = area if weights is None else float_array(weights, area.shape, "weights")
+    for k in np.flatnonzero((weights <= 0) & ~held)[:1]:
+        raise InputError(f"body {k} has a weight ≤ 0: every body that can move needs a mass")
+    weights = np.where(held, area, weights)
+    tolerance = TOUCHING * r.max() if tolerance is None else positive(tolerance, "tolerance")
+    i, j, touches, doubts = _contacts(outlines, x, r, held, tolerance)
+    number = [len(touch.gap) for touch in touches]
+    points, gap = (
+        np.concatenate([np.empty(shape), *(getattr(touch, name) for touch in touches)])
+        for name, shape in (("points", (0, 2)), ("gap", 0))
+    )
+    normal = np.repeat(np.reshape([touch.normal for touch in touches], (-1, 2)), number, axis=0)
+    contacts = make_contacts_at(np.repeat(i, number), np.repeat(j, number), points, normal, x, gap)
+    load = np.zeros((len(x), 3))
+    load[:, 1] = -weights
+    load[held] = np.nan
+    polygonal = [body if body.ndim == 2 else np.empty((0, 2)) for body in outlines]
+    return make_packing(
+        x,
+        r,
+        [np.inf, np.inf],
+        contacts,
+        np.zeros((len(gap), 2)),
+        mu,
+        load=load,
+        info={"bodies": len(x), "tolerance": float(tolerance), **doubts},
+        shapes=Shapes(
+            corners=np.concatenate(polygonal),
+            sides=np.array([len(body) for body in polygonal]),
+            mass=weights,
+            inertia=weights * polar / area,
+        ),
+    )
+
+
+def with_network(packing: Packing) -> Packing:
+    """The Packing with the admissible network nearest to its own forces, or to equal f_n.
+
+    Raises NotJammedError if no network exists, UndecidedError if none was reached.
+    """
+    if not packing.forces.any():
+        equal = np.zeros_like(packing.forces)
+        equal[:, 0] = np.nanmean(np.abs(packing.load[:, :2])) or 1.0
+        packing = packing._replace(forces=equal)
+    S = ensemble(packing)
+    if S.admits(S.original):
+        return packing
+    found = nearest(S, S.original)
+    if not S.admits(found.forces):
+        raise UndecidedError(
+            f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
+        )
+    return packing._replace(forces=S.expand(found.forces))
+
+
+def _outline(body: npt.ArrayLike, number: int) -> Floats:
+    """Corners (k, 2), or (3,) x, y, r of a disk."""
+    name = f"body {number}"
+    given = real_array(body, name)
+    if given.ndim != 1:
+        return polygons.polygon(given, name)
+    disk = float_array(given, (3,), name)
+    if disk[2] <= 0:
+        raise InputError(f"{name} is a disk of radius {disk[2]:g}, which must be above 0")
+    return disk
+
+
+def _measured(body: Floats) -> tuple[float, Floats, float, float]:
+    """Area, centre, polar second moment of area, and circumscribed radius."""
+    if body.ndim == 1:
+        r = body[2]
+        return np.pi * r**2, body[:2], 0.5 * np.pi * r**4, r
+    area, centre, polar = polygons.moments(body)
+    return area, centre, polar, float(np.hypot(*(body - centre).T).max())
+
+
+def _fixed(fixed: npt.ArrayLike, count: int) -> Mask:
+    numbers = np.asarray(fixed).ravel()
+    if not are_whole(numbers, count - 1).all():
+        raise InputError(f"fixed bodies are numbers from 0 to {count - 1}")
+    held = np.zeros(count, dtype=bool)
+    held[numbers.astype(np.int64)] = True
+    return held
+
+
+def _contacts(
+    outlines: Sequence[Floats], x: Floats, r: Floats, held: Mask, tolerance: float
+) -> tuple[Integers, Integers, list[Touch], dict[str, Any]]:
+    """Pairs i, j (k,) that touch, their Touch, and the doubtful pairs."""
+    cell = make_cell([np.inf, np.inf])
+    first, second, _ = find_pairs(x, r, cell, _NEARLY * tolerance)
+    pairs = [
+        (i, j)
+        for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True))
+        if not (held[i] and held[j])
+    ]
+    touching: list[tuple[int, int, Touch]] = []
+    doubts: dict[str, Any] = {"corner_on_corner": [], "nearly_touching": []}
+    for i, j in pairs:
+        met = _meeting(outlines[i], outlines[j], tolerance)
+        if met.touch is not None:
+            touching.append((i, j, met.touch))
+        elif met.cornered:
+            doubts["corner_on_corner"].append([i, j])
+        elif met.gap < 0:
+            raise InputError(
+                f"bodies {i} and {j} overlap by {-met.gap:.3g}, more than the tolerance "
+                f"{tolerance:.3g}; move one, or raise the tolerance"
+            )
+        elif met.gap <= _NEARLY * tolerance:
+            doubts["nearly_touching"].append([i, j, met.gap])
+    i, j = np.array([one[:2] for one in touching], dtype=np.int64).reshape(-1, 2).T
+    return i, j, [one[2] for one in touching], doubts
+
+
+def _meeting(a: Floats, b: Floats, tolerance: float) -> Meeting:
+    if a.ndim == 2 and b.ndim == 2:
+        return polygons.polygons_meet(a, b, tolerance)
+    if a.ndim == 1 and b.ndim == 1:
+        return polygons.disks_meet(a[:2], a[2], b[:2], b[2], tolerance)
+    if a.ndim == 1:
+        return polygons.disk_meets(a[:2], a[2], b, tolerance)
+    met = polygons.disk_meets(b[:2], b[2], a, tolerance)
+    if met.touch is None:
+        return met
+    return met._replace(touch=met.touch._replace(normal=-met.touch.normal))

@@ -1,0 +1,147 @@
+"""Convex polygons and disks in the plane: area, inertia, and where two of them touch.
+
+Corners run anticlockwise. Two polygons are apart along an outward normal of one of their edges; the
+largest of these distances is their gap. An edge that lies on an edge touches at both ends of the
+part that they share, a corner on an edge at one point. Corner on corner no normal is determined, so
+no contact can be made there.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.records import InputError, float_array
+from granforce.types import Floats
+
+# Corners are left out if they bend the outline by less than this (in radians), which is rounding.
+_STRAIGHT = 1e-9
+
+
+class Touch(NamedTuple):
+    """Points at which two bodies touch."""
+
+    points: Floats  # (k, 2) midway between the surfaces
+    normal: Floats  # (2,) unit vector from the first body to the second
+    gap: Floats  # (k,)
+
+
+class Meeting(NamedTuple):
+    """How two bodies lie to each other."""
+
+    gap: float  # distance along the best normal, below 0 if they overlap
+    touch: Touch | None
+    cornered: bool  # whether they touch corner on corner, without a normal
+
+
+def polygon(corners: npt.ArrayLike, name: str) -> Floats:
+    """The corners (k, 2) of a convex polygon, anticlockwise, without corners that do not bend it.
+
+    Raises InputError naming it if there are fewer than three, or it is not convex.
+    """
+    corners = float_array(corners, (-1, 2), name)
+    while len(corners) > 2:
+        edges = np.roll(corners, -1, axis=0) - corners
+        bend = _bends(np.roll(edges, 1, axis=0), edges)
+        flat = np.abs(bend) < _STRAIGHT
+        if not flat.any():
+            break
+        corners = np.delete(corners, np.argmax(flat), axis=0)
+    if len(corners) < 3:
+        raise InputError(f"{name} needs three corners that do not lie on one line")
+    turned = bend.sum() / (2 * np.pi)
+    if not (np.all(bend > 0) or np.all(bend < 0)) or abs(abs(turned) - 1) > 1e-6:
+        raise InputError(f"{name} is not convex; divide it into convex parts")
+    return corners if turned > 0 else corners[::-1].copy()
+
+
+def _bends(before: Floats, after: Floats) -> Floats:
+    """Angles by which the outline turns at each corner; 0 where an edge has no length."""
+    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(across, np.sum(before * after, axis=1))
+
+
+def moments(corners: Floats) -> tuple[float, Floats, float]:
+    """Area, centre of area (2,), and polar second moment of area about it, of a polygon (k, 2)."""
+    first = corners.mean(axis=0)
+    a = corners - first
+    b = np.roll(a, -1, axis=0)
+    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = 0.5 * twice.sum()
+    centre = ((a + b) * twice[:, None]).sum(axis=0) / (6 * area)
+    polar = (twice * np.sum(a * a + a * b + b * b, axis=1)).sum() / 12
+    return float(area), first + centre, float(polar - area * centre @ centre)
+
+
+def polygons_meet(a: Floats, b: Floats, tolerance: float) -> Meeting:
+    """The Meeting of two convex polygons (k, 2); surfaces up to a tolerance apart touch."""
+    sides = _Sides(a, b), _Sides(b, a)
+    gap = float(max(side.least.max() for side in sides))
+    if abs(gap) > tolerance:
+        return Meeting(gap, None, False)
+    found = []
+    for side, sign in zip(sides, (1.0, -1.0), strict=True):
+        for edge in np.flatnonzero(side.least >= -tolerance).tolist():
+            touch = side.touch(edge, sign, tolerance)
+            if touch is not None:
+                found.append((np.ptp(touch.points, axis=0).max(), touch))
+    best = max(found, key=lambda one: one[0], default=(0.0, None))[1]
+    return Meeting(gap, best, best is None)
+
+
+class _Sides:
+    """The edges of one polygon, and the heights of another's corners above them."""
+
+    def __init__(self, one: Floats, other: Floats) -> None:
+        along = np.roll(one, -1, axis=0) - one
+        self.length = np.hypot(*along.T)
+        self.one, self.along = one, along / self.length[:, None]
+        self.out = np.column_stack([self.along[:, 1], -self.along[:, 0]])
+        away = other[None] - one[:, None]
+        self.height = np.einsum("ekx,ex->ek", away, self.out)
+        self.place = np.einsum("ekx,ex->ek", away, self.along)
+        self.least = self.height.min(axis=1)
+
+    def touch(self, edge: int, sign: float, tolerance: float) -> Touch | None:
+        """Where the other's corners touch this edge; None if they meet it in its corners only."""
+        near = np.flatnonzero(self.height[edge] <= tolerance)
+        place, height = self.place[edge, near], self.height[edge, near]
+        order = np.argsort(place)
+        ends = np.clip(place[order[[0, -1]]], 0.0, self.length[edge])
+        if len(near) > 1 and ends[1] - ends[0] > tolerance:
+            gap = np.interp(ends, place[order], height[order])
+        elif len(near) == 1 and tolerance < place[0] < self.length[edge] - tolerance:
+            ends, gap = place, height
+        else:
+            return None
+        out = self.out[edge]
+        points = self.one[edge] + ends[:, None] * self.along[edge] + 0.5 * gap[:, None] * out
+        return Touch(points, sign * out, gap)
+
+
+def disk_meets(x: Floats, r: float, corners: Floats, tolerance: float) -> Meeting:
+    """The Meeting of a disk, centre x (2,) and radius r, with a convex polygon (k, 2)."""
+    sides = _Sides(corners, x[None])
+    outside = int(np.argmax(sides.least))
+    if sides.least[outside] <= 0:
+        return Meeting(float(sides.least[outside] - r), None, False)
+    place = np.clip(sides.place[:, 0], 0.0, sides.length)
+    nearest = sides.one + place[:, None] * sides.along
+    distance = np.hypot(*(nearest - x).T)
+    edge = int(np.argmin(distance))
+    return _round(x, r, nearest[edge], 0.0, tolerance)
+
+
+def disks_meet(x: Floats, r: float, y: Floats, s: float, tolerance: float) -> Meeting:
+    """The Meeting of two disks of centres x, y (2,) and radii r, s."""
+    return _round(x, r, y, s, tolerance)
+
+
+def _round(x: Floats, r: float, y: Floats, s: float, tolerance: float) -> Meeting:
+    distance = float(np.hypot(*(y - x)))
+    gap = distance - r - s
+    if abs(gap) > tolerance or distance == 0:
+        return Meeting(gap, None, False)
+    normal = (y - x) / distance
+    points = (x + (r + 0.5 * gap) * normal)[None]
+    return Meeting(gap, Touch(points, normal, np.array([gap])), False)

@@ -1,0 +1,250 @@
+"""Bodies of any shape: their contacts, closed forms for S, files, and what is refused."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import granforce as gf
+from granforce.packing.assemblies import assembly
+from granforce.packing.masonry import rectangle
+from granforce.study.kinds import imported_parameters
+from granforce.study.schema import dataset_packing, packing_dataset
+
+GROUND = rectangle(-3, -1, 3, 0)
+
+
+def stands(name, *arguments, **options):
+    try:
+        gf.scene(name, *arguments, **options)
+    except gf.NotJammedError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("mu, width", [(0.5, 1.0), (0.9, 0.6), (0.3, 2.0)])
+def test_a_block_rests_on_a_slope_up_to_friction_or_to_its_width(mu, width):
+    most = np.degrees(np.arctan(min(mu, width)))
+    assert stands("slope", mu, angle=most - 1e-5, width=width)
+    assert not stands("slope", mu, angle=most + 1e-5, width=width)
+
+
+@pytest.mark.parametrize("count", [1, 4, 12])
+def test_books_overhang_by_half_the_harmonic_sum(count):
+    packing = gf.scene("books", books=count, overhang=1 - 1e-6)
+    reach = packing.shapes.polygons()[0][:, 0].max()
+    assert reach == pytest.approx(0.5 * np.sum(1 / np.arange(1, count + 1)), rel=2e-6)
+    assert not stands("books", books=count, overhang=1 + 1e-6)
+
+
+@pytest.mark.parametrize("mu, angle", [(0.4, 60.0), (0.3, 70.0), (0.6, 45.0), (0.35, 59.0)])
+def test_s_of_a_ladder_has_both_ends_of_the_textbook(mu, angle):
+    """F: the upward friction of the wall; N = (W/2 − F) cot θ is its pressure, W − F the floor's.
+
+    |F| ≤ μ N, and N ≤ μ (W − F) on the floor.
+    """
+    S = gf.ensemble(gf.scene("ladder", mu, angle=angle))
+    flat = 1 / np.tan(np.radians(angle))
+    high = mu * flat / 2 / (1 + mu * flat)
+    low = -mu * flat / 2 / (1 - mu * flat) if mu * flat < 1 else -np.inf
+    if flat > mu:
+        low = max(low, (flat / 2 - mu) / (flat - mu))
+    bounds = gf.intervals(S)
+    assert S.dimension == 1 and bounds.converged
+    pressure = [(0.5 - end) * flat for end in (high, low)]
+    floor, wall = (int(np.argmax(np.abs(S.contacts.normal[:, k]))) for k in (1, 0))
+    assert np.allclose([bounds.low[wall, 0], bounds.high[wall, 0]], pressure, atol=1e-9)
+    assert np.allclose([bounds.low[floor, 0], bounds.high[floor, 0]], [1 - high, 1 - low])
+
+
+def test_an_arch_needs_the_thickness_of_milankovitch():
+    """0.1075 of the mean radius, as voussoirs become many."""
+    for thickness, standing in ((0.1073, False), (0.1077, True)):
+        assert stands("arch", 0.8, voussoirs=80, thickness=thickness) is standing
+
+
+def test_edges_touch_at_both_ends_of_what_they_share_and_corners_at_one_point():
+    turned = np.array([[0, 0], [1, 1], [0, 2], [-1, 1]]) / 2 + [2.2, 0]
+    bodies = [rectangle(0, 0, 1, 1), rectangle(0.4, 1, 2, 2), turned, [-0.5, 0.5, 0.5], GROUND]
+    packing = assembly(bodies, 0.5, fixed=[4])
+    at = {}
+    for c, point in enumerate(packing.contact_points):
+        pair = int(packing.contacts.i[c]), int(packing.contacts.j[c])
+        at.setdefault(pair, []).append([*point, *packing.contacts.normal[c]])
+    assert np.allclose(sorted(at.pop((0, 1))), [[0.4, 1, 0, 1], [1, 1, 0, 1]])
+    assert np.allclose(sorted(at.pop((0, 4))), [[0, 0, 0, -1], [1, 0, 0, -1]])
+    assert np.allclose(at.pop((2, 4)), [[2.2, 0, 0, -1]])
+    assert np.allclose(at.pop((3, 4)), [[-0.5, 0, 0, -1]])
+    assert np.allclose(at.pop((0, 3)), [[0, 0.5, -1, 0]])
+    assert not at
+
+
+def test_a_contact_given_twice_is_refused_unless_its_places_differ():
+    x, r = [[0, 1], [0, -1]], [1.5, 1.5]
+
+    def made(places):
+        points = np.column_stack([places, np.zeros(len(places))])
+        pairs, down = np.zeros((2, len(places)), dtype=int), np.tile([0.0, -1.0], (len(places), 1))
+        contacts = gf.make_contacts_at(pairs[0], pairs[1] + 1, points, down, x)
+        forces = np.zeros((len(places), 2))
+        return gf.make_packing(x, r, [np.inf, np.inf], contacts, forces, 0.5)
+
+    assert len(made([-1.0, 1.0]).contacts.i) == 2
+    with pytest.raises(gf.InputError, match="contacts 0 and 2 are one"):
+        made([-1.0, 1.0, -1.0])
+
+
+def test_doubtful_pairs_are_named():
+    bodies = [rectangle(0, 0, 1, 1), rectangle(1, 1, 2, 2), rectangle(1.00003, 0, 2, 0.5), GROUND]
+    packing = assembly(bodies, 0.5, fixed=[3], tolerance=1e-6)
+    assert packing.info["corner_on_corner"] == [[0, 1]]
+    ((i, j, gap),) = packing.info["nearly_touching"]
+    assert (i, j) == (0, 2) and gap == pytest.approx(3e-5)
+    closer = assembly(bodies, 0.5, fixed=[3], tolerance=1e-4)
+    assert len(closer.contacts.i) == len(packing.contacts.i) + 2
+    assert closer.contacts.gap.max() == pytest.approx(3e-5)
+
+
+def random_assembly(rng):
+    """Boxes, leaning or upright, and disks: each near the middle of one in the layer below."""
+    kept, middles, low = [], np.arange(-2.0, 2.5), 0.0
+    for _ in range(rng.integers(1, 4)):
+        height, above = rng.uniform(0.3, 0.8), []
+        for middle in rng.permutation(middles)[: rng.integers(1, 7)]:
+            width, x = rng.uniform(0.3, 1.0), middle + rng.uniform(-0.2, 0.2)
+            body = rectangle(x - width / 2, low, x + width / 2, low + height)
+            if rng.random() < 0.15:
+                body = [x, low + height / 2, height / 2]
+            elif rng.random() < 0.5:
+                body[2:, 0] += rng.uniform(-0.2, 0.2)
+            try:
+                assembly([*kept, body, GROUND], 0.5, fixed=[len(kept) + 1])
+            except gf.InputError:  # it overlaps another
+                continue
+            kept.append(body)
+            above.append(x)
+        middles, low = np.array(above), low + height
+    made = assembly([*kept, GROUND], float(rng.uniform(0.1, 0.9)), fixed=[len(kept)])
+    # A disk that rests on one point rolls under any of it.
+    made.load[made.shapes.sides > 0, 0] = (
+        rng.uniform(-0.15, 0.15) * made.load[made.shapes.sides > 0, 1]
+    )
+    return made
+
+
+def own_program(packing, load=None):
+    """Rows and right-hand side of the balance in f_n, f_t, from points and normals alone."""
+    moving = np.flatnonzero(~np.isnan(packing.load[:, 0]))
+    rows = {int(body): 3 * k for k, body in enumerate(moving)}
+    A = np.zeros((3 * len(moving), 2 * len(packing.contacts.i)))
+    for c, point in enumerate(packing.contact_points):
+        n = packing.contacts.normal[c]
+        for body, sign in ((packing.contacts.i[c], -1), (packing.contacts.j[c], 1)):
+            if int(body) not in rows:
+                continue
+            arm = point - packing.x[body]
+            for part, way in enumerate((n, np.array([-n[1], n[0]]))):
+                force = sign * way
+                torque = arm[0] * force[1] - arm[1] * force[0]
+                A[rows[int(body)] : rows[int(body)] + 3, 2 * c + part] = [*force, torque]
+    count, mu = len(packing.contacts.i), packing.mu
+    cones = np.zeros((2 * count, 2 * count))
+    for c in range(count):
+        cones[2 * c : 2 * c + 2, 2 * c] = -mu
+        cones[2 * c : 2 * c + 2, 2 * c + 1] = 1, -1
+    return A, -(packing.load if load is None else load)[moving].ravel(), cones
+
+
+def check_against_linprog(seed):
+    rng = np.random.default_rng(seed)
+    packing = random_assembly(rng)
+    A, b, cones = own_program(packing)
+    free = [(0, None), (None, None)] * len(packing.contacts.i)
+
+    def least(cost):
+        return linprog(cost, cones, np.zeros(len(cones)), A, b, free, method="highs")
+
+    try:
+        S = gf.ensemble(packing)
+    except gf.NotJammedError:
+        assert least(np.zeros(A.shape[1])).status == 2
+        return False
+    k = int(rng.integers(len(S.index)))
+    bounds = gf.intervals(S, [S.index[k]])
+    for part in (0, 1):
+        cost = np.zeros(A.shape[1])
+        cost[2 * S.index[k] + part] = 1.0
+        for sign, value in ((1, bounds.low), (-1, bounds.high)):
+            found = least(sign * cost)
+            scale = S.force_scale
+            assert sign * found.fun == pytest.approx(value[0, part], abs=1e-6 * scale)
+    return True
+
+
+def test_bounds_of_random_assemblies_agree_with_linprog():
+    stood = [check_against_linprog(seed) for seed in range(60)]
+    assert 20 < sum(stood) < 58
+
+
+@pytest.mark.stress
+def test_bounds_of_many_random_assemblies_agree_with_linprog():
+    stood = [check_against_linprog(seed) for seed in range(60, 400)]
+    assert 110 < sum(stood) < 320
+
+
+def test_every_view_of_s_takes_bodies():
+    packing = gf.scene("arch", voussoirs=5, thickness=0.3)
+    S = gf.ensemble(packing)
+    for states in (gf.walk(S, 5, seed=1).states, gf.sample_uniform(S, 5, seed=1).states):
+        assert np.all(S.admits(states))
+    where = gf.reach(S, int(S.index[0]))
+    assert where is not None and np.isfinite(gf.volume(S, seed=0).log_volume)
+    assert gf.rest(packing).at_rest
+    critical = gf.critical_force(S, int(S.index[2]))
+    assert critical.low <= critical.limit_load
+    assert gf.body(gf.ensemble(gf.scene("ladder"))).corners.shape == (2, 1)
+
+
+def test_bodies_without_friction_need_their_torques():
+    packing = gf.blocks([rectangle(0, 0, 1, 1), GROUND], 0.0, fixed=[1])
+    S = gf.ensemble(packing)
+    assert S.dimension == 0 and np.allclose(S.original, [[0.5, 0], [0.5, 0]])
+    assert gf.intervals(S).converged
+
+
+def test_files_and_stores_carry_shapes(tmp_path):
+    packing = gf.blocks([rectangle(0, 0, 1, 1), [1.5, 0.5, 0.5], GROUND], 0.5, fixed=[2])
+    gf.save_packing(packing, tmp_path / "blocks.npz")
+    for again in (
+        gf.load_packing(tmp_path / "blocks.npz"),
+        dataset_packing(packing_dataset(packing)),
+    ):
+        assert imported_parameters(again) == imported_parameters(packing)
+        assert all(np.array_equal(a, b) for a, b in zip(again.shapes, packing.shapes, strict=True))
+        assert again.info == packing.info
+    disks = gf.scene("pyramid")
+    assert "levers" not in packing_dataset(disks) and "mass" not in packing_dataset(disks)
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda: gf.blocks([], 0.5), "no body"),
+        (lambda: gf.blocks([[[0, 0], [1, 0], [2, 0]]], 0.5), "body 0 needs three corners"),
+        (lambda: gf.blocks([[[0, 0], [2, 0], [1, 0.5], [1, 2]]], 0.5), "not convex"),
+        (lambda: gf.blocks([[0, 0, -1]], 0.5), "above 0"),
+        (
+            lambda: gf.blocks([rectangle(0, 0, 1, 1), rectangle(0.5, 0, 2, 1)], 0.5),
+            "overlap by 0.5",
+        ),
+        (lambda: gf.blocks([rectangle(0, 0, 1, 1), GROUND], 0.5, fixed=[2]), "from 0 to 1"),
+        (lambda: gf.blocks([GROUND], 0.5, weights=[0.0]), "weight ≤ 0"),
+        (lambda: gf.walk(gf.ensemble(gf.scene("slope")), 2, relax=gf.gauss_seidel), "disks only"),
+        (lambda: gf.margin(gf.scene("slope")), "disks only"),
+        (lambda: gf.save_vtk(gf.scene("slope"), "a.vtp", "b.vtp"), "disks only"),
+        (lambda: gf.ensemble(gf.scene("slope"), prescribed="stress"), "for disks only"),
+        (lambda: gf.scene("arch", stones=3), "no option stones"),
+    ],
+)
+def test_what_cannot_be_an_assembly_is_refused(call, words):
+    with pytest.raises(gf.InputError, match=words):
+        call()
