@@ -1,4 +1,4 @@
-"""The line of controls: the scene, its friction, and how the packing and its states are made."""
+"""The controls: the scene, its friction, and the options of the packing and its states."""
 
 from typing import Any
 
@@ -24,18 +24,18 @@ from .scene_list import SceneList
 FIELD = {"width": 150, "margin": (4, 12, 4, 0)}
 LIST = FIELD | {"width": 250}
 MADE = "How it is made"
-SAME = "the same μ"  # of a packing made with the friction of the ensemble
+SAME = "the same μ"  # for a packing made with the friction of the ensemble
 
 
 def offered(state: AppState) -> dict[str, Any]:
-    """Options and value of the precomputed results: each series with where it has states."""
-    # The series on screen is among them even before the catalogue is read anew.
+    """Options and value of the list of precomputed results: each series and the μ of its states."""
+    # The series on screen is included even before the catalogue is read again.
     on_screen = [] if state.cell is None else [state.cell]
     series: dict[str, set[float]] = {}
     for cell in [*state.catalogue, *on_screen]:
         series.setdefault(cell.series, set()).add(cell.mu)
     options = {f"{name} — {_frictions(sorted(found))}": name for name, found in series.items()}
-    if state.missing:  # what was asked for has no states: those on screen are of another packing
+    if state.missing:  # no such states: those on screen are of another packing
         return {"options": {f"none with {differs(state)}": "", **options}, "value": ""}
     return {"options": options, "value": state.cell.series if state.cell else ""}
 
@@ -47,7 +47,7 @@ def _frictions(found: list[float]) -> str:
 
 
 def differs(state: AppState) -> str:
-    """What was asked for and is not on screen, in words."""
+    """The requested selection that is not on screen, in words."""
     return differing(state.selection, state.cell and state.cell.selection)
 
 
@@ -132,7 +132,7 @@ class Controls:
             self.work.message = str(error)
 
     def _ask(self) -> None:
-        """Select what the widgets say."""
+        """Select the values of the widgets."""
         state = self.state
         if self._following or state.selection is None:
             return
@@ -140,7 +140,7 @@ class Controls:
             state.ask(self._selection(), at_once=True)
         except InputError as error:
             self.work.message = str(error)
-        if self.work.message:  # what was refused does not stay in its box
+        if self.work.message:  # a refused value is removed from its field
             self._follow()
 
     def _selection(self) -> Selection:
@@ -166,7 +166,7 @@ class Controls:
     # From the state
 
     def _follow(self, *events: Any) -> None:
-        """Widgets as the state has them."""
+        """Update widgets from the state."""
         state = self.state
         if state.selection is None:
             return

@@ -1,4 +1,4 @@
-"""What the picture shows, in sentences with the numbers of the packing on screen."""
+"""Explanations of the picture, in sentences with the numbers of the packing on screen."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ QUESTION = "What am I seeing? Why more than one force network?"
 
 
 def summary_html(replay: Replay) -> str:
-    """What the picture shows, and why there is more than one network, as HTML."""
+    """The contents of the picture, and why there is more than one network, as HTML."""
     summary = replay.summary
     n, free = summary["n"], summary["dimension"]
     if free == 0:
@@ -32,7 +32,7 @@ def summary_html(replay: Replay) -> str:
 
 
 def rest(replay: Replay) -> str:
-    """Why there are many networks, how many, what measures that, and what is drawn around them."""
+    """Why there are many networks, their number, its measures, and the plots around them."""
     summary = replay.summary
     loose = summary.get("rattlers", 0)
     forces, grains = 2 * summary["contacts"], summary["n"] - loose
@@ -74,26 +74,26 @@ def rest(replay: Replay) -> str:
 
 
 def _sides(replay: Replay) -> str:
-    """How large and how tilted the box is, in words; nothing of a box without sides."""
+    """The size and tilt of the box in words; empty for an open box."""
     sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return f" of {' × '.join(sides)} largest radii{tilted}" if sides else ""
 
 
 def _dependent(count: int) -> str:
-    """In words, how many of the equations follow from the others."""
+    """The number of equations that follow from the others, in words."""
     if count < 1:
         return ""
     return f" (less {count} that follow from the others, as each force acts on two disks)"
 
 
 def more(replay: Replay) -> str:
-    """The longer part, to be opened, as HTML for a page without scripts of its own."""
+    """The longer part, collapsed, as HTML for a page without scripts of its own."""
     return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
 
 
 def follow(state: AppState, header: Header) -> None:
-    """Have the help of the page explain what is on screen."""
+    """Make the help of the page explain what is on screen."""
 
     def tell(*events: Any) -> None:
         if state.replay is not None:

@@ -1,4 +1,4 @@
-"""The instrument: packing and player, tabs and results, and what is known of them: one screen."""
+"""The instrument on one screen: packing and player, tabs, and results."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -25,7 +25,7 @@ from .status_line import StatusLine
 from .tabs.tabs import Tabs, pale_when_old
 from .volume import Volume
 
-WAITING_MS = 250  # how often what Panel has kept back is sent
+WAITING_MS = 250  # interval of sending messages that Panel holds back
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
 KEYS = [
     ["Space", "play; pause at the nearest network"],
@@ -38,9 +38,9 @@ KEYS = [
     ["?", "this list"],
 ]
 
-# Below 900 px everything is in one column. From there on the page is one screen high: the packing
-# is a square that takes the height there is, tabs and results are beside it; from 1800 px on force
-# space has a place of its own between them (player.js).
+# Below 900 px everything is in one column. Above, the page is one screen high: the packing is a
+# square of the available height, with tabs and results next to it; from 1800 px on force space has
+# its own column between them (player.js).
 GRID = {
     "& .main-content": {
         "display": "grid",
@@ -94,7 +94,7 @@ GRID = {
 
 
 def explore_page(document: Document, query: str) -> Any:
-    """The page of large packings, as a link's query asks; `embed=1`: the packing alone."""
+    """The page of large packings for a link's query; `embed=1`: only the packing."""
     wake = visit.turns(document)
     state = AppState(visit.library(), wake, query, visit.visitor(document))
     looks, work = state.looks, state.work
@@ -102,7 +102,7 @@ def explore_page(document: Document, query: str) -> Any:
     packing = PackingView(state)
     Stream(state, packing.player, document)
     hears, state.hand.tell = packing.player.hears, packing.player.tell
-    # The page reports its width while it loads, before it can hear an answer.
+    # The page reports its width while it loads, before it can receive an answer.
     hears["wide"] = lambda wide: wake(partial(looks.param.update, wide=wide))
     hears["keep"] = lambda keep: state.keep_all()
     hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
@@ -120,7 +120,7 @@ def explore_page(document: Document, query: str) -> Any:
 
 
 class _Around:
-    """What is around the packing: header, controls, tabs, results and the status line."""
+    """The parts around the packing: header, controls, tabs, results and the status line."""
 
     def __init__(self, state: AppState, side: pn.Column) -> None:
         self.state = state
@@ -138,7 +138,7 @@ class _Around:
         ]  # fmt: skip
 
     def parts(self, player: Player) -> Iterator[None]:
-        """Everything that follows the packing, piece by piece."""
+        """Create everything that follows the packing, in steps."""
         state, controls = self.state, Controls(self.state)
         self.controls[:] = [controls.line, controls.made]
         yield

@@ -1,10 +1,10 @@
-// Slider for μ on a logarithmic scale, with a place for 0 and a tick for every stored value.
+// Slider for μ on a logarithmic scale, with a position for 0 and a tick for every stored value.
 
 import { button } from "../browser/dom.js"
 
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
-const HILL = 22 // px, its height
+const HILL = 22 // px, height of the curve
 
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
 const rounded = (mu) => Number(mu.toPrecision(2))
@@ -25,7 +25,7 @@ export function render({ model, view }) {
   const range = root.querySelector("[type=range]"), typed = part("typed")
 
   const along = (at) => `calc(8px + (100% - 16px) * ${(at - model.least) / (model.most - model.least)})`
-  /** Ask for a μ; where the server is gone, the page that opens anew does, see gone.js. */
+  /** Request a μ; without a server, the page that reloads later does, see connection_lost.js. */
   function wish(mu) {
     view.model.data.wish = mu
     model.mu = mu
@@ -52,7 +52,7 @@ export function render({ model, view }) {
     follow()
   }
 
-  /** η over μ as a hill over the rail: how undetermined forces are where friction is so large. */
+  /** η against μ as a curve above the rail: how undetermined forces are at this friction. */
   function drawHill() {
     const most = Math.max(...model.hill.map(([, eta]) => eta))
     if (!(most > 0)) return
@@ -69,7 +69,7 @@ export function render({ model, view }) {
     range.setAttribute("aria-valuetext", `μ = ${typed.value}`)
   }
 
-  // A stored value is shown while the thumb still moves; others are asked for when it is let go.
+  // A stored value is shown while the thumb is moving; others are requested on release.
   range.addEventListener("input", () => {
     const at = Number(range.value), stored = snapped(at)
     typed.value = String(stored ?? value(at))
@@ -97,7 +97,7 @@ export function render({ model, view }) {
 
   for (const name of ["least", "most", "stored"]) model.on(name, draw)
   model.on("mu", follow)
-  model.on("msg:custom", follow) // what was typed has been taken, or refused
+  model.on("msg:custom", follow) // the typed value was accepted or refused
   model.on("hill", drawHill)
   draw()
   drawHill()

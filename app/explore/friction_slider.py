@@ -13,7 +13,7 @@ MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be ty
 
 
 class FrictionSlider(Scripted):
-    """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
+    """μ on a logarithmic scale that snaps to the values in `stored`; see friction_slider.js."""
 
     mu = param.Number(default=0.1)
     hill = param.List(default=[], doc="[(μ, η2)] to be drawn along it")
@@ -22,7 +22,7 @@ class FrictionSlider(Scripted):
     most = param.Number(default=MOST_PLACE, constant=True)
 
     def __init__(self, on_typed: Callable[[str], object], **params: Any) -> None:
-        """on_typed(text): what to do with a value that was typed, sensible or not."""
+        """on_typed(text): called with a typed value, valid or not."""
         super().__init__(**params)
         self._on_typed = on_typed
 

@@ -1,16 +1,16 @@
-// The address follows the view, and the view follows Back and Forward; where the server is gone, see
-// gone.js.
+// The address follows the view, and the view follows Back and Forward; for a lost server see
+// connection_lost.js.
 
 import { ask } from "../browser/send.js"
 import { goneBanner } from "../browser/connection_lost.js"
 
-const RETURN_MS = 20000 // in which a view that was gone back to appears
+const RETURN_MS = 20000 // within which a view in the history appears
 
 export function render({ model, view }) {
   const banner = goneBanner(view, "What is in the page still plays.")
   let goal = null
 
-  /** A query without what is not gone back to. */
+  /** A query without the parameters that Back ignores. */
   function lasting(query) {
     const given = new URLSearchParams(query)
     for (const name of model.passing) given.delete(name)
@@ -21,7 +21,7 @@ export function render({ model, view }) {
     const { query } = model, now = window.location.search
     if (goal === query) goal = null
     if (goal !== null || !query || query === now) return
-    const known = new URLSearchParams(now).has("mu") // else the page has just opened
+    const known = new URLSearchParams(now).has("mu") // otherwise the page has just opened
     const step = known && lasting(query) !== lasting(now)
     window.history[step ? "pushState" : "replaceState"](null, "", query)
   }

@@ -1,4 +1,4 @@
-"""The page's address: a copy of it reopens the view, Back and Forward go through the views."""
+"""The page's address: a copy of it reopens the view, and Back and Forward go through the views."""
 
 from typing import Any
 
@@ -11,10 +11,10 @@ from ..state.links import VIEW, key
 
 
 class Address(Scripted):
-    """Keeps the address like the state and the state like the address; see address.js.
+    """Keeps the address and the state in sync; see page_address.js.
 
-    It also says when the server is gone, and reopens the view when there is one again. Not Panel's
-    Location, which remembers every frame, and tells nobody when the visitor goes back.
+    It also reports a lost server, and reopens the view when it returns. Not Panel's Location, which
+    stores every frame in the history and does not report Back.
     """
 
     query = param.String(doc="of the address, as the state has it")

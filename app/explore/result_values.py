@@ -1,7 +1,6 @@
-"""The numbers of the results line and of the status line, each with what it is worth.
+"""The numbers of the results line and of the status line, each with its reliability.
 
-`measures`, `packing` and `sampling` are made from what is on screen; how they are laid out is
-`results_line`'s.
+`measures`, `packing` and `sampling` describe what is on screen; `results_line` lays them out.
 """
 
 import math
@@ -22,24 +21,24 @@ LEAST_SIZE = 100  # effective size of a uniform sample below which its errors ar
 
 
 class Quantity(NamedTuple):
-    """A quantity in words, and its values as texts; empty where there is none (yet)."""
+    """A quantity with its values as text; empty if there is none (yet)."""
 
     key: str  # of the glossary
     symbol: str
     words: str
-    seen: str = ""  # over the states, with its standard error where there is one
+    seen: str = ""  # over the states, with its standard error if available
     exact: str = ""  # over all of S, or of the packing
-    note: str = ""  # what has to be said of it, e.g. that it grows with the number of states
+    note: str = ""  # a remark, such as that it grows with the number of states
 
 
 class Sampling(NamedTuple):
-    """How the states were found and whether they can be relied on, in words."""
+    """How the states were generated, and whether they are reliable, in words."""
 
     sampler: str  # "random walk, nearest admissible state"
     networks: str  # "1000 of 1000 attempts accepted, 50 kept"
-    verdict: str  # "mixed", "not mixed", or empty where that cannot be said
-    mixing: str  # why: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20"
-    doubt: str  # why they cannot be relied on, "not mixed: …"; empty where they can
+    verdict: str  # "mixed", "not mixed", or empty if undecided
+    mixing: str  # the reason: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20"
+    doubt: str  # why they are not reliable, "not mixed: …"; empty if they are
 
     def __str__(self) -> str:
         mixed = f"<b>{term('r_hat', self.verdict)}</b>: {self.mixing}"
@@ -48,7 +47,7 @@ class Sampling(NamedTuple):
 
 
 def measures(state: AppState) -> list[Quantity]:
-    """η1, η2, 0.15 η3 and the mean ΔF_n, over the states on screen and over S; [] without any."""
+    """η1, η2, 0.15 η3 and the mean ΔF_n, over the states on screen and S; [] without states."""
     replay = state.replay
     if replay is None:
         return []
@@ -67,7 +66,7 @@ def measures(state: AppState) -> list[Quantity]:
 
 
 def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]:
-    """z, φ, h and ln V of the packing on screen, exact; volume: as `compute.volume` finds it."""
+    """z, φ, h and ln V of the packing on screen, exact; volume: from `compute.volume`."""
     if state.replay is None:
         return []
     summary = state.replay.summary
@@ -90,7 +89,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
 
 
 def sampling(state: AppState) -> Sampling | None:
-    """How the states on screen were found, and whether they have mixed; None without any."""
+    """How the states on screen were generated, and whether they have mixed; None without states."""
     if state.replay is None or state.cell is None:
         return None
     selection, replay = state.cell.selection, state.replay
@@ -123,14 +122,14 @@ def _judged(
 
 
 def sampler(selection: Selection) -> str:
-    """By what states are found, in words."""
+    """The sampler, in words."""
     if selection.kind == "uniform":
         return "uniform sample of S"
     return f"{KINDS['walk'].removeprefix('the ')}, {SOLVERS[selection.relax]}"
 
 
 def _networks(replay: Replay) -> str:
-    """How many networks there are, and how many attempts they took."""
+    """The number of networks, and of the attempts they took."""
     summary = replay.summary
     states, kept = summary["states"], summary["kept"]
     words = f"{states} networks"
@@ -166,7 +165,7 @@ def with_error(value: float, error: float) -> str:
 
 
 def between(low: float, high: float) -> str:
-    """Two values with as many digits as tell them apart: "1.682 … 1.690"; one where they agree."""
+    """Two values with enough digits to distinguish them: "1.682 … 1.690"; one if they agree."""
     if not high > low:
         return short(low)
     digits = min(9, max(2, 1 - int(f"{high - low:.0e}".partition("e")[2])))
@@ -174,7 +173,7 @@ def between(low: float, high: float) -> str:
 
 
 def short(value: float) -> str:
-    """A value to four digits, and 0 of what is only rounding."""
+    """A value to four digits, and 0 for rounding errors."""
     if not np.isfinite(value):
         return "–"
     return "0" if abs(value) < 1e-12 else f"{value:.4g}".replace("-", "−")

@@ -1,4 +1,4 @@
-// Numbers as tables; the one button among them measures the volume of S.
+// Numbers as tables; the only button computes the volume of S.
 
 import { ask } from "../browser/send.js"
 import { made } from "../browser/dom.js"

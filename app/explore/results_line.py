@@ -1,4 +1,4 @@
-"""The results of the states on screen as two tables: how undetermined forces are, and of what."""
+"""The results for the states on screen as two tables: indeterminacy, and the packing."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -19,7 +19,7 @@ UNIT = {"extent": " ⟨fₙ⟩"}
 
 
 class Results(Scripted):
-    """Numbers with symbol and word, seen and exact; see results_line.js."""
+    """Numbers with symbol and name, seen and exact; see results_line.js."""
 
     html = param.String()
 
@@ -40,7 +40,7 @@ class Results(Scripted):
 
 
 def tables(state: AppState, volume: Volume) -> str:
-    """All numbers as HTML, and what they leave out."""
+    """All numbers as HTML, and a note on omitted work."""
     known = " under what is held" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
@@ -79,7 +79,7 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"
 
 
-# Number of the summary → key of the glossary, a noun, and what follows it.
+# Number in the summary → key of the glossary, a noun, and the rest of the sentence.
 LEFT_OUT = {
     "rattlers": ("rattler", "loose disk", ""),
     "unloaded_contacts": ("unloaded", "contact", " without force"),

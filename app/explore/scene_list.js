@@ -1,4 +1,5 @@
-// The list of scenes: another one is another page, in the theme of this one, and with its friction if that was chosen.
+// The list of scenes: choosing one opens its page, in the same theme, and with the friction if it
+// was chosen.
 
 export function render({ model }) {
   const root = document.createElement("label")

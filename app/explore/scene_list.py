@@ -1,4 +1,4 @@
-"""The list of scenes, first of the controls of large packings."""
+"""The list of scenes, the first of the controls."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..state import scene_links
 
 
 class SceneList(Scripted):
-    """Names of all scenes; choosing one opens it; see scenelist.js."""
+    """Names of all scenes; choosing one opens it; see scene_list.js."""
 
     titles = param.List(doc="[name, title] of every scene")
     shown = param.String(default=scene_links.MANY)

@@ -1,12 +1,11 @@
-// The line at the lower edge: what failed, else what is being computed, else what is known of the
-// numbers on screen; and, until it is closed for good, where to begin for somebody new.
-
+// The line at the bottom: a failure, or the progress of a computation, or the reliability of the
+// numbers on screen; and, until it is closed, where new visitors can begin.
 import { ask } from "../browser/send.js"
 import { button, made } from "../browser/dom.js"
 import { knows, remember } from "../browser/local_storage.js"
 import { taskLine } from "../widgets/progress.js"
 
-const NEW = "learn" // what a browser remembers of the line for somebody new
+const NEW = "learn" // name under which a browser remembers that the line for new visitors was closed
 
 export function render({ model, view }) {
   const root = made("div", { className: "line" }), facts = made("p", { className: "facts" })
@@ -17,7 +16,7 @@ export function render({ model, view }) {
     failed.hidden = !model.failed
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
     facts.hidden = model.running
-    view.el.classList.toggle("urgent", model.running || Boolean(model.failed)) // seen wherever the page is scrolled to
+    view.el.classList.toggle("urgent", model.running || Boolean(model.failed)) // visible at any scroll position
     facts.replaceChildren(...model.facts.map((fact) => made("span", { innerHTML: fact })))
   }
 

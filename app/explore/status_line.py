@@ -1,4 +1,4 @@
-"""One line on what is on screen: what is certified and mixed, or computing, or went wrong."""
+"""One line on what is on screen: certified and mixed, or being computed, or failed."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,11 +13,11 @@ from ..state.app_state import AppState
 from ..widgets.progress import Progress
 from . import result_values
 
-CERTIFICATE = "distance_to_rest"  # in the record of a packing that was shown to be at rest
+CERTIFICATE = "distance_to_rest"  # in the record of a packing certified to be at rest
 
 
 class StatusLine(Progress):
-    """Facts on the states on screen, or how far a task is, or what failed; see status_line.js."""
+    """Facts about the states on screen, a task's progress, or a failure; see status_line.js."""
 
     facts = param.List(doc="HTML, one each")
     failed = param.String(doc="what went wrong, in one line; empty if nothing did")
@@ -37,7 +37,7 @@ class StatusLine(Progress):
         self._fail()
 
     def _look(self, *events: Any) -> None:
-        """Have the packing's record read for the certificate that it was given when it was made."""
+        """Read the certificate of rest in the packing's record."""
         library, cell = self._state.library, self._state.cell
         if cell is not None:
 
@@ -68,7 +68,7 @@ class StatusLine(Progress):
 
 
 def facts(state: AppState) -> Iterator[str]:
-    """What there is to know of the numbers on screen, as HTML."""
+    """Facts about the numbers on screen, as HTML."""
     cell, replay = state.cell, state.replay
     if cell is None or replay is None:
         yield "opening the packing …"
@@ -80,7 +80,7 @@ def facts(state: AppState) -> Iterator[str]:
 
 
 def bounds(state: AppState) -> str:
-    """How many exact bounds are certified, and how exactly."""
+    """The number of certified exact bounds, and their accuracy."""
     exact = state.exact
     if exact is None:
         return "exact bounds: not computed"

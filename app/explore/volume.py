@@ -1,4 +1,4 @@
-"""The volume of S of the packing on screen: looked up in the stores, measured when asked for."""
+"""The volume of S of the packing on screen: looked up in the stores, computed on request."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..state.app_state import AppState
 
 
 class Volume(param.Parameterized):
-    """`found` once it is known; `offered` where it can be measured."""
+    """`found` once it is known; `offered` if it can be computed."""
 
     found = param.Parameter(doc="Dataset of the volume, or None")
     offered = param.Boolean(doc="whether there is a volume to be measured")
@@ -24,13 +24,13 @@ class Volume(param.Parameterized):
         self._look()
 
     def measure(self) -> None:
-        """Measure it, in the background."""
+        """Compute it in the background."""
         cell = self.state.cell
         if cell is not None:
             self.work.measuring.start(compute.volume(self.state.library, cell), self._take)
 
     def _look(self, *events: Any) -> None:
-        """Whether a store has it already."""
+        """Look it up in the stores."""
         state, self.found = self.state, None
         self.work.measuring.cancel()
         self._offer()

@@ -1,13 +1,13 @@
-// Packing and plots on screen as one figure in a chosen width: all of it lines and letters but for the small marks
-// of legends, which Bokeh draws as pixels.
+// Packing and plots on screen as one figure of chosen width, in vector graphics except for the
+// small marks of legends, which Bokeh draws as pixels.
 
 import { print } from "../browser/download.js"
 
-const SIDE_BY_SIDE_MM = 120 // from this width on the plots are beside the packing, else below it
-const COLUMN = 900 // units across the packing or a plot; so wide is its picture, see sheet.js
+const SIDE_BY_SIDE_MM = 120 // from this width on the plots are next to the packing, otherwise below it
+const COLUMN = 900 // units across the packing or a plot, as in its picture; see svg_context.js
 const SPACE = 24 // units between them
 
-/** The plots that are seen just now, from above, as SVG. */
+/** The visible plots, from the top, as SVG. */
 export async function plotsSeen(page) {
   const seen = []
   for (const fig of page._all_models.values()) {
@@ -18,7 +18,7 @@ export async function plotsSeen(page) {
   return Promise.all(seen.map(async ([, view]) => (await view.export("svg").to_blob()).text()))
 }
 
-/** A picture to be set into another: its root and its size; names within it begin with `k`. */
+/** A picture to embed in another: its root and its size; ids in it begin with `k`. */
 function inset(text, k) {
   const own = text.replace(/\bid="/g, `$&${k}-`).replace(/url\(#|href="#/g, `$&${k}-`)
   const root = new DOMParser().parseFromString(own, "image/svg+xml").documentElement
@@ -27,7 +27,7 @@ function inset(text, k) {
   return { root, height: (COLUMN * height) / width }
 }
 
-/** One SVG of them all: {text, height}, so many mm wide and high. */
+/** One SVG of all of them: {text, height}, with width and height in mm. */
 export function composed(packing, plots, width, ground) {
   const beside = plots.length > 0 && width >= SIDE_BY_SIDE_MM
   const wide = beside ? 2 * COLUMN + SPACE : COLUMN, down = [0, 0], parts = []
@@ -44,7 +44,7 @@ export function composed(packing, plots, width, ground) {
   return { text, height }
 }
 
-/** Print a figure alone, on a sheet of its own size: saved as PDF there, it stays lines and letters. */
+/** Print a figure alone, on a page of its size: saved as PDF, it stays vector graphics. */
 export function printFigure({ text, height }, width) {
   print("The figure, to be printed", `<!doctype html><meta charset="utf-8"><title>Figure</title><style>
     @page { size: ${width}mm ${height}mm; margin: 0 } body { margin: 0 } svg { display: block }</style>${text}`)

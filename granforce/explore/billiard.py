@@ -1,4 +1,4 @@
-"""Paths in S between its walls: straight ones, for uniform states, and harmonic ones, for normal.
+"""Paths in S between its walls: straight for uniform states, and harmonic for normal ones.
 
 A path is described by the slacks s of all walls and their speeds w. When a path meets wall k, it is
 reflected: w ← w − 2 w_k/K_kk · (row k of K). A reflection costs one pass over the walls and a row
@@ -25,10 +25,10 @@ BLOCK = 64
 MEMORY = 1 << 30
 # Reflections after which a path is rejected, per dimension; a typical path has less than one.
 MOST_TURNS = 10
-# Slacks stay above this: a point that rounding put on a wall is reflected there at once.
+# Slacks stay above this: a point that rounding puts on a wall is reflected there at once.
 _LEAST = 1e-300
-# Flight.count: paths done, turns on this one, turns and paths not taken in all; whether on a path,
-# and the wall that is next on it.
+# Indices of Flight.count: paths done, reflections of this one, total reflections and rejected
+# paths; whether a path is in progress, and its next wall.
 _PATH, _HITS, _TURNS, _REFUSED, _FLYING, _NEXT = range(6)
 
 
@@ -41,20 +41,20 @@ class RowCache(NamedTuple):
 
     values: Floats  # (places, walls)
     place: Integers  # (walls,) place of each row, −1 if not cached
-    owner: Integers  # (places,) wall of each place, −1 where it is free
+    owner: Integers  # (places,) wall of each place, −1 if it is free
     used: Mask  # (places,) bool, used since the clock hand last passed
     hand: Integers  # (1,) the next place that may be reused
 
 
 class RowStore(NamedTuple):
-    """Rows of K, made on demand; threads may share them where there is room for all."""
+    """Rows of K, computed on demand; threads may share them if there is room for all."""
 
     cache: RowCache
     making: threading.Lock  # held by the thread that computes rows
 
     @property
     def whole(self) -> bool:
-        """Whether all rows fit, so that none is ever dropped."""
+        """Whether all rows fit, so that none is ever evicted."""
         return len(self.cache.owner) >= len(self.cache.place)
 
 
@@ -64,7 +64,7 @@ class Flight(NamedTuple):
     s: Floats  # (walls,) slacks
     w: Floats  # (walls,) their speeds
     start: Floats  # (walls,) slacks where the path began
-    left: Floats  # (2,) time that is left of the path, one over that to the next wall
+    left: Floats  # (2,) remaining time of the path, one over that to the next wall
     count: Integers  # type: ignore[assignment]  # (6,) path, its hits, turns, …, as named above
 
 
@@ -95,7 +95,7 @@ def make_rows(rows_of: RowsOf, rows: RowCache, wanted: Sequence[int]) -> None:
         if rows.owner[here] >= 0:
             rows.place[rows.owner[here]] = -1
         rows.values[here], rows.owner[here] = row, wall
-        rows.place[wall] = here  # last: other threads look here
+        rows.place[wall] = here  # last, because other threads look here
         rows.used[here] = True
         rows.hand[0] = (here + 1) % len(rows.owner)
 
@@ -150,8 +150,7 @@ def follow(
 
 @compiled
 def fly(rows, speeds, times, middles, flight, limit, out, stop):
-    """Follow paths with speeds (paths, walls) and times (paths,), each from the end of the last
-    one.
+    """Follow paths with speeds (paths, walls) and times (paths,), each from the end of the last.
 
     Without middles (0, walls) they are straight, and mirrored at walls: a billiard walk (Polyak,
     Gryazina, EJOR 238, 497 (2014)). For speeds in a random direction and times whose law does not
@@ -226,7 +225,7 @@ def _onward(flight, middle, harmonic, row, time, kick):
     rest = max(left[0], _LEAST)
     soonest, next_wall = 1.0 / (np.tan(0.5 * rest) if harmonic else rest), -1
     cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
-    # Rounding must not move a harmonic path where it begins.
+    # Rounding must not move a harmonic path at its start.
     moves, lowest = kick != 0.0 or not harmonic, -np.inf if harmonic else _LEAST
     for first in range(0, len(s), BLOCK):
         if moves:
@@ -241,7 +240,7 @@ def _onward(flight, middle, harmonic, row, time, kick):
 
 @inline
 def _move(s, w, middle, row, cos, sin, kick, lowest, first):
-    """Motion and turn of BLOCK walls."""
+    """Motion and reflection of BLOCK walls."""
     for k in range(first // lanes.LANES, (first + BLOCK) // lanes.LANES):
         slack, speed, m = (
             lanes.load(s, k, MANY),
@@ -255,14 +254,14 @@ def _move(s, w, middle, row, cos, sin, kick, lowest, first):
 
 @inline
 def _some_nearer(s, w, middle, harmonic, soonest, first):
-    """Whether any of BLOCK walls has a larger rate than `soonest`, but for rounding."""
+    """Whether any of BLOCK walls has a larger rate than `soonest`, up to rounding."""
     nearer = lanes.same(MANY, 0.0)
     for k in range(first // lanes.LANES, (first + BLOCK) // lanes.LANES):
         slack, speed = lanes.larger(lanes.load(s, k, MANY), _LEAST), lanes.load(w, k, MANY)
         by = soonest * slack + speed
         if harmonic:
-            # The larger root of s q² + 2 w q + r (`_rate`) is above q where that is negative, or
-            # falls while there are roots.
+            # The larger root of s q² + 2 w q + r (`_rate`) exceeds q if that is negative, or
+            # decreasing while there are roots.
             rest = 2.0 * lanes.load(middle, k, MANY) - slack
             roots = lanes.pick(speed * speed, rest * slack, 1.0, 0.0)
             nearer = nearer + lanes.pick(
@@ -275,11 +274,11 @@ def _some_nearer(s, w, middle, harmonic, soonest, first):
 
 @inline
 def _rate(slack, speed, middle, harmonic):
-    """The inverse of the time t at which a slack is 0 first; at most 0 if it never is.
+    """The inverse of the time t at which a slack first becomes 0; at most 0 if it never does.
 
-    Of a harmonic path that of tan(t/2), t < π: middle + (s − middle) cos t + w sin t = 0 is, for
-    the inverse q of tan(t/2), the quadratic equation s q² + 2 w q + 2 middle − s = 0; of the two
-    forms of its larger root the one is taken in which nothing cancels.
+    For a harmonic path, that of tan(t/2), t < π: middle + (s − middle) cos t + w sin t = 0 is, for
+    the inverse q of tan(t/2), the quadratic equation s q² + 2 w q + 2 middle − s = 0; its larger
+    root is computed in the form without cancellation.
     """
     slack = slack if slack > _LEAST else _LEAST
     if not harmonic:
@@ -294,7 +293,7 @@ def _rate(slack, speed, middle, harmonic):
 
 @within
 def _end(s, w, middle, harmonic, time):
-    """Motion without a turn."""
+    """Motion without a reflection."""
     cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
     for k in range(len(s)):
         s[k] = middle[k] + cos * (s[k] - middle[k]) + sin * w[k]

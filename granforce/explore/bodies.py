@@ -146,10 +146,10 @@ def _inner(S: Ensemble) -> Floats:
 
 
 class _Shape(NamedTuple):
-    """S in coordinates w around a point inside, its walls at distances of order 1 from that."""
+    """S in coordinates w around a point inside, with walls at distances of order 1 from it."""
 
-    walls: Floats  # (n, h) Q: wall k is where Q_k·w = −1
-    stretch: Floats  # (h, h) what takes w to orthonormal coordinates of force: u = w · stretch
+    walls: Floats  # (n, h) Q: wall k is at Q_k·w = −1
+    stretch: Floats  # (h, h) converts w to orthonormal coordinates of force: u = w · stretch
     corners: Floats  # (V, h)
     rays: Floats  # (R, h)
     at_corner: Mask  # (V, n) walls that meet in each corner
@@ -188,28 +188,28 @@ def _shape(slopes: Floats, inner: Floats) -> _Shape:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Vectors (…, h) at the length 1."""
+    """Vectors (…, h) scaled to length 1."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _along(walls: Floats, w: Floats) -> Floats:
-    """The direction of length 1 along all these walls, nearest to w."""
+    """The unit vector along all these walls, nearest to w."""
     direction = np.linalg.svd(walls)[2][-1] if len(walls) else w
     return _unit(direction * np.sign(direction @ w or 1.0))
 
 
 def _on(walls: Floats, w: Floats, t: float) -> Mask:
-    """(n,) walls on which the point w/t lies, to rounding."""
+    """(n,) walls that contain the point w/t, to rounding."""
     length = np.linalg.norm(w)
     size = np.linalg.norm(walls, axis=1) * length + t
     return np.abs(walls @ w + t) <= _ON_WALL * size + _ROUNDING * np.hypot(length, t)
 
 
 def _meetings(walls: Floats) -> list[tuple[Floats, float, list[int]]]:
-    """(w, t, walls) of the ends of {w : Q w ≥ −1}: corners w/t, or, where t = 0, rays w.
+    """(w, t, walls) of the ends of {w : Q w ≥ −1}: corners w/t or, if t = 0, rays w.
 
     In homogeneous coordinates (w, t) corners and rays are the edges of one cone, and the corners of
-    a bounded section through it, in which nothing is far out.
+    a bounded section through it.
     """
     h, which = walls.shape[1], _different(walls)
     if h == 0:
@@ -231,14 +231,14 @@ def _meetings(walls: Floats) -> list[tuple[Floats, float, list[int]]]:
 
 
 def _different(walls: Floats) -> Integers:
-    """The first of all walls in each place, without those that are nowhere."""
+    """The first wall in each place, without walls at infinity."""
     size = np.linalg.norm(walls, axis=1)
     apart = np.linalg.norm(walls[:, None] - walls[None], axis=-1) > _ON_WALL * size[:, None]
     return np.flatnonzero([size[k] > 0 and np.all(apart[k, :k]) for k in range(len(walls))])
 
 
 def _sides(S: Ensemble, shape: _Shape, slopes: Floats, moving: Integers) -> tuple[Side, ...]:
-    """Sides: walls that meet S in one of full size, those in one place together."""
+    """Sides: walls that meet S in a full side; walls in one place together."""
     h = len(shape.stretch)
     ends = [np.pad(shape.corners, ((0, 0), (0, 1)), constant_values=1.0)]
     ends.append(np.pad(shape.rays, ((0, 0), (0, 1))))
@@ -253,7 +253,7 @@ def _sides(S: Ensemble, shape: _Shape, slopes: Floats, moving: Integers) -> tupl
 def _side(
     S: Ensemble, shape: _Shape, slopes: Floats, moving: Integers, walls: Sequence[int]
 ) -> Side:
-    """The Side of walls (positions in moving) that are in one place."""
+    """The Side of walls (positions in moving) in one place."""
     first = walls[0]
     corners, normal = np.flatnonzero(shape.at_corner[:, first]), -_unit(slopes[first])
     if len(normal) == 3:
@@ -263,14 +263,14 @@ def _side(
 
 
 def _stop(S: Ensemble, column: int) -> tuple[int, int]:
-    """(contact, what stops there) of a cone coordinate that is 0."""
+    """(contact, event) of a cone coordinate that is 0."""
     if S.mu == 0:
         return int(S.index[column]), OPENS
     return int(S.index[column // 2]), SLIDES if column % 2 else SLIDES_BACK
 
 
 def _joined(labels: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Stops, a contact that slides both ways being one that opens."""
+    """Stops in which a contact that slides both ways counts as opening."""
     both = {}
     for contact, what in labels:
         both[contact] = OPENS if contact in both else what
@@ -278,7 +278,7 @@ def _joined(labels: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def _around(points: Floats, rays: Floats, normal: Floats) -> Integers:
-    """The order of points (k, 3) of a plane around their middle, begun where rays (r, 3) go out."""
+    """The order of points (k, 3) of a plane around their centre, starting at the rays (r, 3)."""
     across = np.linalg.svd(normal[None])[2][1:]
     flat = (points - points.mean(axis=0)) @ across.T
     angle = np.arctan2(flat[:, 1], flat[:, 0])

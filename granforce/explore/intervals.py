@@ -141,7 +141,7 @@ def intervals(
     solver = Solver(system, workers=workers, seen=seen, found=found, **report)
 
     def zero(key: Key) -> bool:
-        """Whether f_n = 0 was seen there."""
+        """Whether a state with f_n = 0 is known for this key."""
         return skip and key not in given and known.least[key[0]] <= INTERVAL_GAP
 
     def solve(keys: Sequence[Key]) -> Bounds:
@@ -165,7 +165,7 @@ def intervals(
 
 
 def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
-    """{key: (value attained, value that bounds it)} of the components that are known exactly."""
+    """{key: (value attained, value that bounds it)} of components with known values."""
     if ensemble.known is None:
         return {}
     value = np.stack([ensemble.known.value, -ensemble.known.value], axis=-1)
@@ -289,8 +289,10 @@ def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Pro
 def solved(
     ensemble: Ensemble, solver: Solver, keys: Sequence[Key], points: dict[Any, Floats] | None = None
 ) -> Bounds:
-    """{key: (value attained, value that bounds it)} of finished programs; points as for the
-    Solver."""
+    """{key: (value attained, value that bounds it)} of finished programs.
+
+    points: as for the Solver.
+    """
     return solver.solve(keys, [bound_of(ensemble, *key) for key in keys], points)
 
 

@@ -29,23 +29,23 @@ _AT_ONCE = 128
 class Mixing(NamedTuple):
     """Diagnostics of each component; NaN where it cannot vary or there are too few draws."""
 
-    r_hat: Floats  # (…) split R̂, near 1 where all halves of all chains agree
+    r_hat: Floats  # (…) split R̂, near 1 if all halves of all chains agree
     bulk: Floats  # (…) effective sample size for the middle of the distribution
     tail: Floats  # (…) effective sample size for its 5 % and 95 % quantiles
 
     @property
     def worst_r_hat(self) -> float:
-        """Largest R̂, NaN where none is known."""
+        """Largest R̂, NaN if none is known."""
         return float(np.fmax.reduce(self.r_hat, axis=None, initial=np.nan))
 
     @property
     def least_bulk(self) -> float:
-        """Smallest bulk effective sample size, NaN where none is known."""
+        """Smallest bulk effective sample size, NaN if none is known."""
         return float(np.fmin.reduce(self.bulk, axis=None, initial=np.nan))
 
     @property
     def least_tail(self) -> float:
-        """Smallest tail effective sample size, NaN where none is known."""
+        """Smallest tail effective sample size, NaN if none is known."""
         return float(np.fmin.reduce(self.tail, axis=None, initial=np.nan))
 
 
@@ -80,7 +80,7 @@ def _judged(x: Floats) -> Floats:
 
 
 def _halves(x: Floats) -> Floats:
-    """(k, 2 chains, half of the draws) of (chains, draws, k); an odd one in the middle is left."""
+    """(k, 2 chains, half of the draws) of (chains, draws, k); an odd middle draw is dropped."""
     half = x.shape[1] // 2
     return np.ascontiguousarray(np.moveaxis(np.concatenate([x[:, :half], x[:, -half:]]), 2, 0))
 
@@ -92,7 +92,7 @@ def _scores(x: Floats) -> Floats:
 
 
 def _spread_ratio(x: Floats) -> Floats:
-    """√ of all variance over that within chains."""
+    """√(total variance over that within chains)."""
     n = x.shape[2]
     between = n * x.mean(axis=2).var(axis=1, ddof=1)
     within = x.var(axis=2, ddof=1).mean(axis=1)

@@ -1,11 +1,11 @@
 """The outline of S in a plane: its exact projection between an inner and an outer polygon.
 
-The projection of S on two axes u1, u2 of force space is a convex polygon. Its support function
-h(θ) = max {(cos θ u1 + sin θ u2)·F : F in S} is one linear program a direction. Each program gives
-a state, whose projection lies on the outline, and a certified half plane that holds all of S. New
-directions are the normals of those inner edges from which the corner of the half planes beside
-them is still too far, so that the polygons close on each other from both sides (Kamenev, Comput.
-Math. Math. Phys. 32, 114, 1992).
+The projection of S on two axes u1, u2 of force space is a convex polygon. Its support function h(θ)
+= max {(cos θ u1 + sin θ u2)·F : F in S} is one linear program per direction. Each program gives a
+state, whose projection is on the outline, and a certified half plane that contains all of S. New
+directions are the normals of those inner edges whose neighbouring half planes still meet too far
+away, so that the polygons converge from both sides (Kamenev, Comput. Math. Math. Phys. 32, 114,
+1992).
 """
 
 from __future__ import annotations
@@ -36,8 +36,10 @@ _FLOOR = 1e-7
 
 @notebook.brief
 class Outline(NamedTuple):
-    """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons are
-    anticlockwise."""
+    """The projection of S on two axes, in ⟨f_n⟩ times the axes' length.
+
+    Polygons are anticlockwise.
+    """
 
     inner: Floats  # (k, 2) corners of a polygon inside: projections of states of S
     outer: Floats  # (m, 2) corners of a polygon outside: of certified half planes
@@ -50,7 +52,7 @@ class _Support(NamedTuple):
     """Directions d with their points and bounds, in order of their angles."""
 
     d: Floats  # (n, 2) unit vectors
-    point: Floats  # (n, 2) projection of a state that goes farthest along d
+    point: Floats  # (n, 2) projection of a state farthest along d
     bound: Floats  # (n,) d·x ≤ bound for all x of the projection
 
 
@@ -131,9 +133,9 @@ def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
 def _solved(
     solver: Solver, plane: Any, directions: Floats, first: int = 0
 ) -> tuple[Floats, _Support]:
-    """(y (k, n) farthest along new directions (k, 2), their _Support); keys begin at first.
+    """(y (k, n) farthest along new directions (k, 2), their _Support); keys start at first.
 
-    plane: the axes in cone coordinates (n, 2), and what known forces add (2,).
+    plane: the axes in cone coordinates (n, 2), and the contribution of known forces (2,).
     """
     across, origin = plane
     keys = list(range(first, first + len(directions)))
@@ -158,9 +160,9 @@ def _merged(support: _Support, new: _Support) -> _Support:
 
 
 def _corners(support: _Support) -> tuple[Floats, Floats]:
-    """Corners (n, 2) of neighbouring half planes, and their distances (n,) from the edges inside.
+    """Corners (n, 2) of neighbouring half planes, and their distances (n,) from the inner edges.
 
-    Corner and edge k are those of directions k and k + 1.
+    Corner and edge k belong to directions k and k + 1.
     """
     d, after = support.d, np.roll(support.d, -1, axis=0)
     h, h_after = support.bound, np.roll(support.bound, -1)
@@ -183,7 +185,7 @@ def _normals(support: _Support, wide: Mask) -> Floats:
     normal = np.column_stack([edge[:, 1], -edge[:, 0]])
     size = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(size, np.finfo(float).tiny)[:, None]
-    # The normal of an edge within rounding error may point anywhere.
+    # The normal of an edge shorter than rounding error may point anywhere.
     between = (_cross(d, normal) > _CLOSEST) & (_cross(normal, after) > _CLOSEST)
     middle = d + after
     middle /= np.linalg.norm(middle, axis=1)[:, None]

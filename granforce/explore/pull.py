@@ -54,12 +54,12 @@ class Pull(NamedTuple):
     residual: Floats  # (k,) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
     opened: Mask  # (k, N_c) bool, contacts without force
-    sliding: Integers  # (k, N_c) int, sign of f_t where |f_t| = μ f_n > 0, 0 elsewhere
+    sliding: Integers  # (k, N_c) int, sign of f_t if |f_t| = μ f_n > 0, 0 otherwise
 
 
 @notebook.brief
 class Reach(NamedTuple):
-    """How far f_n of one contact can be pulled, and which contacts stop it."""
+    """The range of f_n of one contact, and the contacts that limit it."""
 
     contact: int  # its number in the packing
     low: float  # exact least f_n over S, force
@@ -67,7 +67,7 @@ class Reach(NamedTuple):
     gap: Floats  # (2,) duality gaps in ⟨f_n⟩
     states: Floats  # (2, N_c, 2) a network at either end, force
     opened: Mask  # (2, N_c) bool, contacts without force in every network at that end
-    sliding: Integers  # (2, N_c) int, sign of f_t where every network there has |f_t| = μ f_n
+    sliding: Integers  # (2, N_c) int, sign of f_t if every network there has |f_t| = μ f_n
 
 
 @takes(Ensemble)
@@ -88,8 +88,8 @@ def pull(
     the interval f_n differs from the value by 10⁻⁶ of its width (rarely more, at most 10⁻⁴).
     workers: threads; no result depends on their number.
 
-    Raises InputError for a contact that carries nothing, and for values outside the exact interval,
-    which the message gives; NotJammedError if S is empty.
+    Raises InputError for a contact that carries no force, and for values outside the exact
+    interval, which the message gives; NotJammedError if S is empty.
     """
     position = ensemble.position(contact)
     values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
@@ -188,10 +188,10 @@ def reach(
 ) -> Reach:
     """Exact least and largest f_n of one contact (its number in the packing); a Reach.
 
-    Contacts that are open or slide at an end are those that stop f_n there. workers: threads; no
-    result depends on their number.
+    Contacts that are open or slide at an end are those that limit f_n there. workers: threads;
+    results do not depend on their number.
 
-    Raises InputError for a contact that carries nothing, UndecidedError if the interval could not
+    Raises InputError for a contact that carries no force, UndecidedError if the interval could not
     be certified, NotJammedError if S is empty.
     """
     position = ensemble.position(contact)

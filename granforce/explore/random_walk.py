@@ -175,8 +175,10 @@ def _joined(walks: Sequence[Walk]) -> Walk:
 def _groups(
     chains: list[_Chain], relax: Relax, workers: int, options: dict[str, Any]
 ) -> list[list[_Chain]]:
-    """Groups of chains that run together, vectorised if there are enough; states do not depend on
-    it."""
+    """Groups of chains that run together, vectorised if there are enough.
+
+    States do not depend on the grouping.
+    """
     in_lanes = relax is nearest or (relax is gauss_seidel and options.keys().isdisjoint(SHUFFLED))
     together = min(LANES, -(-len(chains) // workers))
     together = together if in_lanes and together >= WORTH_LANES else 1
@@ -250,7 +252,7 @@ class _Chain:
     ) -> None:
         self.ensemble, self.number = ensemble, number
         self.limit, self.whole, self.ended = limit or 20 * states, whole, False
-        # At the packing's own network, or at the nearest admissible one if that left S.
+        # At the packing's own network, or at the nearest admissible one if its own is not in S.
         self.forces, self.rng = np.array(starting_network(ensemble)), np.random.default_rng(seed)
         self.counts = {"accepted": 0, "rejected": 0, "unconverged": 0, "skipped": 0}
         self.walk = Walk(
@@ -274,11 +276,11 @@ class _Chain:
         relaxed: Callable[[Floats], Relaxation],
         watch: Callable[[Found], object] | None,
     ) -> None:
-        """Continue from the states of an earlier walk, at its place in the random stream."""
+        """Continue from the states of an earlier walk, at its position in the random stream."""
         tried, count = int(begun.attempts.sum()), len(begun.states)
         if count > len(self.walk.states) or tried != sum(begun.counts.values()):
             raise InputError("the walk to continue has more states, or ended between two")
-        for _ in range(tried - 1):  # each attempt drew so many numbers
+        for _ in range(tried - 1):  # each attempt drew this many numbers
             self.rng.uniform(size=self.forces.shape)
         if count > 1:
             self.forces = begun.states[-2]
@@ -298,7 +300,7 @@ class _Chain:
                 watch(self.found(k))
 
     def kicked(self) -> Floats:
-        """The start of the next attempt: to every component a number uniform in ±⟨F_n⟩ is added.
+        """The start of the next attempt: a number uniform in ±⟨F_n⟩ is added to every component.
 
         Raises NotJammedError after too many attempts.
         """
@@ -329,7 +331,7 @@ class _Chain:
         return True
 
     def found(self, k: int = -1) -> Found:
-        """A state accepted, by default the last one."""
+        """An accepted state, by default the last one."""
         k %= self.counts["accepted"]
         return Found(
             chain=self.number,
@@ -341,7 +343,7 @@ class _Chain:
         )
 
     def stay(self) -> None:
-        """All states are the current one: S is a single point."""
+        """Set all states to the current one: S is a single point."""
         self.counts["skipped"] = len(self.walk.states)
         self.walk.states[:] = self.forces
         self.walk.residual[:] = self.ensemble.residual(self.forces)

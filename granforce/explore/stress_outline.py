@@ -97,13 +97,13 @@ def stress_outline(
 def stress_plane(ensemble: Ensemble, states: Floats) -> Floats:
     """Points (…, 2) of the stresses of networks (…, N_c, 2): ((σ_xx − σ_yy)/2P, σ_xy/P).
 
-    NaN where there are no forces.
+    NaN without forces.
     """
     return plane_of(stress_of(ensemble.packing, ensemble.expand(states)))
 
 
 def plane_of(stresses: Floats) -> Floats:
-    """Points (…, 2) of stresses (…, 3), σ_xx, σ_yy and σ_xy; NaN where nothing presses."""
+    """Points (…, 2) of stresses (…, 3), σ_xx, σ_yy and σ_xy; NaN if nothing presses."""
     xx, yy, xy = np.moveaxis(stresses, -1, 0)
     twice = np.where(xx + yy > 0, xx + yy, np.nan)
     return np.stack([xx - yy, 2 * xy], axis=-1) / twice[..., None]

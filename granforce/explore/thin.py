@@ -1,9 +1,9 @@
-"""K of a thin S by singular values, for use when pivots of A C Aᵀ cannot distinguish its rows.
+"""K of a thin S by singular values, for S whose rows the pivots of A C Aᵀ cannot distinguish.
 
-Those pivots are squares: at μ = 10⁻⁷, what friction adds to a row that else follows from others
-(as the rows of the stress do) is 10⁻¹⁴ of it, which is rounding. With the columns of N orthonormal
-in the null space of the balance of relative slacks, and H = 1 + Nᵀ Lᵀ W L N for forces L w of
-slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
+Those pivots are squares: at μ = 10⁻⁷, the contribution of friction to a row that otherwise follows
+from others (such as the rows of the stress) is 10⁻¹⁴ of it, which is rounding. With the columns of
+N orthonormal in the null space of the balance of relative slacks, and H = 1 + Nᵀ Lᵀ W L N for
+forces L w of slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,8 @@ class ThinMatrix(NamedTuple):
     def rows(self, walls: Integers) -> Floats:
         """Rows (k, walls) of K for walls (k,).
 
-        Products round by the shapes of matrices: each row is made among the same others.
+        The rounding of products depends on the shapes of matrices: each row is computed with the
+        same others.
         """
         found = np.zeros((len(walls), self.count))
         for at, wall in enumerate(walls.tolist()):
@@ -45,7 +46,7 @@ class ThinMatrix(NamedTuple):
         return found
 
     def on_hull(self, away: Floats) -> Floats:
-        """The nearest to away (k, count) that the balance lets be."""
+        """The nearest point to `away` (k, count) that satisfies the balance."""
         return self._padded(away[:, : len(self.null)] @ self.null @ self.null.T)
 
     def _padded(self, slacks: Floats) -> Floats:
@@ -56,11 +57,11 @@ class Basis(NamedTuple):
     """The null space of a balance and the correction that restores it, before weighting by y."""
 
     free: Floats  # (w, h) orthonormal
-    inverse: Floats  # (w, rows) the least change of y that takes up an unbalance
+    inverse: Floats  # (w, rows) the least change of y that removes an unbalance
 
 
 def basis(balance: Floats, dimension: int) -> Basis:
-    """The Basis of a balance (rows, w) that leaves so many dimensions."""
+    """The Basis of a balance (rows, w) that leaves this many dimensions."""
     left, values, right = cancelling.apart(np.linalg.svd, balance)
     rank = min(len(values), len(right) - dimension)
     inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
@@ -77,7 +78,7 @@ def thin_matrix(found: Basis, y: Floats, levers: Floats, weight: Floats, count: 
 
 
 def _orthonormal(columns: Floats) -> Floats:
-    """Columns (w, h) of the same span, orthonormal, to rounding in every row by itself.
+    """Columns (w, h) of the same span, orthonormal, to rounding in every row separately.
 
     Householder's method is so stable with pivoting and rows in order of their size (Cox, Higham,
     in Numerical Analysis 1997, 57).
@@ -89,6 +90,6 @@ def _orthonormal(columns: Floats) -> Floats:
 
 
 def null_space(dense: Floats, dimension: int) -> Floats:
-    """Orthonormal (n, dimension) across which a matrix (rows, n) does least."""
+    """Orthonormal (n, dimension) vectors that a matrix (rows, n) maps closest to zero."""
     _, _, rows = cancelling.apart(np.linalg.svd, dense)
     return rows[len(rows) - dimension :].T

@@ -45,15 +45,15 @@ from granforce.types import Cancel, Floats, Integers, Mask, Progress
 PATH = 2.0
 # Paths between stored states: the effective size of 1000 states is then 400 to 700.
 PATHS_PER_STATE = 2
-# Paths whose directions are drawn side by side; after each such batch rounding is taken off.
+# Number of paths whose directions are drawn together; after each such batch rounding is corrected.
 BATCH = lanes.LANES
 # Moves of hit-and-run per state and dimension; its chains mix more slowly by about this factor.
 MOVES_PER_DIMENSION = 20
-# States dropped at the start of each chain; from the first part comes the length of the paths of
-# the second, and from that the length for good.
+# States dropped at the start of each chain; the first part determines the path length of the
+# second, which determines the final one.
 WARM_UP = 20, 40
-# Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed., 11.4);
-# the largest R̂ of 1300 components of chains that have is 1.01 for 1000 states, 1.06 for 200.
+# Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed.,
+# 11.4); for mixed chains the largest R̂ of 1300 components is 1.01 with 1000 states, 1.06 with 200.
 MIXED = 1.1
 # With an effective sample size requested, a run ends at this many times as many states.
 MOST_STATES = 10
@@ -68,11 +68,11 @@ class ChainState(NamedTuple):
 
     slacks: Floats  # (walls,) s
     rng: np.random.Generator
-    paths: int = 0  # taken so far
+    paths: int = 0  # number of paths so far
 
 
 # Final chains, their slacks (chains, count, walls) after each path or state, and the numbers of
-# reflections and of paths rejected for too many (chains, 2).
+# reflections and of rejected paths (chains, 2).
 Flown = tuple[list[ChainState], Floats, Integers]
 
 
@@ -85,13 +85,13 @@ class UniformSample(NamedTuple):
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
     reached: bool  # complete, all in S, R̂ ≤ MIXED, and the effective sample size as requested
-    counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates, skipped states
+    counts: dict[str, Any]  # turns, rejected paths, dropped and skipped states, held coordinates
     setup_seconds: float  # wall time of the walls
-    sampling_seconds: float  # wall time of the steps, those dropped included
+    sampling_seconds: float  # wall time of the steps, including dropped ones
     diagnosis_seconds: float  # wall time of the diagnostics
     method: str
     walls: Walls  # the coordinates used
-    reach: float  # root mean square distance |s − 1| from the centre, as found in the warm-up
+    reach: float  # root mean square distance |s − 1| from the centre, from the warm-up
     ends: Sequence[ChainState]  # ChainState of each chain, from which it can be continued
 
     @property
@@ -132,9 +132,9 @@ def step(
 ) -> Flown:
     """The next `count` states of some chains, as slacks for Walls.points.
 
-    The given ChainStates are left as they were. rows: where rows of K are kept. reach: how far
-    states are from the centre (root mean square of |s − 1|), which sets the length of the
-    billiard's paths; any fixed number leaves the measure uniform.
+    The given ChainStates are not changed. rows: store for rows of K. reach: distance of states from
+    the centre (root mean square of |s − 1|), which sets the length of the billiard's paths; any
+    fixed number leaves the measure uniform.
     """
     if method == "hit_and_run":
         return walked(made, ends, count, 1, lambda ends, left: _chords(made, ends))
@@ -157,9 +157,9 @@ def walked(
     paths: int,
     on: Callable[[list[ChainState], int], Flown],
 ) -> Flown:
-    """The next `count` states of some chains, so many paths between them, as `step` gives them.
+    """The next `count` states of some chains, `paths` paths apart, in the format of `step`.
 
-    on(ends, left): each chain on by some paths, up to `left`.
+    on(ends, left): advances each chain by some paths, at most `left`.
     """
     ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
     counts = np.zeros((len(ends), 2), dtype=int)
@@ -176,7 +176,7 @@ def walked(
 
 
 def flown(made: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
-    """Chains on by a batch of paths; drawn: their speeds, times and middles (`billiard.fly`)."""
+    """Advance chains by a batch of paths; drawn: speeds, times and middles (`billiard.fly`)."""
     slacks, outs, counts = billiard.follow(
         made.rows, made.dimension, rows, [end.slacks for end in ends], drawn
     )
@@ -190,7 +190,7 @@ def flown(made: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequen
 def directions(
     made: Walls, rng: np.random.Generator, count: int, unit: bool = True
 ) -> tuple[Floats, Floats]:
-    """Speeds (count, walls) of covariance K, or uniform directions of it, and numbers in [0, 1]."""
+    """Speeds (count, walls) of covariance K, or its uniform directions, and numbers in [0, 1]."""
     g, parts = np.empty((count, made.count)), np.empty(count)
     for path in range(count):
         g[path], parts[path] = rng.standard_normal(made.count), rng.random()
@@ -201,7 +201,7 @@ def directions(
 
 
 def _chords(made: Walls, ends: list[ChainState]) -> Flown:
-    """Chains on by one state of hit-and-run."""
+    """Advance chains by one state of hit-and-run."""
     slacks, moves = np.stack([end.slacks for end in ends]), MOVES_PER_DIMENSION * made.dimension
     for s, end in zip(slacks, ends, strict=True):
         for first in range(0, moves, BATCH):
@@ -291,7 +291,7 @@ def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:
 def warm_up(
     made: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
 ) -> tuple[list[ChainState], float, Integers]:
-    """Chains ready to draw from: (ChainState of each, reach, turns and refused paths of each)."""
+    """Chains ready to draw from: (ChainState of each, reach, turns and rejected paths of each)."""
     ends, counts = begun(made, chains, seed), np.zeros((chains, 2), dtype=int)
     reach = float(np.sqrt(made.dimension))
     for count in WARM_UP if made.dimension else ():
@@ -303,7 +303,7 @@ def warm_up(
 
 
 def stores_for(made: Walls, chains: int, workers: int) -> list[RowStore]:
-    """Rows of K for each thread: the same for all where they fit, else in parts of the memory."""
+    """Rows of K for each thread: shared if they fit, otherwise in parts of the memory."""
     threads, whole = min(workers, chains), billiard.room_for_rows(made.count)
     if whole.whole:
         return [whole] * threads
@@ -313,7 +313,7 @@ def stores_for(made: Walls, chains: int, workers: int) -> list[RowStore]:
 def shared(
     stores: Sequence[RowStore], tasks: Sequence[Any], work: Callable[[list[Any], RowStore], Any]
 ) -> list[Any]:
-    """work(some tasks, rows) of consecutive parts of the tasks, each by a thread with its store."""
+    """work(some tasks, rows) of consecutive parts of the tasks, each in a thread with its store."""
     parts = np.array_split(np.arange(len(tasks)), len(stores))
     with cancelling.threads(len(stores)) as pool:
         return list(pool.map(work, [[tasks[k] for k in part] for part in parts], stores))
@@ -324,7 +324,7 @@ def together(
     ends: Sequence[ChainState],
     on: Callable[[list[Any], RowStore], Flown],
 ) -> Flown:
-    """on(some chains, rows) of all chains, over threads."""
+    """on(some chains, rows) for all chains, on threads."""
     parts, slacks, counts = zip(*shared(stores, ends, on), strict=True)
     return [end for part in parts for end in part], np.concatenate(slacks), np.concatenate(counts)
 
@@ -339,10 +339,10 @@ def drawn(
     target: int,
     progress: Progress | None,
 ) -> tuple[Sequence[ChainState], Floats, Integers]:
-    """Where chains end, forces (chains, k, N_c, 2) of more states, and counts (chains, 2) of those.
+    """Final chains, forces (chains, k, N_c, 2) of new states, and their counts (chains, 2).
 
-    Each has so many states, and gets more up to the target, or until the work is cancelled. on(some
-    chains, rows, count=…): as `step`.
+    Each chain has `have` states, and gets more up to the target, or until the work is cancelled.
+    on(some chains, rows, count=…): as `step`.
     """
     found = [np.zeros((len(ends), 0, len(ensemble.index), 2))]
     counts = np.zeros((len(ends), 2), dtype=int)
@@ -359,7 +359,7 @@ def drawn(
 
 
 def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
-    """Counts with turns and refused paths (chains, 2) added."""
+    """Counts with turns and rejected paths (chains, 2) added."""
     turns, refused = done.sum(axis=0).tolist()
     return counts | {"turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
 
@@ -441,9 +441,10 @@ def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:
 
 
 def varying(ensemble: Ensemble, made: Walls) -> Mask:
-    """Mask (N_c, 2) of components that are not the same in all of S: some random change has them.
+    """Mask (N_c, 2) of components that vary in S, from random changes.
 
-    Changes count from a tenth of the resolution of S on. The numbers drawn are always the same.
+    Changes count if they exceed a tenth of the resolution of S. The random numbers are always the
+    same.
     """
     T = ensemble.scaled_form[2].tocsc()
     g = np.random.default_rng(0).standard_normal((PROBES, made.count))

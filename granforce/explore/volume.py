@@ -1,8 +1,8 @@
 """The volume of S, by a ladder of normal distributions truncated by the walls.
 
 With q = |s − 1|² of the slacks (see `walls`) and Z(β) = ∫_S exp(−½ β q), the volume is Z(0). At
-large β walls hardly matter: Z = (2π/β)^(h/2) P, where P is the part of independent normal states
-that lie in S. From there, steps go down to β = 0, each so short that the logarithm of the averaged
+large β walls hardly matter: Z = (2π/β)^(h/2) P, where P is the fraction of independent normal
+states in S. From there, steps lead down to β = 0, each so short that the logarithm of the averaged
 quantity has a standard deviation of STEP:
 
     Z(β′)/Z(β) = ⟨exp(½ (β − β′) q)⟩_β = 1/⟨exp(−½ (β − β′) q)⟩_β′
@@ -33,23 +33,23 @@ from granforce.records import positive, random_seed, takes, worker_count
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Progress
 
-# Standard deviation of ½ (β − β′) q, by which steps of the ladder are chosen.
+# Standard deviation of ½ (β − β′) q that determines the steps of the ladder.
 STEP = 0.7
-# Part of independent normal states that lie in S at the top of the ladder; how many are drawn to
-# choose it, and to estimate it.
+# Fraction of independent normal states in S at the top of the ladder; number drawn to choose it,
+# and to estimate it.
 _INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
 # Smallest standard error that can be requested: the top of the ladder alone contributes 0.008,
 # √((1 − _INSIDE)/(_INSIDE _COUNTED)), which more paths do not reduce.
 LEAST_ACCURACY = 0.01
-# Paths on each rung to find the next one, and of them those left out before q is averaged.
+# Paths on each rung to find the next one, of which the first are left out of the mean of q.
 _PILOT, _FORGOTTEN = 48, 16
-# Paths on each rung at first, and batches of them whose scatter tells the error.
+# Initial paths on each rung, and number of batches whose scatter gives the error.
 _FIRST, _BATCHES = 256, 16
-# Paths whose speeds are drawn side by side; after each such batch rounding is taken off.
+# Number of paths whose speeds are drawn together; after each such batch rounding is corrected.
 _BATCH = 32
-# Rounds of more paths, each at most so many times as many, until the error is the wanted one.
+# Rounds of more paths, each at most _GROWTH times as many, until the error is as requested.
 _MOST_ROUNDS, _GROWTH = 30, 4.0
-# A turn costs about so many passes over the walls less than a path does besides.
+# Cost of a path without reflections, in passes over the walls.
 _PATH_COST = 20.0
 _COUNTS = "turns", "refused"
 # Two ladders further apart than this many of their standard errors do not agree.
@@ -67,7 +67,7 @@ class Volume(NamedTuple):
     per_grain: float  # ln V over the number of grains of the backbone
     ladders: Floats  # (2,) ln V from the ladder down and from the ladder up
     reached: bool  # the error is as requested, and both ladders agree
-    counts: dict[str, Any]  # rungs, paths, turns, refused paths
+    counts: dict[str, Any]  # rungs, paths, turns, rejected paths
     seconds: float  # wall time
 
     @property
@@ -155,10 +155,11 @@ def volume(
 
 
 def _top(made: Walls, rng: np.random.Generator) -> tuple[float, float, float]:
-    """The largest β, ln Z there, and the variance of that."""
+    """The largest β, ln Z there, and its variance."""
 
     def reach(count: int) -> Floats:
-        # Normal states of β = 1: how far outside of S each is, as the β at which it lies on a wall.
+        # Normal states of β = 1: how far each is outside S, as the β at which it would be on a
+        # wall.
         w = made.moved(rng.standard_normal((count, made.count)))
         return np.maximum(-w.min(axis=1), 0.0) ** 2
 
@@ -179,7 +180,7 @@ class _Rung(NamedTuple):
     reach: float  # √⟨q⟩ nearby: sets the length of paths
     end: uniform.ChainState
     q: Floats  # (paths,) |s − 1|²
-    x: Floats  # (paths,) β|w|² of the speeds at first, less its mean, over its standard deviation
+    x: Floats  # (paths,) initial β|w|² of the speeds minus its mean, over its standard deviation
     turns: int
     refused: int
 
@@ -193,7 +194,7 @@ def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> lis
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
         spread = max(float(q.std()), 1e-300)
-        # Wider distributions have wider q: the last step is a short one, and none is too long.
+        # Wider distributions have wider q: the last step is short, and none is too long.
         beta = 0.0 if beta * spread < STEP else max(0.5 * beta, beta - 2 * STEP / spread)
     up = []
     for number in range(len(down) - 1, -1, -1):
@@ -201,7 +202,7 @@ def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> lis
         up.append(_settled(made, rows, beta, reach, slacks, [seed, 2, number]))
         slacks = up[-1].end.slacks
     rungs = down, up[::-1]
-    # More of the same: what the ladder was built by has no part in the result.
+    # New paths: those that built the ladder are not used in the result.
     return [
         [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
         for way in rungs
@@ -216,7 +217,7 @@ def _settled(
     slacks: Floats,
     seed: list[int],
 ) -> _Rung:
-    """A rung whose chain has left where it came from, with the paths after that."""
+    """A rung whose chain has forgotten its start, with the paths after that."""
     fresh = _Rung(
         beta=beta,
         reach=reach,
@@ -231,7 +232,7 @@ def _settled(
 
 
 def _flown(made: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
-    """The rung with so many more paths, in whole batches."""
+    """The rung with this many more paths, in whole batches."""
     h, beta, end, found, drawn = made.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)
     middle = np.ones((1 if beta > 0 else 0, made.count))
@@ -256,7 +257,7 @@ def _flown(made: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Ru
 
 
 def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
-    """ln Z(0)/Z(top) by each ladder (2,), and what each rung adds to the variance of their mean."""
+    """ln Z(0)/Z(top) by each ladder (2,), and the variance that each rung adds to their mean."""
     betas = np.array([rung.beta for rung in rungs[0]])
     step = 0.5 * -np.diff(betas)
     sums, variance = np.zeros(2), np.zeros((2, len(betas)))
@@ -280,7 +281,7 @@ def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
 
 
 def _controls(x: Floats) -> Floats:
-    """Numbers (paths, 4) of mean 0 that q goes with, from x of its path and the one before."""
+    """Numbers (paths, 4) of mean 0 correlated with q, from x of its path and the previous one."""
     before = np.append(0.0, x[:-1])
     return np.stack([x, before, x * before, np.where(x, x * x - 1.0, 0.0)], axis=1)
 
@@ -294,11 +295,11 @@ def _log_mean(values: Floats) -> tuple[float, Floats]:
 
 
 def _more(rungs: list[list[_Rung]], variance: Floats, wanted: float) -> Integers:
-    """How many more paths (2, rungs) each rung gets, for a variance as wanted at the least cost."""
+    """Number of further paths (2, rungs) per rung for the wanted variance at the least cost."""
     have = np.array([[len(rung.q) for rung in way] for way in rungs])
     turns = np.array([[rung.turns for rung in way] for way in rungs])
     cost = (turns / have + _PATH_COST).mean(axis=0)
-    # Neighbours are alike: their mean is less noisy.
+    # Neighbours are similar, and their mean is less noisy.
     each = np.convolve(
         np.pad((variance * have).mean(axis=0), 2, mode="edge"), np.ones(5) / 5, "valid"
     )
@@ -314,9 +315,9 @@ def _extended(
     more: Integers,
     progress: Progress | None,
 ) -> list[list[_Rung]]:
-    """The rungs with so many more paths each, over threads."""
+    """The rungs with this many more paths each, on threads."""
     count = len(rungs[0])
-    # Neighbours in different threads: the widest take the longest.
+    # Neighbours in different threads, as the widest take longest.
     order = [
         (way, k)
         for first in range(len(stores))

@@ -1,9 +1,9 @@
 """S by its walls: sampling moves only the slack of each wall, relative to that at a centre.
 
 At the centre f° of S every slack is s = 1. Around the analytic centre (the largest Π y of the cone
-coordinates y ≥ 0 and of what is left of known bounds), S contains the ball |s − 1| ≤ 1 and lies in
-one of a radius equal to the number of walls (Nesterov, Nemirovskii, Interior-point polynomial
-algorithms, 1994): it is nearly round. Slacks move together as the matrix K of `wall_matrix` says.
+coordinates y ≥ 0 and of the slacks of known bounds), S contains the ball |s − 1| ≤ 1 and is inside
+one with a radius equal to the number of walls (Nesterov, Nemirovskii, Interior-point polynomial
+algorithms, 1994): it is nearly round. Slacks move together by the matrix K of `wall_matrix`.
 """
 
 import copy
@@ -27,24 +27,24 @@ from granforce.tolerances import BALANCED
 from granforce.types import Floats, Integers, Mask
 
 _MOST_NEWTON_STEPS = 200
-# Newton's decrement at the centre: it only has to make S round.
+# Newton's decrement at the centre, which only has to make S round.
 _NEAR_CENTRE = 1e-3
 
 
 class Walls(NamedTuple):
-    """y = centre; y[moving] *= s. Walls beyond those of `moving` are padding: there s = 1."""
+    """y = centre; y[moving] *= s. Walls beyond `moving` are padding with s = 1."""
 
     centre: Floats  # (n,) y°, coordinates of `Ensemble.scaled_form`
-    moving: Integers  # (w,) positions in y of what is not held in all of S
-    matrix: WallMatrix | ThinMatrix  # K of all `count` walls; thin where S is too thin for pivots
+    moving: Integers  # (w,) positions in y of coordinates that vary in S
+    matrix: WallMatrix | ThinMatrix  # K of all `count` walls; thin if S is too thin for pivots
     dimension: int  # h of the affine hull of S
-    pull: Floats  # (2 N_c,) W (m − f°), what a measurement pulls with; 0 without one
+    pull: Floats  # (2 N_c,) W (m − f°), the pull of a measurement; 0 without one
     root: Floats  # (2 N_c,) √W
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
 
     @property
     def count(self) -> int:  # type: ignore[override]
-        """Number of walls, padding included."""
+        """Number of walls, including padding."""
         return self.matrix.count
 
     def rows(self, walls: Integers) -> Floats:
@@ -56,9 +56,9 @@ class Walls(NamedTuple):
         return self.matrix.moved(g, pulls)
 
     def on_hull(self, slacks: Floats) -> Floats:
-        """The slacks (k, count), or next to them, that balance lets be and walls, too."""
+        """Slacks (k, count) corrected to satisfy the balance, and the walls."""
         away = self.matrix.on_hull(slacks - 1.0)
-        # Beyond a wall by rounding: to where the way from the centre meets it.
+        # Beyond a wall by rounding: to the point where the way from the centre meets it.
         return 1.0 - away / away.min(axis=1, initial=-1.0, keepdims=True)
 
     def points(self, slacks: Floats) -> Floats:
@@ -68,16 +68,16 @@ class Walls(NamedTuple):
         return y
 
 
-# What steps of a centre that is none lead to is seen by its sign.
+# Overflows in steps from an invalid centre are detected by its sign.
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")
 def walls(
     ensemble: Ensemble, weight: Floats | float = 0.0, measured: Floats | float = 0.0
 ) -> Walls:
     """The Walls of an ensemble.
 
-    weight, measured (N_c, 2): W and m in ⟨f_n⟩ for the centre of exp(−½ Σ W (f − m)²) cut by the
-    walls, which has the largest Σ log y − ½ Σ W (f − m)², in place of the analytic one; K then has
-    W in its stiffness.
+    weight, measured (N_c, 2): W and m in ⟨f_n⟩ for the centre of exp(−½ Σ W (f − m)²) truncated by
+    the walls, which has the largest Σ log y − ½ Σ W (f − m)², instead of the analytic centre; K
+    then has W in its stiffness.
 
     Raises NotJammedError if S is empty, InputError if the centre lies at infinity, UndecidedError
     if no solver could decide, or S is thinner than rounding.
@@ -85,7 +85,7 @@ def walls(
     y = ensemble.hull.inner
     setup = _setup(ensemble, weight, measured)
     centre = _centred(setup, y, _matrix)
-    # Where rows are lost, no centre may be found, or a wrong one.
+    # Without the lost rows no centre may be found, or a wrong one.
     matrix_at: _MatrixAt = _matrix
     if _is_thin(setup, y if centre is None else centre):
         matrix_at = _Thin(setup)
@@ -111,19 +111,19 @@ class _Setup(NamedTuple):
     ensemble: Ensemble
     problem: Problem  # its balance, independent rows
     contact: Integers  # (n,) contact of each coordinate y
-    normal: Floats  # (n, 2) what unit f_n, f_t/μ add to it
+    normal: Floats  # (n, 2) change of each coordinate per unit f_n, f_t/μ
     held: Mask  # (n,) bool
-    stiff: Floats  # (N_c, 2) W, of f_n and f_t/μ; PINNED for what is known
+    stiff: Floats  # (N_c, 2) W, of f_n and f_t/μ; PINNED for known forces
     target: Floats  # (N_c, 2) m, f_t/μ
 
     @property
     def cones(self) -> int:
-        """Coordinates of the cones; those of known bounds come after."""
+        """Number of coordinates of the cones; those of known bounds come after."""
         return self.ensemble.per_contact * len(self.stiff)
 
     @property
     def weight(self) -> Floats:
-        """W (N_c, 2), 0 for what is known."""
+        """W (N_c, 2), 0 for known forces."""
         return np.where(self.stiff < PINNED, self.stiff, 0.0)
 
     @property
@@ -172,12 +172,12 @@ def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float)
 
 
 def _barrier(setup: _Setup, y: Floats) -> Floats:
-    """The curvature of −Σ log y."""
+    """The second derivatives of −Σ log y."""
     return np.where(setup.held, 1.0, y) ** -2.0
 
 
 def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
-    """(K at y, its walls' positions in y)."""
+    """(K at y, positions of its walls in y)."""
     curvature = _barrier(setup, y)
     C, _, free = setup.conductances(curvature, setup.stiff)
     own, _, _ = setup.conductances(curvature, setup.known)
@@ -191,7 +191,7 @@ def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
 
 
 def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:
-    """Unbalance b − A f of y, by rows of the problem and global rows."""
+    """Unbalance b − A f of y, in the rows of the problem and the global rows."""
     S, problem = setup.ensemble, setup.problem
     forces = setup.forces(y) * knowledge.units(S.mu)
     rest = np.zeros(len(problem.b) + len(problem.b_border))
@@ -201,7 +201,7 @@ def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:
 
 
 class _Thin:
-    """K at y by singular values, and its walls' positions in y, for any y."""
+    """K at y by singular values, and the positions of its walls in y, for any y."""
 
     def __init__(self, setup: _Setup) -> None:
         _, self.moving = _matrix(setup, setup.ensemble.hull.inner)
@@ -232,7 +232,7 @@ _MatrixAt = Callable[[_Setup, Floats], tuple[WallMatrix | ThinMatrix, Integers]]
 
 
 def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
-    """The balance (rows, w) of what moves."""
+    """The balance (rows, w) of the moving coordinates."""
     return ensemble.scaled_form[0].tocsc()[:, moving].toarray()
 
 
@@ -263,9 +263,9 @@ def _centred(
     y: Floats,
     matrix_at: _MatrixAt,
 ) -> Floats | None:
-    """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps.
+    """The y with the largest Σ log y − ½ Σ W (f − m)², from y by damped Newton steps.
 
-    None if they do not converge: it may lie at infinity.
+    None if they do not converge: it may be at infinity.
     """
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
@@ -318,7 +318,7 @@ def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
         plain = np.maximum(known, knowledge.units(ensemble.mu) ** 2)
         units = _shape(setup, np.zeros_like(y), plain)[1] - shape
         matrix, moving = _matrix(setup, y)
-        # Its own, or whoever changes a sample's would change the ensemble's.
+        # A copy, or changes to a sample's matrix would change the ensemble's.
         matrix = matrix._replace(network=copy.deepcopy(matrix.network))
         matrix = wall_matrix.restored(matrix)
     root = np.sqrt(setup.weight).ravel()
@@ -326,10 +326,10 @@ def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
 
 
 def _shape(setup: _Setup, curvature: Floats, stiff: Floats) -> tuple[int, float]:
-    """Dimension h of what balance leaves free, and ½ ln det of the stiffness M there.
+    """Dimension h of the balanced changes, and ½ ln det of the stiffness M there.
 
-    For N a basis of the null space of A, det NᵀMN is det M det A M⁻¹Aᵀ but for a factor that only
-    A has part in.
+    For N a basis of the null space of A, det NᵀMN is det M det A M⁻¹Aᵀ up to a factor that depends
+    only on A.
     """
     network, diagonal = setup.problem.network, setup.problem.diagonal
     C, logs, free = setup.conductances(curvature, stiff)

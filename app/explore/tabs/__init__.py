@@ -1,1 +1,1 @@
-"""The tabs, a folder each."""
+"""The tabs, one folder each."""

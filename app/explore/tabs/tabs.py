@@ -1,4 +1,4 @@
-"""The tabs beside the packing: each view is made when it is first seen."""
+"""The tabs next to the packing; each view is created when it is first visible."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -15,8 +15,8 @@ from .intervals import intervals
 from .push import push
 from .your_packing import upload
 
-# Name in links → title, and view. Their components are known before any page is: those that are
-# defined while pages are open, the first page alone learns of.
+# Name in links → title, and view. Components must be defined before any page opens: if defined
+# later, only the first page learns of them.
 TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
     "intervals": ("Intervals", intervals.View),
     "plane": ("Force space", force_space.View),  # the second: see WITHOUT_SPACE
@@ -35,26 +35,26 @@ LOOK = {
     "& .MuiTab-root.Mui-selected": {"color": "var(--ink)", "fontWeight": 600},
     "& .MuiTabs-list, & .MuiTabs-flexContainer": {"borderBottom": "1px solid var(--line)"},
 }  # fmt: skip
-# The same without force space, which has a place of its own on a wide screen.
+# The same without force space, which has its own column on a wide screen.
 WITHOUT_SPACE = LOOK | {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}}
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
-OPENING = "Opening …"  # until the view is there
+OPENING = "Opening …"  # until the view exists
 SPACE = f"<h2>{TABS['plane'][0]}</h2>"
 HEADING = "h2 { margin: 0; padding: 6px 2px; border-bottom: 1px solid var(--line); "
 HEADING += "font-size: 15px; font-weight: 600; line-height: 23px; }"
 PLOTTED = ("intervals", "plane", "statistics", "perturb")  # what can be saved with the packing
-GROWING = ("intervals", "plane")  # what shows a walk while it is computed
+GROWING = ("intervals", "plane")  # views that show a walk during its computation
 
 
 class Tabs:
-    """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
+    """Views next to the packing; each is created when first visible, and notified when hidden."""
 
     def __init__(self, state: AppState) -> None:
         self.state, self.looks = state, state.looks
         self.names = list(TABS)
         self._begun: set[str] = set()
         self._space: Any = None  # the view of force space, wherever it is
-        self._apart = False  # whether that is in a place of its own, or on its way there
+        self._apart = False  # whether it is in its own column, or on its way there
         self.pages = {
             name: pn.Column(note(OPENING), css_classes=[f"in-{name}"], sizing_mode="stretch_width")
             for name in self.names
@@ -71,26 +71,26 @@ class Tabs:
         self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
     def choose(self, number: int) -> None:
-        """Show tab 1, 2, …; other numbers do nothing, and what is on screen anyway stays there."""
+        """Show tab 1, 2, …; other numbers and tabs without content here have no effect."""
         if 1 <= number <= len(self.names) and not self._has_place(self.names[number - 1]):
             self.tabs.active = number - 1
 
     def _showing(self) -> Iterator[None]:
         name = self.names[self.tabs.active]
-        yield from self.filling(name)  # first, so that those who follow the state find it there
+        yield from self.filling(name)  # first, so that observers of the state find it
         if name == self.names[self.tabs.active]:
             self.looks.tab = name
 
     def reserve(self, place: Any) -> None:
-        """Have a wide screen show at once that force space comes to a place of its own."""
+        """Make a wide screen reserve the column of force space at once."""
         wide = self.looks.wide
         self.tabs.sx = WITHOUT_SPACE if wide else LOOK
-        place.visible = wide  # nobody else need begin with it
+        place.visible = wide  # other screens do not show it
         if wide and not place.objects:
             place[:] = [pn.pane.HTML(SPACE, stylesheets=[HEADING], **WIDE), note(OPENING)]
 
     def beside(self, place: Any) -> Iterator[None]:
-        """Put force space into a place of its own on a wide screen, else back into its tab."""
+        """Put force space into its own column on a wide screen, otherwise back into its tab."""
         wide, page = self.looks.wide, self.pages["plane"]
         self.reserve(place)
         if wide == self._apart:
@@ -111,13 +111,13 @@ class Tabs:
         yield
 
     def _leave(self, place: Any) -> None:
-        """Take force space away from a place; it is made anew for another."""
+        """Remove force space from a place; it is created again for another."""
         place[:] = []
         if self._space is not None:
             self._space.left = True
 
     def filling(self, name: str) -> Iterator[None]:
-        """Make the view of a tab, once; a generator of pieces."""
+        """Create the view of a tab, once; a generator of steps."""
         if name not in self._begun and not self._has_place(name):
             self._begun.add(name)
             yield
@@ -128,7 +128,7 @@ class Tabs:
             pieces = list(view.panel())
             if name in PLOTTED:
                 pieces.append(figure.panel(self.state))
-            # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
+            # Choices first, then two at a time: Bokeh processes everything at each step.
             there = []
             for k in range(-1, len(pieces), 2):
                 if self._has_place(name):
@@ -139,12 +139,12 @@ class Tabs:
             self.looks.views += 1
 
     def _has_place(self, name: str) -> bool:
-        """Whether a tab's view is beside the packing instead, where there may be but one of it."""
+        """Whether a tab's view is outside the tabs; only one may exist."""
         return self.looks.wide and name == "plane"
 
 
 def pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
-    """Have parts (name, view) of other states than those asked for be pale; see player.js."""
+    """Dim parts (name, view) that belong to older states than requested; see player.js."""
     for name, part in parts:
         old = "growing" if name in GROWING else "still"
         part.styles = part.styles | {

@@ -1,4 +1,4 @@
-"""Share what is on screen: pictures, tables, datasets, the packing, the parameters."""
+"""Export of what is on screen: pictures, tables, datasets, the packing, the parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from . import files, standalone
 
 
 class Snapshot:
-    """What is on screen at the moment when a file of it is asked for; it makes the file."""
+    """What is on screen when a file is requested; makes the file."""
 
     def __init__(self, state: AppState) -> None:
         self.library, self.cell, self.replay = state.library, state.cell, state.replay
@@ -50,7 +50,7 @@ class Snapshot:
         }
 
     def file(self, ending: str, mime: str, content: bytes) -> File:
-        """A file named like the packing."""
+        """A file named after the packing."""
         return File(f"{self.stem}.{ending}", mime, content)
 
     def csv(self, job: Job) -> File:
@@ -97,7 +97,7 @@ class Snapshot:
 
 
 class Kind(NamedTuple):
-    """A kind of file: what its button says, and what makes it; None: the browser draws it."""
+    """A kind of file: its button's label and its method; None: the browser draws it."""
 
     words: str
     make: Callable[[Snapshot, Job], File] | None = None
@@ -136,7 +136,7 @@ packing.npz</code> continues with the packing.
 
 
 class View:
-    """Buttons; a file is made, off the event loop, when it is asked for."""
+    """Buttons; a file is made off the event loop when it is requested."""
 
     name = "export"
 
@@ -150,7 +150,7 @@ class View:
         self.making.param.watch(self._rest, "running")
 
     def panel(self) -> pn.Column:
-        """Buttons, and what they are for."""
+        """Buttons with explanations."""
         return pn.Column(
             self.buttons,
             Progress(self.making, self.task),
@@ -173,7 +173,7 @@ class View:
             task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)
 
     def _rest(self, event: Any) -> None:
-        """What failed or was cancelled brings no file: its button rests, too."""
+        """After a failure or cancellation no file follows: reset the button."""
         if not event.new:
             self.buttons.rest()
 
@@ -183,7 +183,7 @@ class View:
 
 
 def all_states(library: Library, cell: Cell, job: Job) -> xr.Dataset:
-    """The dataset of a cell with all its states: those that were not kept are computed again."""
+    """The dataset of a cell with all its states; those not stored are computed again."""
     if cell.params.get("keep") is None:
         return library.dataset(cell)
     return computed_anew(library, cell, cell.params | {"keep": None}, job)

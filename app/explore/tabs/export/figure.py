@@ -12,7 +12,7 @@ from ....widgets.parts import folded_away, note
 
 TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
-WIDTH_MM = 170  # of a page's two columns
+WIDTH_MM = 170  # width of two columns
 HELP = """
 As on screen, as vector graphics. From 120 mm on, the plots are next to the packing.
 """

@@ -1,4 +1,4 @@
-"""What is on screen as files, made in memory: table, dataset, packing, parameters."""
+"""What is on screen as files made in memory: table, dataset, packing, parameters."""
 
 import io
 import json
@@ -22,7 +22,7 @@ from ....results.selection import command
 from ....state.known import Knowledge
 from ....state.pulls import Held
 
-# The contact dimension of a packing's own arrays; that of the states holds the backbone only.
+# The contact dimension of a packing's own arrays; that of the states contains only the backbone.
 PACKING_CONTACTS = "packing_contact"
 
 
@@ -33,10 +33,10 @@ def contacts(
     held: Held | None = None,
     knowledge: Knowledge | None = None,
 ) -> Columns:
-    """One row a contact of the backbone, forces in ⟨f_n⟩ as on screen: {name: array}.
+    """One row per contact of the backbone, forces in ⟨f_n⟩ as on screen: {name: array}.
 
-    On screen is the state of this frame, or the network that pulls have led to, with the bounds
-    that what is known leaves.
+    On screen is the state of this frame, or the network after pulls, with the bounds given the
+    known forces.
     """
     normal, tangential = replay.normal[frame], replay.tangential[frame]
     if held is not None:
@@ -67,11 +67,11 @@ def contacts(
     return {f"{name} [mean]" if name.startswith("f_") else name: columns[name] for name in columns}
 
 
-FREE = "_without_known"  # at the end of the names of bounds that heed nothing that is known
+FREE = "_without_known"  # suffix of the names of bounds without known forces
 
 
 def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
-    """Exact bounds in ⟨f_n⟩; none where they are of other contacts."""
+    """Exact bounds in ⟨f_n⟩; none if they belong to other contacts."""
     if not np.array_equal(exact["backbone"].values, replay.backbone):
         return {}
     return {
@@ -81,7 +81,7 @@ def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
     }
 
 
-# What the columns of the table of contacts hold.
+# The meaning of the columns in the table of contacts.
 COLUMNS = {
     "contact": "number of the contact in the packing",
     "i": "number of the first grain; the normal n points from i to j",
@@ -109,14 +109,14 @@ def _meaning(column: str) -> str:
 
 
 def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
-    """Which network is on screen, in words."""
+    """The network on screen, in words."""
     if held is not None:
         return "Network: pulled by hand"
     return f"Network {replay.number[frame]}" if frame else "Network as packed"
 
 
 def bounds_of(knowledge: Knowledge) -> str:
-    """Of which networks a table's exact bounds are, in words; empty where nothing is held."""
+    """The networks to which a table's exact bounds refer, in words; empty without held forces."""
     if not knowledge.known:
         return ""
     if knowledge.whole is None:
@@ -125,7 +125,7 @@ def bounds_of(knowledge: Knowledge) -> str:
 
 
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
-    """Lines, each after a #, that tell what a table holds and in which units."""
+    """Lines, each after a #, that explain a table and its units."""
     unit = (
         "Forces are in the mean normal force, as on screen; it is "
         f"{replay.force_scale:.9g} in the packing's own unit (pressure times length)."
@@ -135,7 +135,7 @@ def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
 
 
 def dataset(packing: Packing, states: xr.Dataset, exact: xr.Dataset | None = None) -> xr.Dataset:
-    """Packing, states and, where known, exact intervals (exact_low, exact_high) in one dataset."""
+    """Packing, states and, if known, exact intervals (exact_low, exact_high) in one dataset."""
     geometry = packing_dataset(packing)
     geometry = geometry.rename({"contact": PACKING_CONTACTS})
     parts = [states.copy(), geometry.drop_attrs(deep=False)]
@@ -161,14 +161,14 @@ def zarr_zip(whole: xr.Dataset) -> bytes:
 
 
 def npz(packing: Packing) -> bytes:
-    """A packing as NPZ, to be read by `granforce` and load_packing."""
+    """A packing as NPZ, for `granforce` and load_packing."""
     file = io.BytesIO()
     importers.save_packing(packing, file)
     return file.getvalue()
 
 
 def parameters(cell: Cell, link: str, view: Mapping[str, Any]) -> bytes:
-    """All that names what is on screen, as JSON: parameters, link, command, view."""
+    """The parameters of what is on screen, as JSON: parameters, link, command, view."""
     values = {
         "kind": cell.kind,
         "entry": cell.name,

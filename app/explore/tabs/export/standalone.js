@@ -1,4 +1,4 @@
-// The player without a server: the model is a plain object, its plots are those of this file.
+// The player without a server: the model is a plain object, and its plots are those of this file.
 
 import { render } from "../../../packing/player.js"
 
@@ -11,7 +11,7 @@ function unpacked(value) {
   return Object.fromEntries(Object.entries(value).map(([name, part]) => [name, unpacked(part)]))
 }
 
-/** Parameters as properties that tell those who listen; nobody is at the other end. */
+/** Parameters as properties that notify listeners in the page. */
 function standIn(given) {
   const heard = {}
   const on = (names, act) => { for (const name of [names].flat()) (heard[name] ??= []).push(act) }
@@ -34,14 +34,14 @@ export function begin(given, style) {
   const shadow = document.getElementById("player").attachShadow({ mode: "open" })
   shadow.append(Object.assign(document.createElement("style"), { textContent: style }))
   shadow.append(render({ model, view }))
-  data.player.scene.hand = null // nobody is there to make the networks that follow a hand
-  data.player.select() // no button holds a force either
+  data.player.scene.hand = null // no server computes networks for dragging
+  data.player.select() // nor can a button hold a force
   const { player } = data, paint = player.paintPlots.bind(player)
   player.paintPlots = (now) => {
     paint(now)
     player.plots.follow("plane", player.replay)
   }
   player.again()
-  // Their marks were drawn before there was a place for them.
+  // Their marks were drawn before layout.
   for (const { type, change } of page._all_models.values()) if (type === "Legend") setTimeout(() => change.emit(), 100)
 }

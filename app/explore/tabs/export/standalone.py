@@ -1,4 +1,4 @@
-"""The page as one file: packing, player, intervals and force space, without a server or network."""
+"""The page as one file: packing, player, intervals and force space, without server or network."""
 
 import base64
 import json
@@ -28,7 +28,7 @@ from ... import explanation
 from . import still
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
-FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
+FRAME_BYTES = 4.5e6  # of forces; if there are more, states are left out evenly
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -73,14 +73,13 @@ def html(
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: under what is known; shown: loads, gone, measured and pins, as the player has them.
+    exact: with known forces; shown: loads, gone, measured and pins, as for the player.
     """
     intervals = exact_intervals(exact, replay)
     kept, acceptance = thinned(replay)
     plane = planes.principal(kept)
     figures = still.figures(library, kept, exact, plane, outlined, view)
-    # In a document of their own: else Bokeh adds what a page that is served just then has its
-    # browser do.
+    # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
     bare = Document()
     for figure in figures:
         bare.add_root(figure)
@@ -139,7 +138,7 @@ def thinned(replay: Replay) -> tuple[Replay, Floats]:
 
 
 def _plain(value: Any) -> Any:
-    """Arrays as base64 with their type, all else as JSON takes it."""
+    """Arrays as base64 with their type, everything else in JSON types."""
     if isinstance(value, dict):
         return {name: _plain(part) for name, part in value.items()}
     if isinstance(value, np.ndarray):
@@ -151,5 +150,5 @@ def _plain(value: Any) -> Any:
 
 
 def _script(value: Any) -> str:
-    """JSON that can stand in a script."""
+    """JSON that is safe inside a script."""
     return json.dumps(value, ensure_ascii=False).replace("</", "<\\/")

@@ -1,4 +1,4 @@
-"""The plots beside the packing as they are, for a file: bound to no page."""
+"""The plots next to the packing as they are, for a file, independent of any page."""
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,7 @@ def at_rest(
     tab: str = "",
     loads: Floats | None = None,
 ) -> AppState:
-    """A state that shows a replay by day, where nothing is computed, pulled or known."""
+    """A state that shows a replay by day, without computations, pulls and known forces."""
     state = AppState(library, query=None)
     here = view | {"dark": False, "between": None, "tab": tab}
     with discard_events(state):
@@ -44,7 +44,7 @@ def figures(
     outlined: Outlined | None,
     view: View,
 ) -> tuple[Figure, Figure, Figure]:
-    """Bokeh figures of intervals, of η as it grows, and of the principal plane `chosen`."""
+    """Bokeh figures of intervals, of the growth of η, and of the principal plane `chosen`."""
     bars = intervals.View(at_rest(library, replay, exact, view, "intervals"))
     space = force_space.View(at_rest(library, replay, exact, view))
     space._show(replay, chosen)

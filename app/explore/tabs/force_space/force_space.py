@@ -1,4 +1,4 @@
-"""Force space in a plane: every network found, the one on screen, and the outline of S."""
+"""Force space in a plane: all networks found, the one on screen, and the outline of S."""
 
 from typing import Any
 
@@ -19,9 +19,9 @@ from . import sentences
 from .other_states import MARKED, OtherStates
 from .space_figure import Columns, SpaceFigure
 
-WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
-# Width over height: beside the packing a window is no higher than this; on a wide screen there is
-# a place of its own for it.
+WHOLE = "principal", "stress"  # planes that do not depend on the selected contact
+# Width over height: next to the packing a window is no higher than this; on a wide screen force
+# space has its own column.
 ASPECT, WIDE_ASPECT = 1.6, 1.15
 COMING = "Networks appear as they are sampled."
 GROWS = "Networks appear as they are sampled; the exact outline of S follows."
@@ -51,7 +51,7 @@ class View(TabView):
         self.catch_up()
 
     def panel(self) -> pn.Column:
-        """Plot, choice of the plane, and what it says."""
+        """Plot, choice of the plane, and explanation."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
             self.lead,
@@ -68,7 +68,7 @@ class View(TabView):
     # Contents
 
     def update(self) -> None:
-        """Place the states on screen in the plane, and have the outline looked up or computed."""
+        """Place the states on screen in the plane, and look up or compute the outline."""
         state, replay = self.state, self.state.seen
         if replay is None:
             return
@@ -92,12 +92,12 @@ class View(TabView):
 
     @property
     def kind(self) -> str:
-        """The plane chosen; while a walk goes on, that of its states stands for the first pair."""
+        """The chosen plane; during a walk, the plane of its states replaces the first pair."""
         first = self.planes.value == "pair" and self.looks.pair is None
         return "principal" if first and self.state.growing else self.planes.value
 
     def _depends(self) -> tuple[Any, ...]:
-        """What a plane of the kind chosen depends on, beside the states."""
+        """Dependencies of a plane of the chosen kind, in addition to the states."""
         state, kind = self.state, self.kind
         if kind == "pair":
             return (self.looks.pair,)
@@ -106,7 +106,7 @@ class View(TabView):
         return (state.work.fourfold,) if kind == "principal" and state.growing else ()
 
     def _place(self, replay: Replay, kind: str) -> None:
-        """Have axes found that need a moment; of a walk under way from what there is of it."""
+        """Compute axes that take a moment; during a walk, from the states so far."""
         state = self.state
         library, following = state.library, state.work.live if state.growing else None
         selection = following.selection if following else state.cell.selection
@@ -124,7 +124,7 @@ class View(TabView):
         self.placing.start(place, lambda plane: self._placed(replay, plane))
 
     def _clear(self) -> None:
-        """Nothing of another plane stays."""
+        """Remove everything that belongs to another plane."""
         self.state.plane = self.found = None
         self.finding.object = self.lead.object = ""
         self.drawing.clear()
@@ -158,15 +158,15 @@ class View(TabView):
             self.looks.frame = row
 
     def _span(self, event: Any) -> None:
-        """A contact that is clicked takes the place of the green one of a pair."""
+        """A clicked contact replaces the green one of a pair."""
         pair = self.state.plane.pair if self.state.plane is not None else []
         if self.shown is None or self.shown[1:] != ("pair", self.looks.pair):
-            return  # another is asked for, as by the way back
+            return  # another plane was requested, for example by Back
         if self.visible and pair and event.new not in (None, *pair):
             self.looks.pair = event.new, pair[1]
 
     def _show(self, replay: Replay, plane: Plane) -> None:
-        """Path, original and cone; the outline is to come."""
+        """Show path, original network and cone; the outline follows."""
         self.state.plane = plane
         frame = min(self.looks.frame, len(plane.path) - 1)
         self.drawing.show(plane, self._path(replay, plane), frame)
@@ -182,7 +182,7 @@ class View(TabView):
             self.drawing.title(self.state.seen, self.state.plane, self.looks.dark)
 
     def _path(self, replay: Replay, plane: Plane) -> Columns:
-        """Columns of the path; of a walk under way the player fills in the states as they come."""
+        """Columns of the path; during a walk the player adds states as they arrive."""
         path, number = plane.path, replay.number
         if self.state.growing:
             number = progress_feed.numbers(replay.summary)
@@ -191,7 +191,7 @@ class View(TabView):
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
     def _outlined(self, replay: Replay, found: Outlined) -> None:
-        if self.shown is not None and self.shown[0] is not replay:  # another came meanwhile
+        if self.shown is not None and self.shown[0] is not replay:  # another one arrived meanwhile
             return
         self._show(replay, found.plane)
         self.found = found
@@ -202,7 +202,7 @@ class View(TabView):
         self._tell(found)
 
     def _show_others(self) -> None:
-        """The other states, in the plane on screen."""
+        """Show the other states in the plane on screen."""
         plane, replay, other = self.state.plane, self.state.replay, self.others.replay
         if other is None or plane is None:
             self.drawing.beside.data = {"x": [], "y": []}
@@ -213,7 +213,7 @@ class View(TabView):
             self._tell(self.found)
 
     def _tell(self, found: Outlined) -> None:
-        """How much of the outline the states reach."""
+        """Report how much of the outline the states reach."""
         if found.plane.kind == planes.STRESS:
             self.told.object = sentences.stresses(found)
             return

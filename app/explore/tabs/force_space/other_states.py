@@ -1,4 +1,4 @@
-"""Uniform states beside the walk on screen, or the walk beside uniform ones."""
+"""Uniform states next to the walk on screen, or the walk next to uniform states."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,17 +12,17 @@ from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....widgets.progress import Progress
 
-# What is offered beside states of a kind, and what the others are called.
+# The label of the switch for states of a kind.
 ALSO = {"walk": "also uniformly sampled networks", "uniform": "also the walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
-ENOUGH = 300  # states beside those shown, where they have to be computed
+ENOUGH = 300  # states in addition to those shown, if they have to be computed
 
 
 class OtherStates:
-    """A switch that has the other kind of states found or computed: `replay`."""
+    """A switch that loads or computes the other kind of states: `replay`."""
 
     def __init__(self, state: AppState, changed: Callable[[], object]) -> None:
-        """changed(): there are others, or none any more."""
+        """changed(): called when there are others, or none any more."""
         self.state, self._changed = state, changed
         self.replay: Replay | None = None
         self.switch = pmui.Switch(label=ALSO["walk"], size="small", margin=(6, 8))
@@ -32,12 +32,12 @@ class OtherStates:
 
     @property
     def kind(self) -> str:
-        """Where the other states come from."""
+        """The source of the other states."""
         cell = self.state.cell
         return "walk" if cell is not None and cell.kind == "uniform" else "uniform"
 
     def look(self) -> None:
-        """Those of a store are shown; else the switch has them computed."""
+        """Show those of a store; otherwise the switch computes them."""
         cell, self.replay = self.state.cell, None
         if self.state.growing or cell is None:
             return self.fetch()
@@ -50,7 +50,7 @@ class OtherStates:
             self.fetch()
 
     def fetch(self, *events: Any) -> None:
-        """Find or compute the other states, or take them away."""
+        """Load or compute the other states, or remove them."""
         state, replay, cell = self.state, self.state.replay, self.state.cell
         self.task.cancel()
         self.replay = None
@@ -71,6 +71,6 @@ class OtherStates:
                 self.replay = shown.replay
                 self._changed()
                 if found is None:
-                    state.refresh()  # it is listed from now on
+                    state.refresh()  # now it is listed
 
         self.task.start(work, done)

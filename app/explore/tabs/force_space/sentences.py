@@ -1,4 +1,4 @@
-"""What the shadow of S on a plane shows, in words."""
+"""Sentences about the projection of S onto a plane."""
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from ....widgets.hints import term
 from ....widgets.parts import mark
 from ....widgets.plot_style import DOT, ORIGINAL, PALE, STATES
 
-MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
-MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
+MANY = 10  # dimensions above which nearly all volume of a body is near its centre
+MOSTLY = 0.75  # fraction of the dots in the inner half above which they are described as central
 
 CROWDED = ": to move far out, many forces have to change together, which is unlikely by chance"
 HEADING = "<b>Every network, and the one on screen.</b> "
@@ -29,7 +29,7 @@ COMPUTED = (
 
 
 def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
-    """What the marks of the plot are, as HTML."""
+    """The meaning of the marks in the plot, as HTML."""
     marks = [
         mark(STATES, "a dot: a whole force network", "50%"),
         mark(DOT, "the one in the packing: drag it", "50%"),
@@ -44,7 +44,7 @@ def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
 
 
 def finding(found: Outlined, replay: Replay, others: Floats, called: str) -> str:
-    """How many of the states, and of others (k, 2) so called, keep to the middle of S, as HTML."""
+    """How many of the states, and of others (k, 2), are near the centre of S, as HTML."""
     path = found.plane.path[1:]
     inner = planes.inner_share(path, found.outer)
     many = "All" if inner == 1 else f"{min(inner, 0.99):.0%}"
@@ -58,7 +58,7 @@ def finding(found: Outlined, replay: Replay, others: Floats, called: str) -> str
 
 
 def computed(found: Outlined, replay: Replay) -> str:
-    """What is drawn, how much of the outline the states reach, and how that was computed."""
+    """What is drawn, how much of the outline the states reach, and how it was computed."""
     path = found.plane.path[1:]
     part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
     area = planes.area(path) / planes.area(found.outer)
@@ -73,7 +73,7 @@ def computed(found: Outlined, replay: Replay) -> str:
 
 
 def stresses(found: Outlined) -> str:
-    """What the outline of all stresses says, as HTML."""
+    """The meaning of the outline of all stresses, as HTML."""
     reach = np.hypot(*found.inner.T).max(initial=0.0)
     path = np.hypot(*found.plane.path.T)
     return (
@@ -87,14 +87,14 @@ def stresses(found: Outlined) -> str:
 
 
 def _drawn(replay: Replay) -> str:
-    """How many networks the dots are, in a sentence."""
+    """The number of networks drawn as dots, in a sentence."""
     kept, states = replay.summary["kept"], replay.summary["states"]
     some = f"{kept} of the {states} networks, about every {round(states / kept)}th"
     return f"The dots are {some if kept < states else f'all {kept} networks'}."
 
 
 def _variance(plane: Plane) -> str:
-    """How much of the states' scatter goes along the axes, where that was asked of them."""
+    """The share of the states' variance along the axes, for principal axes."""
     if not np.isfinite(plane.share).all():
         return ""
     across, up = plane.share

@@ -14,7 +14,7 @@ from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, ho
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
-# The page's theme gives all axes one colour.
+# The page's theme would give all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
 
 
@@ -22,7 +22,7 @@ class SpaceFigure:
     """A plane of force space; the player moves the state on screen along the path."""
 
     def __init__(self, tab: str, aspect: float, show: Callable[[int], object]) -> None:
-        """tab: of the view; aspect: width over height; show(row): a dot was clicked."""
+        """tab: of the view; aspect: width over height; show(row): called when a dot is clicked."""
         none: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(none | {"state": []}, name="path")
         self.here = ColumnDataSource(none, name="here", tags=["follows", "path", tab])
@@ -64,7 +64,7 @@ class SpaceFigure:
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5
         )
         here.tags = MOVES
-        # The state on screen moves too often to be looked at for the range.
+        # The state on screen moves too often to be included in the range.
         fig.x_range.renderers = fig.y_range.renderers = [*edges, states]
         rows = ("network", "@state"), ("at", "@x{0.000}, @y{0.000}")
         fig.add_tools(hover([states], *rows), TapTool(renderers=[states]))
@@ -79,7 +79,7 @@ class SpaceFigure:
         self.path.selected.on_change("indices", tapped)
 
     def clear(self) -> None:
-        """Nothing of another plane stays; without dots there is no plot."""
+        """Remove everything of another plane; without dots there is no plot."""
         self.figure.visible = False
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.cone):
@@ -87,22 +87,22 @@ class SpaceFigure:
         self.forget_outline()
 
     def forget_outline(self) -> None:
-        """The outline is to come."""
+        """Remove the outline until the next one arrives."""
         for source in (self.inner, self.outer, self.half):
             source.data = {"x": [], "y": []}
 
     def show(self, plane: Plane, path: Columns, frame: int) -> None:
-        """Networks in a plane, that of row `frame` on screen; no outline."""
+        """Networks in a plane, with that of row `frame` on screen; no outline."""
         x, y = plane.path.T
         self.path.data = path
         self.original.data = {"x": x[:1], "y": y[:1]}
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.forget_outline()
-        # Distances mean something among principal axes: both then have the same scale.
+        # Distances are meaningful in principal axes: both then have the same scale.
         self.figure.update(match_aspect=not plane.components, visible=True)
 
     def outline(self, found: Outlined) -> None:
-        """The outline, and halfway to it from its middle, of which stresses say nothing."""
+        """The outline, and the half-way line to its centroid, which is omitted for stresses."""
         parts = [(self.inner, found.inner), (self.outer, found.outer)]
         if found.plane.kind != planes.STRESS:
             parts.append((self.half, planes.halfway(found.outer)))
@@ -111,13 +111,13 @@ class SpaceFigure:
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}
 
     def draw_cone(self, plane: Plane, mu: float, reach: float) -> None:
-        """Coulomb's cone where both axes are forces of one contact, up to f_n = reach."""
+        """Coulomb's cone if both axes are forces of one contact, up to f_n = reach."""
         one = len({contact for contact, _ in plane.components}) == 1
         cone = {"x": [reach, 0, reach], "y": [mu * reach, 0, -mu * reach]}
         self.cone.data = cone if one else {"x": [], "y": []}
 
     def title(self, replay: Replay, plane: Plane, dark: bool) -> None:
-        """Titles of the axes, in the colours of the lines whose forces they are."""
+        """Labels of the axes, in the colours of the contacts whose forces they are."""
         colours = lines(dark) if plane.pair else (text(dark),) * 2
         axes = self.figure.xaxis[0], self.figure.yaxis[0]
         for axis, words, colour in zip(axes, planes.labels(replay, plane), colours, strict=True):

@@ -1,4 +1,4 @@
-"""A figure against friction: lines of the study with error bars, and what is on the page on top."""
+"""A figure against friction: lines of the study with error bars, and the page's packings on top."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ HERE, OWN = "this packing", "other packings on this page"
 
 
 class Line(NamedTuple):
-    """One quantity of a figure: what it is called, and its points in the study."""
+    """One quantity of a figure: its label, and its points in the study."""
 
     label: str
     points: Points
@@ -29,10 +29,10 @@ class Line(NamedTuple):
 
 
 class AgainstFriction:
-    """Lines of the study against μ; `mark` puts rings where the page's packings lie."""
+    """Lines of the study against μ; `mark` puts rings at the page's packings."""
 
     def __init__(self, name: str, label: str, lines: Sequence[Line], **options: Any) -> None:
-        """name: of the file that the figure is saved as; label: of the axis of values."""
+        """name: of the file to save the figure in; label: of the value axis."""
         fig = figure(name, None, "friction μ", label, x_axis_type="log", **options)
         fig.xaxis.ticker = FixedTicker(ticks=DECADES)
         fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
@@ -79,7 +79,7 @@ class AgainstFriction:
         self.here.data = {"x": x, "y": y}
 
     def choosable(self, choose: Callable[[float], object]) -> None:
-        """choose(μ): a point was clicked."""
+        """choose(μ): called when a point is clicked."""
         for renderer in self.points:
             source = renderer.data_source
             renderer.nonselection_glyph = renderer.selection_glyph = renderer.glyph
@@ -94,6 +94,6 @@ class AgainstFriction:
 
 
 def shown(points: Points) -> Floats:
-    """Columns x, y, error of those points that a logarithmic axis of μ can show."""
+    """Columns x, y, error of the points that a logarithmic axis of μ can show."""
     kept = [p for p in points if p[0] > 0 and np.isfinite(p[1])]
     return np.array(kept, dtype=float).reshape(-1, 3).T

@@ -1,4 +1,4 @@
-"""The paper's claims and what the study found, as tables."""
+"""The paper's claims and the study's findings, as tables."""
 
 import html
 import re
@@ -17,7 +17,7 @@ VERDICTS = {
     "too few data": "…",
     "not measured": "…",
 }
-# Columns: whose numbers a claim is judged by, and heading.
+# Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
     "gauss_seidel": "paper’s sweeps, to 10⁻³",
     "nearest": "random walk",
@@ -31,7 +31,7 @@ TABLE = "<div style='overflow-x:auto'><table class='claims'>{}</table></div>"
 
 
 def claims(about: str, heading: str, opened: bool = False) -> str:
-    """The paper's claims about one of `study_data.ABOUT`, a column for each sampler, as HTML."""
+    """The paper's claims about one of `study_data.ABOUT`, a column per sampler, as HTML."""
     found = study_data.claims(about)
     if not found:
         return ""
@@ -50,7 +50,7 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
 
 
 def legend() -> str:
-    """What the tables hold, as HTML."""
+    """The contents of the tables, as HTML."""
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
         f"<b>What the paper claims, and what the study found</b> ({PAPER}). Each cell: verdict, "
@@ -81,7 +81,7 @@ def _number(value: float) -> str:
 
 
 def plain(text: str) -> str:
-    """A text with its symbols where there is no HTML."""
+    """A text with its symbols, without HTML."""
     return text.replace("F_n", "Fₙ").replace("f_n", "fₙ").replace("F_orig", "fₙ as packed")
 
 

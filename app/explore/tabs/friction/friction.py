@@ -1,4 +1,4 @@
-"""How undetermined forces are over friction: the paper's figures, and the packing on screen."""
+"""Indeterminacy against friction: the paper's figures, and the packing on screen."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
 from .this_packing import Scatter, forces
 
-# Where it is wide enough, z is drawn within Figure 1, where no curve is; else below it.
+# If it is wide enough, z is drawn inside Figure 1, where there is no curve; otherwise below it.
 INSET = """
 :host { position: absolute; top: 56px; left: 70px; width: 40% !important; z-index: 1; }
 @media (max-width: 599.95px) { :host { position: static; width: 100% !important; } }
@@ -38,10 +38,10 @@ WIDE = {"sizing_mode": "stretch_width"}
 
 
 class Rows(NamedTuple):
-    """Numbers of the packings on the page that were made like the one on screen."""
+    """Numbers of the page's packings made with the same options as the one on screen."""
 
     own: list[Row]
-    exact: list[Row]  # of those whose exact intervals a store has
+    exact: list[Row]  # of those whose exact intervals are in a store
     here: Row  # that on screen
 
 
@@ -65,7 +65,7 @@ class View(TabView):
         self.catch_up()
 
     def panel(self) -> pn.Column:
-        """Figures under each other, each under its sentence; claims last."""
+        """The figures, each below its sentence; claims last."""
         first, fourth, sixth = self.figures
         pairs = [part for pair in zip(THIS, self.folded, strict=True) for part in pair]
         folds = folded_away(*pairs)
@@ -76,7 +76,7 @@ class View(TabView):
         )  # fmt: skip
 
     def update(self) -> None:
-        """Have the numbers of the page's packings read, then draw."""
+        """Read the numbers of the page's packings, then draw."""
         state = self.state
         self.task.cancel()
         if state.replay is None or state.cell is None:
@@ -87,7 +87,7 @@ class View(TabView):
         self.task.start(work, lambda rows: state.work.piecewise(self._show(replay, rows)))
 
     def _show(self, replay: Replay, rows: Rows) -> Iterator[None]:
-        """Figure 1 first; a generator of pieces."""
+        """Draw Figure 1 first; a generator of steps."""
         if self.indeterminacy is None:
             self.indeterminacy = Indeterminacy()
             self._place(self.indeterminacy)
@@ -115,7 +115,7 @@ class View(TabView):
             part.choosable(self._choose)
 
     def _show_packing(self, replay: Replay, rows: Rows) -> None:
-        """Figures of the packing on screen alone."""
+        """Draw the figures of the packing on screen alone."""
         exact = exact_intervals(self.state.exact, replay)
         self.scatter = Scatter(replay, exact, self._select)
         self._mark()
@@ -132,14 +132,14 @@ class View(TabView):
         self.looks.contact = contact
 
     def _choose(self, mu: float) -> None:
-        """Show such a packing, made first if there is none."""
+        """Show such a packing; if there is none, it is made first."""
         self.state.choose(mu=mu)
         if self.state.missing:
             self.state.compute()
 
 
 def read(library: Library, cells: Sequence[Cell], cell: Cell) -> Callable[[Job], Rows]:
-    """Work that reads the numbers of the cells, `cell` that on screen; and the study, once."""
+    """Work that reads the numbers of the cells, where `cell` is on screen; and the study, once."""
 
     def work(job: Job) -> Rows:
         job.begin(f"reading {len(cells)} results and the finished study")

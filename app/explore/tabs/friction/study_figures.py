@@ -1,4 +1,4 @@
-"""The paper's Figures 1, 4 and 6 from the finished study, and sentences made from its numbers."""
+"""The paper's Figures 1, 4 and 6 from the finished study, and sentences from its numbers."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ from ...result_values import with_error
 from .against_friction import COLOURS, MARKERS, AgainstFriction, Line, Points
 
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃", 0.15))
-# Parts of the study, and what they are called.
+# Parts of the study, and their labels.
 SAMPLERS = {
     "walk": "random walk",
     "sweeps_1e-3": "by Gauss–Seidel, to 10⁻³",
@@ -30,11 +30,11 @@ SAMPLERS = {
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 BINS = 30
-ROOM = 1.5  # of the largest η: above the rising curve is the inset
+ROOM = 1.5  # of the largest η: leaves room for the inset above the rising curve
 
 
 class Indeterminacy:
-    """Figure 1: η1, η2 and 0.15 η3 against μ; in the inset z."""
+    """Figure 1: η1, η2 and 0.15 η3 against μ, with z in the inset."""
 
     def __init__(self) -> None:
         walks = study_data.rows("walk")
@@ -55,14 +55,14 @@ class Indeterminacy:
         _small(self.z.figure)
 
     def mark(self, own: list[Row], here: Row) -> None:
-        """Where the page's packings lie, `here` that on screen."""
+        """Mark the page's packings, with `here` on screen."""
         points = [statistics.means(own, name, factor=factor) for name, _, factor in MEASURES]
         rings = [(here["mu"], factor * here[name]) for name, _, factor in MEASURES]
         self.etas.mark(points, rings)
         self.z.mark([statistics.means(own, "coordination")], [(here["mu"], here["coordination"])])
 
     def sentence(self) -> str:
-        """Where η is largest, and why it falls again, as HTML."""
+        """The μ at which η is largest, and why it falls again, as HTML."""
         walks = study_data.rows("walk")
         points = statistics.means(walks, "eta2")
         if not points:
@@ -160,14 +160,14 @@ class Correlations:
         legend_above(self.drawn.figure, 3)
 
     def mark(self, own: list[Row], exact: list[Row], here: Row) -> None:
-        """Where the page's packings lie, `here` that on screen."""
+        """Mark the page's packings, with `here` on screen."""
         known = [[row for row in rows if _has(row, "correlation")] for rows in (own, exact)]
         points = [statistics.means(rows, "correlation") for rows in known]
         ring = [(here["mu"], here["correlation"])] if _has(here, "correlation") else []
         self.drawn.mark([points[0], [], points[1]], ring)
 
     def sentence(self) -> str:
-        """Between which values the walk's correlation lies, as HTML; empty without a study."""
+        """The range of the walk's correlation, as HTML; empty without a study."""
         points = self.found["walk"]
         if not points:
             return ""
@@ -186,14 +186,14 @@ def _has(row: Row, name: str) -> bool:
 
 
 def packings(rows: Iterable[Row]) -> str:
-    """How many packings there are at a friction: "10 to 30"."""
+    """The number of packings per friction: "10 to 30"."""
     counts = Counter(row["mu"] for row in rows).values()
     least, most = min(counts, default=0), max(counts, default=0)
     return str(most) if least == most else f"{least} to {most}"
 
 
 def _small(fig: Figure) -> None:
-    """Have a figure look like an inset."""
+    """Give a figure the style of an inset."""
     fig.legend.visible = False
     for axis in fig.axis:
         axis.update(

@@ -13,11 +13,11 @@ from ....results.replays import Replay
 from ....widgets.parts import figure
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, legend_above
 
-LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
+LARGEST, BINS = 6.0, 40  # of P(f_n): end of the axis in ⟨f_n⟩, and number of bins
 
 
 class Scatter:
-    """ΔF_n against f_n as packed, one point a contact; a click selects the contact."""
+    """ΔF_n against f_n as packed, one point per contact; a click selects the contact."""
 
     def __init__(self, replay: Replay, exact: Bounds, select: Callable[[int], object]) -> None:
         self.original = replay.normal[0]
@@ -59,7 +59,7 @@ class Scatter:
         legend_above(fig)
 
     def mark(self, contact: int | None) -> None:
-        """A ring around this contact."""
+        """Draw a ring around this contact."""
         chosen = [] if contact is None else [contact]
         self.chosen.data = {"x": self.original[chosen], "y": self.seen[chosen]}
 

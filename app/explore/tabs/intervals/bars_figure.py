@@ -1,4 +1,4 @@
-"""The plot of intervals: a pale and a dark bar for each contact, and a dot for its force now."""
+"""The plot of intervals: a pale and a dark bar per contact, and a dot for its present force."""
 
 from collections.abc import Callable
 
@@ -13,20 +13,20 @@ from ....widgets.parts import MOVES, figure
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, now
 
 COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
-COLUMNS += ("whole_low", "whole_high")  # exact intervals without what is known
-APART = 100  # bars up to which there is room between them, and for large dots
-# Widths of what was possible before, is possible, and was seen, in that of one contact, and size
-# of dots, px; of few bars, and of many.
+COLUMNS += ("whole_low", "whole_high")  # exact intervals without known forces
+APART = 100  # number of bars up to which there are gaps between them, and large dots
+# Widths of the bars for previously possible, possible and seen forces, in that of one contact, and
+# size of dots, px; for few bars, and for many.
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.6)
-CARRYING = 0.1  # ⟨f_n⟩ as packed from which on a contact counts for the axis of its own unit
-SORTED = "sorted"  # tag of the figure where forces as packed ascend; see plot_layer.js
+CARRYING = 0.1  # ⟨f_n⟩ as packed above which a contact counts for the axis in its own unit
+SORTED = "sorted"  # tag of the figure if forces as packed ascend; see plot_layer.js
 
 
 class BarsFigure:
-    """Bars of the contacts drawn; the player rewrites `now`, and of a walk under way low, high."""
+    """Bars of contacts; the player updates `now` and, during a walk, low and high."""
 
     def __init__(self, choose: Callable[[int], object]) -> None:
-        """choose(contact): a bar was clicked."""
+        """choose(contact): called when a bar is clicked."""
         self.bars = ColumnDataSource({column: [] for column in COLUMNS}, name="bars")
         self.chosen = ColumnDataSource({"rank": [], "low": [], "high": []}, name="chosen")
         self.contacts: Integers = np.array([], dtype=int)
@@ -81,9 +81,9 @@ class BarsFigure:
     def show(
         self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, own: bool
     ) -> int:
-        """Draw these contacts; how many bars reach beyond the axis.
+        """Draw these contacts; return how many bars extend beyond the axis.
 
-        before: exact bounds without what is known; own: forces in units of that as packed.
+        before: exact bounds without known forces; own: forces in units of that as packed.
         """
         self.contacts = contacts
         original = replay.normal[0, contacts]
@@ -115,14 +115,14 @@ class BarsFigure:
         return int(np.sum(highest > top))
 
     def draw_packed(self, ascending: bool) -> None:
-        """Forces as packed as a line where they ascend; else as dots."""
+        """Draw forces as packed as a line if they ascend, otherwise as dots."""
         # Not by `visible`, which the player sets.
         self.line.glyph.line_alpha = float(ascending)
         self.packed.glyph.update(fill_alpha=float(not ascending), line_alpha=float(not ascending))
         self.figure.tags = [SORTED] if ascending else []
 
     def mark(self, contact: int | None) -> None:
-        """Show where a contact stands, if it is drawn."""
+        """Mark a contact if it is drawn."""
         at = np.flatnonzero(self.contacts == contact)
         low, high = self.figure.y_range.start, self.figure.y_range.end
         rank = self.bars.data["rank"][at].tolist() if len(at) else []
@@ -135,5 +135,5 @@ def _ends(of: str, bounds: Bounds, contacts: Integers) -> dict[str, Floats]:
 
 
 def set_range(axis: Range1d, low: float, high: float) -> None:
-    """Have an axis reach from low to high, also after a reset."""
+    """Set the range of an axis, also after a reset."""
     axis.update(start=low, end=high, reset_start=low, reset_end=high)

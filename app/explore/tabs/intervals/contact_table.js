@@ -1,11 +1,10 @@
-// All contacts as a table: their forces in the network on screen, what they can be, what is known. It
-// asks the player, not the server, and only while it is open; rows that a filter leaves out are dim in
-// the packing.
+// A table of all contacts: present forces, possible forces, known forces. It reads from the player,
+// not the server, and only while it is open; rows hidden by a filter are dim in the packing.
 
 const ROWS = 200 // shown at once
-const AGAIN_MS = 250 // between two fillings while things move
+const AGAIN_MS = 250 // between two updates during motion
 const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3) : "–")
-// Of each column: heading, what it holds for contact c, how that is written.
+// Of each column: heading, value for contact c, its format.
 const COLUMNS = [
   ["contact", (on, c) => on.walk.backbone[c], String],
   ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
@@ -16,7 +15,7 @@ const COLUMNS = [
   ["ΔFₙ", (on, c) => on.high[c] - on.low[c], NUMBER],
   ["held", (on, c) => Number(on.known.has(c)), (value) => (value ? "held" : "")],
 ]
-const FORCE = 2 // the column that the table is sorted by at first
+const FORCE = 2 // the column by which the table is sorted at first
 
 export function render({ model, view }) {
   const root = document.createElement("details"), page = view.model.document
@@ -32,7 +31,7 @@ export function render({ model, view }) {
   const player = () => page.get_model_by_name("player")?.player
   let from = 0, pending = 0, shown = []
 
-  /** What the columns are read from. */
+  /** The data for the columns. */
   function now() {
     const on = player(), { replay, look } = on, { walk, mixed } = replay
     const pairs = Array(walk.contacts)
@@ -64,7 +63,7 @@ export function render({ model, view }) {
     dim(found.length < all.length ? found : null, all.length)
   }
 
-  /** Contacts that are left out are dim in the packing. */
+  /** Dim the contacts hidden by a filter. */
   function dim(found, count) {
     const { look } = player(), was = look.only
     look.only = found && new Uint8Array(count)

@@ -1,4 +1,4 @@
-"""All contacts as a table, to be opened; it follows the network on screen, see contacts.js."""
+"""A table of all contacts that follows the network on screen; see contact_table.js."""
 
 import param
 
@@ -7,7 +7,7 @@ from ....state.view_settings import Looks
 
 
 class Contacts(Scripted):
-    """Number, disks, forces and their bounds of each contact; sorted, searched and filtered."""
+    """Number, disks, forces and bounds of each contact; can be sorted, searched and filtered."""
 
     dark = param.Boolean()
     open = param.Boolean()

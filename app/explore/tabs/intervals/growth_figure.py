@@ -13,7 +13,7 @@ LABELS = {"eta1": "η₁", "eta2": "η₂", "eta3": "0.15 η₃"}
 
 
 class GrowthFigure:
-    """Curves that the player fills in; dashed: where those of all networks shown end."""
+    """Curves that the player fills in; dashed: their final values over all networks shown."""
 
     def __init__(self) -> None:
         self.growth = ColumnDataSource({name: [] for name in ("state", *LABELS)}, name="growth")
@@ -35,7 +35,7 @@ class GrowthFigure:
         legend_above(fig)
 
     def show(self, replay: Replay, growing: bool) -> None:
-        """Curves of a Replay, or of a walk under way, the end of which is not known."""
+        """Curves of a Replay, or of a walk in progress with unknown end."""
         number = progress_feed.numbers(replay.summary) if growing else replay.number
         unseen = np.full(len(number), np.nan, dtype=np.float32)
         self.growth.data = {"state": number.astype(np.int32)} | {
@@ -46,7 +46,7 @@ class GrowthFigure:
             span.visible = not growing
         if growing:
             return
-        # Of the states shown, like the curves: all states of the walk have seen more.
+        # Of the states shown, like the curves: the states of the whole walk span more.
         ends = [replay.growth[name][-1] * (0.15 if name == "eta3" else 1) for name in LABELS]
         ends = [float(np.nan_to_num(end)) for end in ends]
         for span, end in zip(self.finals, ends, strict=True):

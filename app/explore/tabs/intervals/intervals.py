@@ -34,7 +34,7 @@ FIXED = "Not at all: balance determines every force."
 
 
 class View(TabView):
-    """One bar a contact: pale what is possible, dark what was seen, a dot for the force now."""
+    """One bar per contact: pale for possible, dark for seen, a dot for the present force."""
 
     name = "intervals"
 
@@ -63,7 +63,7 @@ class View(TabView):
         self.catch_up()
 
     def panel(self) -> pn.Column:
-        """Choices and bars; the table, and growth, to be opened."""
+        """Choices and bars; collapsed table and growth."""
         wide = {"sizing_mode": "stretch_width"}
         grows = folded_away(GROWS, plotted(self.growth.figure))
         self.looks.keep_active(grows, "growth")
@@ -78,7 +78,7 @@ class View(TabView):
         )
 
     def update(self) -> None:
-        """Take over contacts, exact intervals and the walk's length."""
+        """Update contacts, exact intervals and the walk's length."""
         state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
             return
@@ -108,12 +108,12 @@ class View(TabView):
         self.looks.contact = contact
 
     def _offer(self, *events: Any) -> None:
-        """Exact intervals are to be asked for only where none are there or under way."""
+        """Offer exact intervals only if there are none and none are being computed."""
         self.exact.visible = self.state.replay is not None and self.state.exact_wanted
 
 
 def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: int = 0) -> str:
-    """What pale, dark and dots are just now, as HTML."""
+    """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return HEADING + FIXED
     held = len(state.knowledge.known)

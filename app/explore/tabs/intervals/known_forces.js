@@ -1,4 +1,4 @@
-// What is known, as chips; what it leaves open, in words; and which contact would be worth measuring.
+// Known forces as chips, their effect in words, and the contact most worth measuring.
 
 import { ask } from "../../../browser/send.js"
 import { button, made } from "../../../browser/dom.js"

@@ -1,4 +1,4 @@
-"""What is known above the intervals: chips, what it leaves open, which measurement comes next."""
+"""Known forces above the intervals: chips, their effect, and the next measurement."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from ....state.app_state import AppState
 from ....state.known import Knowledge, Ranked
 from ....widgets.hints import term
 
-STRONGEST = 5  # contacts that are named whose interval has shrunk most
+STRONGEST = 5  # number of contacts listed whose interval has shrunk most
 ASK = (
     "To treat a force as known, for example from a measurement, hold it (button Hold, or H). All "
     "other intervals shrink or stay the same."
@@ -21,7 +21,7 @@ ASK = (
 
 
 class Known(Scripted):
-    """Chips of what is known; see known.js. Contacts are positions in the backbone."""
+    """Chips of known forces; see known_forces.js. Contacts are positions in the backbone."""
 
     chips = param.List(doc="pairs (contact, words)")
     words = param.String(doc="effect on the other intervals, HTML")
@@ -66,7 +66,7 @@ class Known(Scripted):
 
 
 def words(knowledge: Knowledge, number: Integers) -> str:
-    """What is known leaves so much open, as HTML."""
+    """The remaining freedom given the known forces, as HTML."""
     narrowed, known = knowledge.narrowed, tuple(knowledge.known)
     if not known:
         return ASK
@@ -100,7 +100,7 @@ def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
 
 
 def _worth(before: float, after: float, expected: float) -> str:
-    """What knowing a contact would tell."""
+    """The value of knowing a contact."""
     if np.isnan(after) or np.isnan(before):
         return f"errors about {expected:.1%} smaller, by the networks"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"

@@ -1,4 +1,4 @@
-"""In which order contacts are drawn, and which of them."""
+"""The order in which contacts are drawn, and the selection of them."""
 
 from typing import NamedTuple
 
@@ -11,13 +11,13 @@ from ....results.replays import Replay
 from ....state.known import Narrowed
 from ....state.view_settings import SORTS
 
-MOST_BARS = 3000  # more than there are pixels would only cost time; of more, evenly many are drawn
-SOME = 16  # bars that can be told apart at a glance
+MOST_BARS = 3000  # more than the pixels; of more contacts, evenly spaced ones are drawn
+SOME = 16  # number of bars distinguishable at a glance
 USUAL = "original"
 
 
 class Order(NamedTuple):
-    """Contacts (N_c,) as positions in the backbone, and what they are sorted by in words."""
+    """Contacts (N_c,) as positions in the backbone, and their order in words."""
 
     contacts: Integers
     words: str
@@ -27,9 +27,9 @@ class Order(NamedTuple):
 def ordered(
     replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None = None, coming: bool = False
 ) -> Order:
-    """All contacts in the order that `by`, one of SORTS, names, as far as it is known.
+    """All contacts in the order `by`, one of SORTS, as far as it is known.
 
-    narrowed: what known forces leave open; coming: whether exact bounds are being computed.
+    narrowed: intervals given known forces; coming: whether exact bounds are being computed.
     """
     value = _value(replay, exact, by, narrowed)
     if value is None:
@@ -42,7 +42,7 @@ def ordered(
 
 
 def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) -> Floats | None:
-    """What contacts are sorted by, ascending; None where it is not known."""
+    """The values for sorting contacts, ascending; None if unknown."""
     if by == USUAL:
         return replay.normal[0]
     if by == "extent":
@@ -59,6 +59,6 @@ def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) ->
 
 
 def picked(order: Integers, most: int, named: list[int]) -> Integers:
-    """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
+    """Ranks (k,) of contacts to draw: evenly spaced, at most `most`, and the named ones."""
     step = -(-len(order) // most)
     return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))

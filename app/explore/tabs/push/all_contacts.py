@@ -19,7 +19,7 @@ HELD = " Held forces are ignored here: all admissible networks count."
 
 
 class LimitLoads:
-    """One dot a contact; a click selects it."""
+    """One dot per contact; a click selects it."""
 
     def __init__(self, replay: Replay, loads: Loads, choose: Callable[[int], object]) -> None:
         self.normal, self.loads = replay.normal[0], loads
@@ -45,12 +45,12 @@ class LimitLoads:
         source.selected.on_change("indices", tapped)
 
     def mark(self, contact: int | None) -> None:
-        """A ring around this contact."""
+        """Draw a ring around this contact."""
         here = [] if contact is None else [contact]
         self.chosen.data = {"x": self.normal[here], "y": self.loads.load[here]}
 
     def sentence(self) -> str:
-        """What contacts bear, as HTML."""
+        """The loads that contacts bear, as HTML."""
         median, most = np.percentile(self.loads.load, [50, 90])
         return (
             f"<b>Half of the contacts withstand a push of {median:.2f} mean forces, one in ten "

@@ -1,13 +1,13 @@
-// Slider for the push on a contact. Where it is moved, arrows in the packing grow and the network follows
-// (push_animation.js); it stops where the disks set off, at the critical force.
+// Slider for the push on a contact. As it moves, arrows in the packing grow and the network follows
+// (push_animation.js); it stops where disks start to move, at the critical force.
 
 import { ask } from "../../../browser/send.js"
 
 const STEPS = 400 // of the slider
-const RISE_S = 5 // from nothing to the end, by the button
-const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
-const TICKS = 8 // numbers on the scale, about
-const THUMB = 8 // px from the slider's ends to where its thumb stands for them
+const RISE_S = 5 // from zero to the end, by the button
+const ROOM = 1.25 // factor on the scale if its end lies beyond it
+const TICKS = 8 // approximate number of ticks
+const THUMB = 8 // px from the slider's ends to the centre of its thumb there
 
 export function render({ model, view }) {
   const root = document.createElement("div")
@@ -19,7 +19,7 @@ export function render({ model, view }) {
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.values?.length > 0, end = () => (known() ? model.path.values.at(-1) : Infinity)
-  let load = 0, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: whom the load is shown by
+  let load = 0, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: the owner of the shown load
 
   function find() {
     if (known() || asked) return
@@ -36,7 +36,7 @@ export function render({ model, view }) {
     ask(model, view, { gave: true })
   }
 
-  /** Where another network came into view than that which is pushed, nothing is pushed any more. */
+  /** If a network other than the pushed one is shown, end the push. */
   function look() {
     if (shows || !(load > 0 && known()) || (by.held && player().replay?.held === by.held)) return
     by.end()
@@ -85,7 +85,7 @@ export function render({ model, view }) {
     line.innerHTML = drawn
   }
 
-  /** By itself, as soon as it is known how far. */
+  /** Rise automatically once the end is known. */
   function rise() {
     load = 0
     const way = ++rises

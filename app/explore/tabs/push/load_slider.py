@@ -1,4 +1,4 @@
-"""Slider for the push on a contact: the network follows it in the packing until something moves."""
+"""Slider for the push on a contact: the network in the packing follows until something moves."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,7 @@ from ....browser.messages import Message
 
 
 class LoadSlider(Scripted):
-    """How hard two disks are pushed apart, in ⟨f_n⟩, as far as disks hold; see load.js."""
+    """The force that pushes two disks apart, in ⟨f_n⟩, while they hold; see load_slider.js."""
 
     contact = param.Integer(default=None, allow_None=True, doc="the one that is pushed")
     path = param.Dict(default={}, doc="networks under growing loads, see perturb.path; {} unknown")
@@ -17,7 +17,7 @@ class LoadSlider(Scripted):
     running = param.Boolean(doc="whether it is being computed")
 
     def __init__(self, pushed: Callable[[], object], gave: Callable[[], object]) -> None:
-        """pushed(): it was moved where no path is known; gave(): it has come to the end of it."""
+        """pushed(): moved while no path is known; gave(): moved to the end of the path."""
         super().__init__(sizing_mode="stretch_width", margin=(4, 10))
         self._pushed, self._gave = pushed, gave
 

@@ -1,4 +1,4 @@
-"""What a push on one contact does, in words, as a table, and against distance."""
+"""The effect of a push on one contact, in words, as a table, and against distance."""
 
 import numpy as np
 from bokeh.models import BoxAnnotation
@@ -40,7 +40,7 @@ TABLE = '<table class="claims"><tr>{}</tr><tr>{}</tr></table>'
 
 
 def sentence(replay: Replay, contact: int, pushed: Pushed | None, held: int) -> str:
-    """What is pushed, what came of it, and whether `held` forces are respected, as HTML."""
+    """The push, its result, and whether `held` forces are respected, as HTML."""
     text = HEADING.format(replay.backbone[contact])
     if pushed is None:
         text += ASKED.format(now=replay.normal[0, contact])
@@ -53,7 +53,7 @@ def sentence(replay: Replay, contact: int, pushed: Pushed | None, held: int) -> 
 
 
 def _farthest(pushed: Pushed) -> float:
-    """The largest displacement of the first motion, of which the root mean square is 1."""
+    """The largest displacement of the first motion, relative to its root mean square."""
     return float(np.hypot(*pushed.displacement.T).max())
 
 
@@ -72,7 +72,7 @@ def table(replay: Replay, contact: int, pushed: Pushed) -> str:
 
 
 def decay_sentence(pushed: Pushed) -> str:
-    """Whether |u| falls like a power law or an exponential over the range of the fit, as HTML."""
+    """Whether |u| decays as a power law or an exponential over the range of the fit, as HTML."""
     if not np.isfinite(pushed.exponent):
         return ""
     r, u = _fitted(pushed)
@@ -122,7 +122,7 @@ def decay(pushed: Pushed) -> Figure:
 
 
 def _fitted(pushed: Pushed) -> tuple[np.ndarray, np.ndarray]:
-    """Radius and mean |u| of the shells in which α is fitted."""
+    """Radius and mean |u| of the shells in the fit of α."""
     inner, outer = pushed.fit
     known = np.isfinite(pushed.profile) & (pushed.profile > 0)
     known &= (pushed.radius >= inner) & (pushed.radius <= outer)

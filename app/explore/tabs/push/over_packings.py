@@ -1,4 +1,4 @@
-"""The paper's Figure 2: critical force and decay exponent against how undetermined forces are."""
+"""The paper's Figure 2: critical force and decay exponent against indeterminacy."""
 
 from collections.abc import Sequence
 
@@ -48,7 +48,7 @@ def responses(own: list[Row]) -> tuple[list[Figure], str, str]:
 
 
 def _lead(study: list[Row]) -> str:
-    """At which μ the critical force is largest, and whether η2 is, too, as HTML."""
+    """The μ of the largest critical force, and whether η2 is largest there too, as HTML."""
     points = statistics.means(study, "critical_force")
     if not points:
         return ""
@@ -61,7 +61,7 @@ def _lead(study: list[Row]) -> str:
 
 
 def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
-    """Lines {name: label} against η2, and μ beside the points of the first."""
+    """Lines {name: label} against η2, with μ next to the points of the first."""
     drawn = []
     for k, (name, label) in enumerate(lines.items()):
         known = [row for row in rows if np.isfinite(row.get(name, np.nan))]
@@ -92,7 +92,7 @@ def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
 
 
 def _own(fig: Figure, rows: list[Row], names: Sequence[str]) -> None:
-    """Open symbols at rows, in the colours of the lines of these names."""
+    """Open symbols at rows, in the colours of the lines with these names."""
     for k, name in enumerate(names):
         known = [row for row in rows if np.isfinite(row.get(name, np.nan))]
         if known:

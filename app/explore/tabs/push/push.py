@@ -1,4 +1,4 @@
-"""Push the disks of a contact apart: limit load, critical force, and how the packing gives way."""
+"""Push the disks of a contact apart: limit load, critical force, and the first motion."""
 
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
@@ -27,11 +27,11 @@ ISOSTATIC = (
     "<b>Without friction, any push moves the packing:</b> it has only as many contacts as "
     "equations (it is isostatic)."
 )
-SCALE = 2.0  # of the largest force, up to which the slider goes at first
+SCALE = 2.0  # of the largest force, initial end of the slider
 
 
 class Shown(NamedTuple):
-    """What the tab says and draws."""
+    """The contents of the tab."""
 
     lead: str
     plots: Iterable[Figure] = ()
@@ -56,8 +56,8 @@ class View(TabView):
         self.lead, self.numbers, self.told = note(), note(), note()
         self.task = state.work.task(told=False)
         self.loads: LimitLoads | None = None
-        self.pushed: tuple[Pushed, int, Replay] | None = None  # of which contact of which packing
-        self.gave = False  # whether the push has come to where disks move
+        self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
+        self.gave = False  # whether the push has reached the load at which disks move
         self._shown: Replay | None = None
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
@@ -85,7 +85,7 @@ class View(TabView):
         )
 
     def update(self) -> None:
-        """Show what is chosen; what is not known yet waits for a hand, but for Fig. 2."""
+        """Show the selection; unknown results wait for a push, except Fig. 2."""
         what, replay = self.what.value, self.state.replay
         if replay is not self._shown:
             self._shown, self.loads = replay, None
@@ -113,7 +113,7 @@ class View(TabView):
 
     @property
     def contact(self) -> int | None:
-        """What is pushed: the selected contact, or a strong one near the middle."""
+        """The contact to push: the selected one, or a strong one near the centre."""
         replay, chosen = self.state.replay, self.looks.contact
         return replay.invited if chosen is None and replay is not None else chosen
 
@@ -125,7 +125,7 @@ class View(TabView):
     # One contact
 
     def _push(self) -> None:
-        """The slider was moved: find out how far it goes."""
+        """The slider was moved: compute its end."""
         state, contact, replay = self.state, self.contact, self.state.replay
         if contact is None or replay is None or self.what.value != "one":
             return
@@ -155,7 +155,7 @@ class View(TabView):
         return Shown(lead, [one_contact.decay(found)], numbers, text)
 
     def _animate(self, *events: Any) -> None:
-        """The first motion goes to and fro on the packing while this tab is seen."""
+        """Animate the first motion to and fro on the packing while this tab is visible."""
         shown = self.visible and self.what.value == "one" and self.animate.value and self.gave
         field = self.pushed[0].displacement if shown and self.pushed is not None else None
         if self.state.displacement is not field:
@@ -199,7 +199,7 @@ class View(TabView):
 
 
 def path(pushed: Pushed) -> dict[str, Any]:
-    """Networks under growing loads as the slider takes them: flat arrays, forces in ⟨f_n⟩."""
+    """Networks under growing loads for the slider: flat arrays, forces in ⟨f_n⟩."""
     return {
         "values": pushed.loads,
         "normal": pushed.states[..., 0].astype(np.float32).ravel(),

@@ -1,4 +1,4 @@
-"""The picture of a photoelastic frame: grains, force chains with their errors, marks and scales."""
+"""The picture of a photoelastic frame: grains, force chains with errors, marks and scales."""
 
 from typing import Any
 
@@ -26,19 +26,19 @@ WORDS = {
     "measured": "measured; width: fₙ",
     "deviation": "width: inferred fₙ; colour: its difference",
 }
-STRONG = 0.995  # quantile of f_n from which on chains are as wide as they get
+STRONG = 0.995  # quantile of f_n at which chains have their largest width
 WIDEST = 0.5  # that width, in mean radii
-FAINT = 0.01  # of that width, below which nothing is drawn
+FAINT = 0.01  # fraction of that width below which nothing is drawn
 AMBER = "#e69f00"  # suspects: a warning
-SCALE = "scale"  # tag of what is a scale
-QUIET = "#808080"  # scales, read by day and by night
-SAMPLES = (0.5, 1.0, 2.0)  # ⟨f_n⟩, of the scale of widths
+SCALE = "scale"  # tag of scales
+QUIET = "#808080"  # scales, legible by day and by night
+SAMPLES = (0.5, 1.0, 2.0)  # ⟨f_n⟩, in the scale of widths
 Layers = dict[str, list[Any]]  # {one of WORDS: renderers}
 STRIP = 0.08  # height of a line of scales below the grains, in widths of the frame
 
 
 def network(frame: Frame, **options: Any) -> tuple[Figure, Layers]:
-    """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: of it."""
+    """Figure of the frame, and {one of WORDS: renderers} of its layers; options: of the figure."""
     name, title = f"frame{frame.report['frame']}", frame.source.split(": ")[-1]
     fig = figure(
         name, f"{title}, frame {frame.report['frame']}",
@@ -92,7 +92,7 @@ def network(frame: Frame, **options: Any) -> tuple[Figure, Layers]:
 
 
 def dress(fig: Figure, layers: Layers, shown: str, small: bool = False) -> None:
-    """Show one of WORDS in a figure of `network`; small: without what another beside it tells."""
+    """Show one of WORDS in a figure of `network`; small: without what the other figure shows."""
     for name, drawn in layers.items():
         for one in drawn:
             one.visible = name == shown
@@ -132,7 +132,7 @@ def _draw_grains(fig: Figure, frame: Frame) -> None:
 
 
 def _mark(fig: Figure, frame: Frame) -> None:
-    """Suspects, contacts that certainly carry force, and what was mended."""
+    """Mark suspects, contacts that certainly carry force, and repairs."""
     middle = frame.lines.mean(axis=1)
     for label, places, marker, colour in (
         ("suspect", middle[frame.suspects], "triangle", AMBER),
@@ -147,7 +147,7 @@ def _mark(fig: Figure, frame: Frame) -> None:
 
 
 def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
-    """Below the grains: how wide a force is, and how long a length; they zoom with the picture."""
+    """Scales of force and length below the grains, which zoom with the picture."""
     r = frame.r[:, None]
     (left, bottom), (right, _) = (frame.x - r).min(axis=0), (frame.x + r).max(axis=0)
     across = right - left

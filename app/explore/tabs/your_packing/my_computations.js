@@ -1,4 +1,4 @@
-// What was computed here: a name to be typed, what it is, when, how large; to be opened or deleted.
+// Stored computations: name, kind, time, size; to open or delete.
 
 import { ask } from "../../../browser/send.js"
 import { button, made } from "../../../browser/dom.js"
@@ -10,7 +10,7 @@ export function render({ model, view }) {
   const told = root.querySelector(".told"), body = root.querySelector("tbody")
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
-  /** Only a second click deletes. */
+  /** Delete only at a second click. */
   function remove(entry, it) {
     if (it.dataset.sure) return ask(model, view, { delete: entry })
     it.dataset.sure = "yes"

@@ -1,4 +1,4 @@
-"""My computations: what is in the visitor's own cache, to be opened, named or deleted."""
+"""My computations: the visitor's own cache, to open, name or delete entries."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from ....state.app_state import AppState
 
 
 class Mine(Scripted):
-    """A table of what was computed here, the newest first; see my_results.js."""
+    """A table of stored computations, newest first; see my_computations.js."""
 
     rows = param.List(doc="dicts, see my_results.rows; and `here`, whether it is on screen")
 

@@ -1,4 +1,4 @@
-"""A photoelastic frame: measured against inferred forces, the network, and an honest account."""
+"""A photoelastic frame: measured and inferred forces, the network, and a report."""
 
 import html
 from collections.abc import Callable
@@ -30,15 +30,15 @@ SHOWN = {
     "beside": "Both",
     "deviation": "Difference in σ",
 }
-SAVED = "photoelastic_saved"  # of the picture that the buttons save
+SAVED = "photoelastic_saved"  # name of the picture that the buttons save
 TOLD = 12  # contacts that are listed
-PLAYED_MS = 700  # a frame of a series
+PLAYED_MS = 700  # per frame of a series
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
-HALF = WIDE | {"styles": {"flex": "1 1 240px"}, "min_width": 240}  # of two, where they fit
+HALF = WIDE | {"styles": {"flex": "1 1 240px"}, "min_width": 240}  # one of two, if both fit
 
 
 class Frames:
-    """What there is to see of the frames in the files that were dropped, one at a time."""
+    """The frames of the uploaded files, one at a time."""
 
     def __init__(
         self,
@@ -48,9 +48,7 @@ class Frames:
         on_open: Callable[[Frame], object],
         **options: Any,
     ) -> None:
-        """on_open(frame): the frame is wanted as a packing; options: of
-        `photoelastic_frames.infer`.
-        """
+        """on_open(frame): called to open the frame as a packing; options: of `infer`."""
         self.files, self.task, self.options = files, task, options
         self.known = {first.report["frame"]: first}
         self.frame, self.playing = first, 0
@@ -73,7 +71,7 @@ class Frames:
         self._fill(first)
 
     def panel(self) -> list[Any]:
-        """All of it, from above."""
+        """All parts, from the top."""
         return [
             self.player,
             self.found,
@@ -88,7 +86,7 @@ class Frames:
         ]
 
     def _turn(self, number: int) -> None:
-        """Another frame: as it is known, or inferred first, while the player waits."""
+        """Show another frame: from memory, or after inference, while the player waits."""
         if number in self.known:
             self._show(self.known[number])
         elif not self.task.running:
@@ -100,7 +98,7 @@ class Frames:
     def _came(self, frame: Frame) -> None:
         self.known[frame.report["frame"]] = frame
         self._show(frame)
-        if self.player.value not in self.known:  # turned on in the meantime
+        if self.player.value not in self.known:  # changed in the meantime
             self._turn(self.player.value)
         else:
             self.player.direction = self.playing
@@ -123,7 +121,7 @@ class Frames:
         self.stresses.object = stresses(frame)
 
     def _panes(self) -> list[Any]:
-        """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""
+        """The chosen quantities in one or two pictures, styled before they are visible."""
         shown, one = self.choice.value, self.picture
         both = shown == "beside"
         frame_picture.dress(one, self.layers, "inferred" if both else shown, small=both)
@@ -153,7 +151,7 @@ forces held fixed. Intervals, pulls and outlines then show which other forces ba
 
 
 def found(report: dict[str, Any]) -> str:
-    """What was found, kind by kind and line by line, folded up."""
+    """The findings by kind and line, collapsed."""
     if not report["findings"]:
         return ""
     lines = "".join(f"<li>{html.escape(line)}</li>" for line in report["findings"])
@@ -161,7 +159,7 @@ def found(report: dict[str, Any]) -> str:
 
 
 def compared(frame: Frame) -> Figure:
-    """Figure of inferred against measured forces, of the contacts that were measured."""
+    """Figure of inferred against measured forces, for measured contacts."""
     fig = figure("photoelastic_forces", None, "measured / ⟨fₙ⟩", "inferred / ⟨fₙ⟩", height=340)
     seen = np.isfinite(frame.measured).all(axis=1)
     drawn, ends = [], [0.0]
@@ -217,7 +215,7 @@ def listed(frame: Frame) -> str:
 
 
 def stresses(frame: Frame) -> str:
-    """The stress by region as a table, the top of the picture above."""
+    """The stress by region as a table, with the top of the picture above."""
     side = round(len(frame.stress) ** 0.5)
     rows = []
     for b in reversed(range(side)):

@@ -1,4 +1,4 @@
-"""Bring your own packing: drop its files, see what it is, and look at it like any other."""
+"""Bring your own packing: drop its files, read the report, and use it like any other."""
 
 import html
 from typing import Any
@@ -19,7 +19,7 @@ from ....widgets.select import Select
 from . import photoelastic as measured
 from .my_computations import Mine
 
-STATES = 200  # of the walk that is made at once
+STATES = 200  # of the first walk
 HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
@@ -48,7 +48,7 @@ SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 
 
 class View:
-    """Drop files, see the report; the packing is then on the page."""
+    """Drop files and see the report; the packing is then on the page."""
 
     name = "upload"
 
@@ -79,7 +79,7 @@ class View:
         self._ask()
 
     def panel(self) -> pn.Column:
-        """Where to drop, what is asked, and what came."""
+        """The drop area, questions, and results."""
         return pn.Column(
             self.dropper,
             pn.FlexBox(
@@ -92,13 +92,13 @@ class View:
             self.report,
             self.frame,
             note(HELP),
-            # On a server for all it would show all theirs.
+            # On a shared server it would show the computations of all visitors.
             *([] if LIMITS.shared else [Mine(self.state)]),
             sizing_mode="stretch_width",
         )
 
     def _ask(self) -> None:
-        """Show the fields that the files at hand need."""
+        """Show the fields that these files need."""
         kind = uploads.family(self.files) if self.files else None
         self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
         self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
@@ -107,7 +107,7 @@ class View:
 
     def _dropped(self, new: list[tuple[str, bytes]]) -> None:
         self._refuse("")
-        self._clear()  # what was dropped before
+        self._clear()  # earlier files
         try:
             self.files = uploads.added(self.files, new)
         except InputError as error:
@@ -161,7 +161,7 @@ class View:
     def _show(
         self, brought: uploads.Brought, frame: photoelastic_frames.Frame | None = None
     ) -> None:
-        """Report, and put the packing on the page; its walk is computed at once."""
+        """Report, and open the packing; its walk is computed at once."""
         rows = "".join(
             ROW.format(*map(html.escape, row)) for row in uploads.report_rows(brought.report)
         )
@@ -171,13 +171,13 @@ class View:
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
 
     def _compare(self, frame: photoelastic_frames.Frame) -> None:
-        """Measured beside inferred forces."""
+        """Compare measured and inferred forces."""
         options = self._options()
         shown = measured.Frames(frame, dict(self.files), self.task, self.open, **options)
         self.frame[:] = shown.panel()
 
     def open(self, frame: photoelastic_frames.Frame) -> None:
-        """Put a frame on the page, as a packing like any other."""
+        """Open a frame as a packing like any other."""
         if self.task.running:
             return
         packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"
@@ -191,7 +191,7 @@ class View:
         self.frame[:] = []
 
     def _wait(self, line: str) -> None:
-        """Say what is still to be given; nothing where all is there."""
+        """Say what is still missing; empty if nothing is."""
         self.waiting.param.update(title=line, visible=bool(line))
 
     def _refuse(self, line: str) -> None:
