@@ -28,7 +28,7 @@ class StatusLine(Progress):
         super().__init__(*tasks, knowledge.task, knowledge.ranking, **params)
         self._state = state
         self._rest: tuple[Cell, bool] | None = None  # whether it is certified
-        self._looking = work.task(reading, told=False)
+        self._looking = work.task(reading, reported=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
         state.param.watch(self._look, "cell")
         work.param.watch(self._fail, "message")

@@ -144,7 +144,7 @@ class Knowledge(param.Parameterized):
     def __init__(self, state: Any) -> None:
         super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.work = state, state.work
-        self.task, self.ranking = self.work.task(told=False), self.work.task()
+        self.task, self.ranking = self.work.task(reported=False), self.work.task()
         self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
         self.param.watch(self._follow, "known")
         state.param.watch(self._follow, "replay")

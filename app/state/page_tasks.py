@@ -48,13 +48,13 @@ class Work(param.Parameterized):
         elif next(pieces, "end") != "end":
             self._wake(partial(self.piecewise, pieces))
 
-    def task(self, pool: Pool = computing, *, told: bool = True) -> Task:
+    def task(self, pool: Pool = computing, *, reported: bool = True) -> Task:
         """A new Task of this page: work off the event loop, ended when the page is closed.
 
-        told: whether the page reports its errors; otherwise the caller does.
+        reported: whether the page reports its errors; otherwise the caller does.
         """
         task = Task(pool, self._wake, self._visitor)
-        if told:
+        if reported:
             task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")
         self.tasks.append(task)

@@ -54,7 +54,7 @@ class TabView:
 
     name: str
     update: Callable[[], None]
-    told: pn.pane.HTML  # the place of notes
+    details: pn.pane.HTML  # the place of notes
 
     def __init__(
         self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
@@ -84,7 +84,7 @@ class TabView:
     def failed(self, event: Any) -> None:
         """Show the error of a task whose message is watched."""
         if event.new:
-            self.told.object = event.new
+            self.details.object = event.new
 
     def _changed(self, *events: Any) -> None:
         self._stale |= any(event.name not in ("tab", "wide") for event in events)

@@ -55,7 +55,7 @@ def _no_file(path: str) -> bool:
 class Unused(NamedTuple):
     """Options that have no effect in one form of a command."""
 
-    said: str  # that form in words: "with --packing"
+    words: str  # that form in words: "with --packing"
     holds: Callable[[argparse.Namespace], bool]  # whether a command line has that form
     names: frozenset[str]  # options, as attributes
 
@@ -89,13 +89,13 @@ class Parser(argparse.ArgumentParser):
         }
 
     def leaves_out(
-        self, said: str, holds: Callable[[argparse.Namespace], bool], names: Iterable[str]
+        self, words: str, holds: Callable[[argparse.Namespace], bool], names: Iterable[str]
     ) -> None:
         """Reject these options (attributes) in command lines for which holds(arguments) is true."""
         names = frozenset(names)
         if strange := names - self.options.keys():
             raise KeyError(f"{self.prog} has no option {min(strange)!r}")
-        self.unused.append(Unused(said, holds, names))
+        self.unused.append(Unused(words, holds, names))
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
@@ -110,7 +110,7 @@ class Parser(argparse.ArgumentParser):
                 if useless := [typed for name, typed in given.items() if name in way.names]:
                     have, them = ("has", "it") if len(useless) == 1 else ("have", "them")
                     self.error(
-                        f"{' and '.join(useless)} {have} no effect {way.said}; leave {them} out"
+                        f"{' and '.join(useless)} {have} no effect {way.words}; leave {them} out"
                     )
         return found, unknown
 

@@ -62,7 +62,7 @@ class Listing(NamedTuple):
     lines: tuple[Integers, Integers]  # (N,), (k,): their line numbers
     both_ways: bool  # whether two lines of one contact are independent measurements
     frame: float
-    said: str  # the recognised columns, in words
+    description: str  # the recognised columns, in words
 
     def place(self, kind: int, row: SupportsIndex) -> str:
         """'file, line n' of a grain (kind 0) or a contact (1)."""
@@ -94,7 +94,7 @@ class Columns(NamedTuple):
     name: str  # file name
     values: dict[str, Floats]  # {column: (rows,)}
     lines: Integers  # (rows,) line numbers
-    said: str
+    description: str
 
     @property
     def frames(self) -> Floats:
@@ -113,7 +113,9 @@ class Columns(NamedTuple):
     def with_frames(self, frame: Floats | Integers) -> Columns:
         """The same with a column for the frame (rows,), derived from ids."""
         values = self.values | {"frame": np.asarray(frame, dtype=np.float64)}
-        return self._replace(values=values, said=f"{self.said}, frames told apart by the ids")
+        return self._replace(
+            values=values, description=f"{self.description}, frames told apart by the ids"
+        )
 
 
 class TextFrames(NamedTuple):
@@ -167,7 +169,7 @@ class TextFrames(NamedTuple):
             lines=(grains.lines, contacts.lines),
             both_ways=False,
             frame=float(frame),
-            said=f"{grains.said}; {contacts.said}",
+            description=f"{grains.description}; {contacts.description}",
         )
 
 
@@ -354,8 +356,8 @@ def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[s
         and len(np.unique(numbers[:, 0])) == 1 < len(numbers)
     ):
         raise InputError(
-            f"{name}: the third of five columns is 0 throughout, which names no grain; where the "
-            "second grain is named is not told: name the columns (--columns i=…,j=…,ft=…,fn=…)"
+            f"{name}: the third of five columns is 0 throughout, so the column of "
+            "the second grain is unknown: name the columns (--columns i=…,j=…,ft=…,fn=…)"
         )
     if found is None:
         raise InputError(

@@ -197,7 +197,7 @@ def read_pegs(
     first = len(listed.pairs)
     report = {
         "frame": plain(listing.frame),
-        "columns": listing.said,
+        "columns": listing.description,
         **({"names": renamed} if renamed else {}),
         "grains": len(r),
         **ignored,

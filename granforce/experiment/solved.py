@@ -209,7 +209,7 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
         lines=(np.arange(1, count + 1), owner + 1),
         both_ways=True,
         frame=number,
-        said=f"{name}: struct array particle with {description}",
+        description=f"{name}: struct array particle with {description}",
     )
 
 

@@ -145,7 +145,7 @@ def synthetic_frame(
         lines=(np.arange(1, count + 1), np.arange(1, len(ends) + 1)),
         both_ways=True,
         frame=float(whole(number, "number")),
-        said="synthetic frame",
+        description="synthetic frame",
     )
     true = np.column_stack([c.i, c.j])[inside] + 1.0
     return SyntheticFrame(listing, true, forces[inside], unit)

@@ -174,8 +174,8 @@ def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
 
 def needs_no_program(ensemble: Ensemble, system: System) -> bool:
     """Whether everything is `determined`; checked only if S has no interior or forces are known."""
-    asked = ensemble.known is not None or not system.middle.reached
-    return asked and ensemble.is_determined
+    checked = ensemble.known is not None or not system.middle.reached
+    return checked and ensemble.is_determined
 
 
 def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
@@ -204,7 +204,7 @@ def _intervals(
     ensemble: Ensemble, places: Integers, bounds: Bounds, counts: dict[str, int]
 ) -> Intervals:
     keys = itertools.product((int(c) for c in places), (0, 1), (0, 1))
-    attained, gap = (one.reshape(-1, 2, 2) for one in told(bounds, list(keys)))
+    attained, gap = (one.reshape(-1, 2, 2) for one in values_and_gaps(bounds, list(keys)))
     value = attained * [1.0, -1.0]
     if ensemble.mu == 0:
         value[:, 1], gap[:, 1] = 0.0, 0.0
@@ -250,13 +250,15 @@ def limit_load_bounds(
     # For each contact: maximise F, with f_n + F and f_t acting on the grains.
     bounds = solver.solve(keys, [Program([], [], key) for key in keys])
     bounds |= {place: (0.0, 0.0) for place in places if not met[place]}
-    attained, gap = told(bounds, places)
+    attained, gap = values_and_gaps(bounds, places)
     load = np.where(gap <= INTERVAL_GAP, -attained * ensemble.force_scale, np.nan)
     load[~met[places]] = np.inf
     return LimitLoads(ensemble.index[places], load, gap, *_judged(gap), solver.counts)
 
 
-def told(bounds: dict[Any, tuple[float, float]], keys: Sequence[Any]) -> tuple[Floats, Floats]:
+def values_and_gaps(
+    bounds: dict[Any, tuple[float, float]], keys: Sequence[Any]
+) -> tuple[Floats, Floats]:
     """Values attained and duality gaps (k,) of keys; NaN for unfinished programs."""
     none = np.nan, np.nan
     both = np.array([bounds.get(key, none) for key in keys]).reshape(-1, 2)

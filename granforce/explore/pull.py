@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
-from granforce.explore.intervals import determined, needs_no_program, solved, told
+from granforce.explore.intervals import determined, needs_no_program, solved, values_and_gaps
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
@@ -205,7 +205,7 @@ def reach(
         found = solved(ensemble, Solver(system, workers=workers), keys, points)
         cancelling.check("exact interval")
         states = np.stack([_balanced(ensemble, points[key]) for key in keys])
-    attained, gap = told(found, keys)
+    attained, gap = values_and_gaps(found, keys)
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
     if not np.all(ensemble.admits(states)):

@@ -275,11 +275,11 @@ def _check_same(previous: UniformSample, chains: int, seed: int, method: str) ->
         "seed": (streams.entropy, seed),
         "method": (previous.method, method),
     }
-    for name, (had, asked) in drawn.items():
-        if had != asked:
+    for name, (former, requested) in drawn.items():
+        if former != requested:
             raise InputError(
-                f"the sample to continue was drawn with {name} = {brief(had)}, not {brief(asked)}; "
-                "give the same arguments"
+                f"the sample to continue was drawn with {name} = {brief(former)}, "
+                f"not {brief(requested)}; give the same arguments"
             )
 
 

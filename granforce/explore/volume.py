@@ -262,7 +262,7 @@ def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
     step = 0.5 * -np.diff(betas)
     sums, variance = np.zeros(2), np.zeros((2, len(betas)))
     for number, both in enumerate(zip(*rungs, strict=True)):
-        told = []
+        samples = []
         for way, rung in enumerate(both):
             influence = np.zeros(len(rung.q))
             for k, sign in ((number, 1.0), (number - 1, -1.0)):
@@ -270,9 +270,9 @@ def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
                     log, weight = _log_mean(sign * step[k] * rung.q)
                     sums[way] += 0.5 * sign * log
                     influence += 0.5 * sign * weight
-            told.append((influence, _controls(rung.x)))
-        slopes = [np.linalg.lstsq(x, one - one.mean(), rcond=None)[0] for one, x in told]
-        for way, (influence, x) in enumerate(told):
+            samples.append((influence, _controls(rung.x)))
+        slopes = [np.linalg.lstsq(x, one - one.mean(), rcond=None)[0] for one, x in samples]
+        for way, (influence, x) in enumerate(samples):
             known = x @ slopes[1 - way]
             sums[way] -= known.mean()
             parts = np.array([part.mean() for part in np.array_split(influence - known, _BATCHES)])

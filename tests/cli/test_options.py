@@ -159,7 +159,7 @@ def test_every_command_and_every_way_has_a_line():
         given = [parsed(command, line) for line in LINES[command]]
         for way in one.unused:
             held = {bool(way.holds(arguments)) for arguments in given}
-            assert held == {True, False}, (command, way.said)
+            assert held == {True, False}, (command, way.words)
 
 
 @pytest.mark.parametrize("command, line", CASES)
@@ -180,7 +180,7 @@ def _typed(action):
 
 
 WAYS = [
-    (command, line, way.said)
+    (command, line, way.words)
     for command, line in CASES
     for way in PARSERS[command].unused
     if way.holds(parsed(command, line))
@@ -190,7 +190,7 @@ WAYS = [
 @pytest.mark.parametrize("command, line, said", WAYS)
 def test_what_is_not_used_is_refused(command, line, said, capsys):
     one = PARSERS[command]
-    (way,) = (way for way in one.unused if way.said == said)
+    (way,) = (way for way in one.unused if way.words == said)
     for action in one._actions:
         if action.dest in way.names and action.option_strings:
             words = [*command.split(), *shlex.split(line), *_typed(action)]

@@ -196,7 +196,7 @@ def test_a_third_column_of_zeros_is_a_flag(made, taken):
     """No grain is in every contact."""
     grains, rows = made
     same(read(grains, [[row[1], row[2], 0, row[3], row[4]] for row in rows]), taken)
-    with pytest.raises(InputError, match="0 throughout, which names no grain"):
+    with pytest.raises(InputError, match="0 throughout, so the column of the second"):
         read(grains, [[1, row[1], 0, row[3], row[4]] for row in rows])
 
 

@@ -76,7 +76,7 @@ def test_columns_are_recognised(flag, separator, numbered, header):
     assert np.array_equal(found.flag != 0, [row[5] != 0 and flag for row in grains])
     assert np.array_equal(found.ends, [row[1:3] for row in rows])
     assert np.allclose(found.forces, [[row[4], row[3]] for row in rows])
-    assert "radius" in found.said and "tangential" in found.said
+    assert "radius" in found.description and "tangential" in found.description
 
 
 def made(text):

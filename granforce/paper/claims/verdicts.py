@@ -156,7 +156,9 @@ def _turns(turned: Any, verdict: str) -> str:
     for other in sorted(set(turned.values()) - {verdict}):
         if turned[None] == other:
             why.append(f"{other} with another draw of packings")
-        left_out = [f"{mu:g}" for mu, told in turned.items() if mu is not None and told == other]
+        left_out = [
+            f"{mu:g}" for mu, direction in turned.items() if mu is not None and direction == other
+        ]
         if len(left_out) > MOST_NAMED:
             why.append(f"{other} without any one of {len(left_out)} μ")
         elif left_out:

@@ -102,7 +102,7 @@ def test_the_outline_holds_the_path_and_is_kept(state):
     path = np.stack([view.drawing.path.data["x"], view.drawing.path.data["y"]], axis=1)
     merged = np.concatenate([corners, path])
     assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
-    assert "linear programs" in view.told.object
+    assert "linear programs" in view.details.object
     assert len(state.library.cache.find("outline")) == 1
 
 
@@ -131,7 +131,7 @@ def test_a_point_has_no_outline(state):
     state.looks.tab = "plane"
     view = plane_view.View(state)
     wait_for(state)
-    assert "one point" in view.told.object and not len(view.drawing.outer.data["x"])
+    assert "one point" in view.details.object and not len(view.drawing.outer.data["x"])
 
 
 def test_planes_of_unknown_contacts_are_refused(state):
@@ -408,7 +408,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     points = statistics.means(study_data.rows("walk"), "eta2")
     mu, value, _ = max(points, key=lambda point: point[1])
     assert f"μ = {mu:g}: η₂ = {value:.3f}" in view.first.object
-    told = view.told.object
+    told = view.details.object
     assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
@@ -660,7 +660,7 @@ def test_figure_2_takes_what_the_stores_hold(state):
     view = perturb_view.View(state)
     view.what.value = "store"
     wait_for(state)
-    assert "open symbols: 2 packings" in view.told.object and len(view.plots.objects) == 2
+    assert "open symbols: 2 packings" in view.details.object and len(view.plots.objects) == 2
     force = view.plots.objects[0].object
     drawn = [r.data_source.data for r in force.renderers]
     rings = [np.asarray(d["x"]) for d in drawn if "x" in d and len(d["x"]) == 2]

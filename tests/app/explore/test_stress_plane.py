@@ -25,14 +25,14 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
     view = View(state)
     view.planes.value = "stress"
     state.looks.tab = view.name
-    wait_for(state, lambda: "shear" in view.told.object)
+    wait_for(state, lambda: "shear" in view.details.object)
     corners = np.stack([view.drawing.outer.data["x"], view.drawing.outer.data["y"]], axis=1)
     path = np.stack([view.drawing.path.data["x"], view.drawing.path.data["y"]], axis=1)
     merged = np.concatenate([corners, path])
     assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
     (entry,) = state.library.cache.find("stress")
     friction = state.library.cache[entry.name]["friction"].item()
-    assert f"{friction:.3f}" in view.told.object
+    assert f"{friction:.3f}" in view.details.object
     assert "σ" in view.drawing.figure.xaxis.axis_label and view.drawing.figure.match_aspect
     state.looks.contact = 4  # the same plane
     assert not view.task.running and len(view.drawing.outer.data["x"])
@@ -43,7 +43,7 @@ def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
     hand, state.hand.tell = state.hand, told.append
     view.planes.value = "stress"
     state.looks.tab = view.name
-    wait_for(state, lambda: "shear" in view.told.object)
+    wait_for(state, lambda: "shear" in view.details.object)
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value)
     wait_for(state)

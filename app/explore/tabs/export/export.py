@@ -142,9 +142,12 @@ class View:
 
     def __init__(self, state: AppState) -> None:
         self.state = state
-        self.task, self.making = state.work.task(reading, told=False), state.work.task(told=False)
+        self.task, self.making = (
+            state.work.task(reading, reported=False),
+            state.work.task(reported=False),
+        )
         self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
-        self.told = note()
+        self.details = note()
         for task in (self.task, self.making):
             task.param.watch(self._follow, "message")
         self.making.param.watch(self._rest, "running")
@@ -154,16 +157,16 @@ class View:
         return pn.Column(
             self.buttons,
             Progress(self.making, self.task),
-            self.told,
+            self.details,
             note(HELP),
             sizing_mode="stretch_width",
         )
 
     def _asked(self, key: str) -> None:
         state, kind = self.state, KINDS[key]
-        self.told.object = ""
+        self.details.object = ""
         if state.replay is None:
-            self.told.object = "Nothing is on screen yet."
+            self.details.object = "Nothing is on screen yet."
             self.buttons.rest()
         elif kind.make is None:
             name = f"{stem(state.cell.selection)}.{key}"
@@ -179,7 +182,7 @@ class View:
 
     def _follow(self, event: Any) -> None:
         if event.new:
-            self.told.object = event.new
+            self.details.object = event.new
 
 
 def all_states(library: Library, cell: Cell, job: Job) -> xr.Dataset:

@@ -24,13 +24,13 @@ def panel(state: AppState) -> Any:
     def refuse(line: str) -> None:
         state.work.message = line
 
-    def asked(kind: str) -> None:
+    def make(kind: str) -> None:
         if state.replay is None:
             return buttons.rest()
         name = f"{stem(state.cell.selection)}_figure.{kind}"
         buttons.hand_over_picture(name, caption(state), width.value)
 
-    buttons = Handover(asked, files=FILES, margin=(4, 10, -8, 10))
+    buttons = Handover(make, files=FILES, margin=(4, 10, -8, 10))
     width = NumberField(
         refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
         margin=(0, 10, 4, 10),

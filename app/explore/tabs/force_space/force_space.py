@@ -38,9 +38,12 @@ class View(TabView):
         aspect = WIDE_ASPECT if self.looks.wide else ASPECT
         self.drawing = SpaceFigure(self.name, aspect, self._choose)
         self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
-        self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
+        self.task, self.placing = (
+            state.work.task(reported=False),
+            state.work.task(reading, reported=False),
+        )
         self.others = OtherStates(state, self._show_others)
-        self.lead, self.finding, self.told = note("Placing the networks …"), note(), note()
+        self.lead, self.finding, self.details = note("Placing the networks …"), note(), note()
         for task in (self.placing, self.task):
             task.param.watch(self.failed, "message")
         self.planes.param.watch(self.refresh, "value")
@@ -59,7 +62,7 @@ class View(TabView):
             self.planes,
             self.finding,
             Progress(self.placing, self.task),
-            self.told,
+            self.details,
             self.others.switch,
             self.others.progress,
             **wide,
@@ -88,7 +91,7 @@ class View(TabView):
             self._placed(replay, self._components(replay))
         except InputError as error:
             self._clear()
-            self.told.object = str(error)
+            self.details.object = str(error)
 
     @property
     def kind(self) -> str:
@@ -113,7 +116,7 @@ class View(TabView):
         states = following.states() if following and state.work.fourfold else None
         if kind == "principal" and following and states is None:
             self._clear()  # too few for axes
-            self.told.object = COMING
+            self.details.object = COMING
             return
 
         def place(job: Job) -> Plane:
@@ -135,10 +138,10 @@ class View(TabView):
             return
         self._show(replay, plane)
         if state.growing:
-            self.told.object = GROWS
+            self.details.object = GROWS
             return
         if replay.summary["dimension"] == 0:
-            self.told.object = ONE_POINT
+            self.details.object = ONE_POINT
             return
         work = planes.outline(state.library, state.cell, replay, plane)
         self.task.start(work, lambda found: self._outlined(replay, found))
@@ -172,7 +175,7 @@ class View(TabView):
         self.drawing.show(plane, self._path(replay, plane), frame)
         self._title()
         self.drawing.draw_cone(plane, replay.summary["mu"], 1.05 * float(plane.path[:, 0].max()))
-        self.told.object = self.finding.object = ""
+        self.details.object = self.finding.object = ""
         self.found = None
         self._show_others()
         self.lead.object = sentences.lead(replay, plane, outlined=False)
@@ -215,14 +218,14 @@ class View(TabView):
     def _tell(self, found: Outlined) -> None:
         """Report how much of the outline the states reach."""
         if found.plane.kind == planes.STRESS:
-            self.told.object = sentences.stresses(found)
+            self.details.object = sentences.stresses(found)
             return
         replay, others, called = self.state.replay, np.empty((0, 2)), ""
         if self.others.replay is not None:
             others = np.column_stack([self.drawing.beside.data[name] for name in "xy"])
             called = MARKED[self.others.kind]
         self.finding.object = sentences.finding(found, replay, others, called)
-        self.told.object = folded(sentences.computed(found, replay))
+        self.details.object = folded(sentences.computed(found, replay))
 
 
 def _loosest(replay: Replay) -> int:

@@ -54,7 +54,7 @@ class View(TabView):
         super().__init__(state, "replay", "exact", "catalogue")
         self.task = state.work.task(reading)
         self.first = note("Reading and drawing Figures 1, 4 and 6 …")
-        self.fourth, self.sixth, self.told = note(), note(), note()
+        self.fourth, self.sixth, self.details = note(), note(), note()
         self.figures = [pn.Column(**WIDE) for _ in range(3)]
         self.folded = [pn.Column(**WIDE) for _ in THIS]
         self.indeterminacy: Indeterminacy | None = None
@@ -72,7 +72,7 @@ class View(TabView):
         self.looks.keep_active(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
             Progress(self.task), self.first, first, self.fourth, fourth, self.sixth,
-            sixth, folds, self.told, **WIDE,
+            sixth, folds, self.details, **WIDE,
         )  # fmt: skip
 
     def update(self) -> None:
@@ -102,7 +102,7 @@ class View(TabView):
             self.correlations.drawn.choosable(self._choose)
             self.figures[2].objects = [plotted(self.correlations.drawn.figure)]
             self.sixth.object = self.correlations.sentence()
-            self.told.object = _claims()
+            self.details.object = _claims()
         self.correlations.mark(rows.own, rows.exact, rows.here)
         yield
         self._show_packing(replay, rows)

@@ -53,7 +53,7 @@ class View(TabView):
             question("Unit", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
-        self.lead, self.told = note("Opening the packing …"), note()
+        self.lead, self.details = note("Opening the packing …"), note()
         self.exact.on_click(lambda event: state.compute_exact())
         state.knowledge.param.watch(self.refresh, ["narrowed", "known"])
         state.param.watch(self._offer, ["seen", "exact"])

@@ -36,7 +36,7 @@ class Shown(NamedTuple):
     lead: str
     plots: Iterable[Figure] = ()
     numbers: str = ""
-    told: str = ""  # small print
+    details: str = ""  # small print
 
 
 class View(TabView):
@@ -53,8 +53,8 @@ class View(TabView):
             label="animate the first motion", value=True, size="small", margin=(4, 10)
         )
         self.plots = pn.Column(sizing_mode="stretch_width")
-        self.lead, self.numbers, self.told = note(), note(), note()
-        self.task = state.work.task(told=False)
+        self.lead, self.numbers, self.details = note(), note(), note()
+        self.task = state.work.task(reported=False)
         self.loads: LimitLoads | None = None
         self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
         self.gave = False  # whether the push has reached the load at which disks move
@@ -80,7 +80,7 @@ class View(TabView):
             self.numbers,
             self.animate,
             self.plots,
-            self.told,
+            self.details,
             **wide,
         )
 
@@ -118,7 +118,7 @@ class View(TabView):
         return replay.invited if chosen is None and replay is not None else chosen
 
     def _show(self, shown: Shown) -> None:
-        self.lead.object, self.told.object = shown.lead, shown.told
+        self.lead.object, self.details.object = shown.lead, shown.details
         self.numbers.object = shown.numbers
         self.plots.objects = [plotted(fig) for fig in shown.plots]
 
@@ -149,7 +149,7 @@ class View(TabView):
         found = None if self.pushed is None else self.pushed[0]
         lead = one_contact.sentence(replay, contact, found, held)
         if found is None:
-            return Shown(lead, told=folded(one_contact.COMPUTED))
+            return Shown(lead, details=folded(one_contact.COMPUTED))
         text = one_contact.decay_sentence(found) + folded(one_contact.COMPUTED)
         numbers = one_contact.table(replay, contact, found)
         return Shown(lead, [one_contact.decay(found)], numbers, text)
@@ -179,7 +179,7 @@ class View(TabView):
             return Shown(all_contacts.ASKED + note_of_held)
         self.loads.mark(self.looks.contact)
         lead = self.loads.sentence() + note_of_held
-        return Shown(lead, [self.loads.figure], told=folded(self.loads.computed()))
+        return Shown(lead, [self.loads.figure], details=folded(self.loads.computed()))
 
     def _choose(self, contact: int) -> None:
         self.looks.contact = contact
@@ -217,6 +217,6 @@ def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job
         job.begin("drawing")
         drawn, lead, text = responses(found)
         table = claims.claims("store", "The paper's claims and the results", opened=True)
-        return Shown(lead, drawn, told=text + table)
+        return Shown(lead, drawn, details=text + table)
 
     return work

@@ -55,7 +55,7 @@ class View:
     def __init__(self, state: AppState) -> None:
         self.state = state
         self.files: uploads.Files = {}
-        self.task = state.work.task(told=False)
+        self.task = state.work.task(reported=False)
         self.dropper = Dropper(
             self._dropped,
             self._refuse,
