@@ -3,13 +3,16 @@
 import re
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import panel as pn
 from bokeh.document import Document
 from panel.custom import JSComponent
 
 from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
+from .panel_patches import once_there
 
 APP = Path(__file__).resolve().parents[1]
 SHARED = Path(__file__).with_name("shared.css").read_text()  # shared by all styles
@@ -108,4 +111,5 @@ class Scripted(JSComponent):
             self._heard(message)
 
     def _handle_msg(self, data: Any) -> None:
-        self.hear(data)
+        # An answer may change parameters, which would be lost on a page in transit.
+        once_there(pn.state.curdoc, partial(self.hear, data))

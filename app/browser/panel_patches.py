@@ -119,6 +119,14 @@ def in_transit(document: Document) -> bool:
     return not pn.state.loaded and session is not None and session.connection_count > 0
 
 
+def once_there(document: Document | None, function: Callable[[], object]) -> None:
+    """Call a function now or, if its page is in transit, as soon as the page has arrived."""
+    if document is None or not in_transit(document):
+        function()
+    else:  # in the turn after: Panel counts the page as loaded when all that waits for it was called
+        pn.state.onload(lambda: document.add_next_tick_callback(function))
+
+
 def unseen_ms(context: Any) -> float:
     """Time in ms without a browser connected to a page's session; 0 while one is connected."""
     session = None if context is None else context.session

@@ -102,8 +102,7 @@ def explore_page(document: Document, query: str) -> Any:
     packing = PackingView(state)
     Stream(state, packing.player, document)
     hears, state.hand.tell = packing.player.hears, packing.player.tell
-    # The page reports its width while it loads, before it can receive an answer.
-    hears["wide"] = lambda wide: wake(partial(looks.param.update, wide=wide))
+    hears["wide"] = lambda wide: looks.param.update(wide=wide)
     hears["keep"] = lambda keep: state.keep_all()
     hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
     side = pn.Column(packing.player, css_classes=["side"], **WIDE)

@@ -10,7 +10,7 @@ from tornado.ioloop import IOLoop
 
 from ..background import gc_pauses
 from ..background.jobs import Visitor
-from ..browser.panel_patches import in_transit, together, unseen_ms
+from ..browser.panel_patches import in_transit, once_there, together, unseen_ms
 from ..results.library import Library
 from .page_tasks import Work
 
@@ -42,28 +42,17 @@ def at_end(close: Callable[[], object]) -> None:
 
 def turns(document: Document) -> Callable[[Callable[[], object]], None]:
     """wake(function): call it soon on the page's thread, when its changes can be sent."""
-    waiting: list[Callable[[], object]] = []
     loop = IOLoop.current()
 
-    def run(function: Callable[[], object]) -> None:
-        if in_transit(document):
-            waiting.append(function)
-        else:
-            together(function)
-
     def come(function: Callable[[], object]) -> None:
+        call = partial(together, function)
         if document.session_context is not None:  # otherwise the page has ended
-            document.add_next_tick_callback(partial(run, function))
+            document.add_next_tick_callback(partial(once_there, document, call))
 
     def wake(function: Callable[[], object]) -> None:
         # From any thread; the page can end at any time except within a turn of the loop.
         loop.add_callback(come, function)
 
-    def arrived() -> None:
-        while waiting:
-            wake(waiting.pop(0))
-
-    pn.state.onload(arrived)
     return wake
 
 

@@ -106,7 +106,6 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     searched(page, "~")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""
