@@ -127,6 +127,7 @@ class _Around:
             door="explore", dark=state.looks.dark, keys=KEYS, css_classes=["header-row"], **WIDE
         )
         self.header.link(state.looks, dark="dark")
+        self.address = Address(state)  # before anything can be asked for
         self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
         self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
         self.panels = pn.Column(css_classes=["panels"], **WIDE)
@@ -151,6 +152,6 @@ class _Around:
         yield
         yield from tabs.filling(state.looks.tab)
         yield from tabs.beside(self.space)
-        self.panels.extend([Address(state), Hints()])
+        self.panels.extend([self.address, Hints()])
         explanation.follow(state, self.header)
         state.read_ahead()

@@ -4,11 +4,10 @@
 import { ask } from "../browser/send.js"
 import { goneBanner } from "../browser/connection_lost.js"
 
-const RETURN_MS = 20000 // within which a view in the history appears
-
 export function render({ model, view }) {
   const banner = goneBanner(view, "What is in the page still plays.")
-  let goal = null
+  let asked = model.settled // how many views were gone back to
+  const waits = () => asked > model.settled // meanwhile the address is ahead of the view
 
   /** A query without the parameters that Back ignores. */
   function lasting(query) {
@@ -18,24 +17,24 @@ export function render({ model, view }) {
   }
 
   function write() {
-    const { query } = model, now = window.location.search
-    if (goal === query) goal = null
-    if (goal !== null || !query || query === now) return
-    const known = new URLSearchParams(now).has("mu") // otherwise the page has just opened
-    const step = known && lasting(query) !== lasting(now)
-    window.history[step ? "pushState" : "replaceState"](null, "", query)
+    const { query } = model
+    if (!query || waits()) return
+    const put = (how, view) => window.history[how](null, "", view)
+    // Opened without a view the address gets the first one, even if another has been asked for meanwhile.
+    if (!new URLSearchParams(window.location.search).has("mu")) put("replaceState", model.first)
+    const now = window.location.search
+    if (query !== now) put(lasting(query) === lasting(now) ? "replaceState" : "pushState", query)
   }
 
   function returned() {
-    const asked = window.location.search
-    if (lasting(asked) === lasting(model.query)) return
-    goal = asked
-    ask(model, view, { query: asked })
-    setTimeout(() => { if (goal === asked) { goal = null; write() } }, RETURN_MS)
+    const query = window.location.search
+    if (!waits() && lasting(query) === lasting(model.query)) return
+    asked++
+    ask(model, view, { query })
   }
 
   window.addEventListener("popstate", returned)
-  model.on("query", write)
+  model.on(["query", "settled"], write)
   model.on("remove", () => window.removeEventListener("popstate", returned))
   write()
   return banner

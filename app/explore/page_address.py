@@ -18,6 +18,8 @@ class Address(Scripted):
     """
 
     query = param.String(doc="of the address, as the state has it")
+    first = param.String(doc="the query of the first view")
+    settled = param.Integer(doc="how many views that were gone back to are on screen, or refused")
     passing = param.List(
         default=[key(name) for name in PASSING],
         doc="what changes the address but is not gone back to",
@@ -25,7 +27,8 @@ class Address(Scripted):
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
-        self._state = state
+        self._state, self._asked = state, 0
+        state.work.reader.param.watch(self._settle, "running")
         state.param.watch(self._tell, "selection")
         for part in state.parts:
             part.param.watch(self._tell, [name for name in VIEW if name in part.param])
@@ -33,8 +36,15 @@ class Address(Scripted):
 
     def _tell(self, *events: Any) -> None:
         if self._state.cell is not None:
-            self.query = f"?{self._state.link()}"
+            query = f"?{self._state.link()}"
+            self.param.update(query=query, first=self.first or query)
+
+    def _settle(self, *events: Any) -> None:
+        if not self._state.work.reader.running:
+            self.settled = self._asked
 
     def _heard(self, message: Message) -> None:
         """The visitor went back or forward to another view."""
+        self._asked += 1
         self._state.open(message["query"])
+        self._settle()

@@ -23,6 +23,7 @@ from app.background.gc_pauses import settle
 from app.background.jobs import Job, Pool, Task, Visitor
 from app.background.limits import LIMITS, NAMES, Limits, read_limits
 from app.explore.controls import Controls
+from app.explore.page_address import Address
 from app.explore.results_line import left_out
 from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
@@ -292,6 +293,17 @@ def test_the_view_travels_with_the_link(state, visited):
     again = visited(state.link())
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
+
+
+def test_a_view_that_is_gone_back_to_is_settled_once_it_is_there_or_refused(state):
+    address = Address(state)
+    first = address.query
+    address.hear({"query": f"{first}&tab=export".replace("mu=0.1", "mu=1")})
+    wait_for(state)
+    assert address.settled == 1 and "mu=1&" in address.query and state.looks.tab == "export"
+    address.hear({"query": "?mu=none"})
+    wait_for(state)
+    assert address.settled == 2 and address.first == first
 
 
 def test_a_link_names_contacts_and_networks_by_their_own_numbers():
