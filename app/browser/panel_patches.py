@@ -123,7 +123,7 @@ def once_there(document: Document | None, function: Callable[[], object]) -> Non
     """Call a function now or, if its page is in transit, as soon as the page has arrived."""
     if document is None or not in_transit(document):
         function()
-    else:  # in the turn after: Panel counts the page as loaded when all that waits for it was called
+    else:  # in the turn after that in which Panel begins to count the page as loaded
         pn.state.onload(lambda: document.add_next_tick_callback(function))
 
 

@@ -143,7 +143,6 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     page.wait_for_function(f"() => {MODEL}('path').get_column('x').every(Number.isFinite)")
 
 
-@pytest.mark.slow
 def test_two_networks_side_by_side_with_one_player(visit):
     page = visit("?frame=3&reference=1")
     more(page).locator("button.split").click()
