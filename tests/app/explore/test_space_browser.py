@@ -83,6 +83,27 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
+def test_force_space_opens_without_a_warning_and_its_tools_cover_nothing(visit):
+    told = []
+
+    def listen(page):
+        page.on("console", lambda one: one.type == "warning" and told.append(one.text))
+
+    page = visit("?tab=plane", prepare=listen)
+    ready(page)
+    frame, tools = page.evaluate(
+        """() => {
+            const page = Bokeh.documents[0]
+            const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
+            const box = view.canvas_view.el.getBoundingClientRect(), bar = view.model.toolbar
+            const {bottom} = page.views_manager.find_one(bar).el.getBoundingClientRect()
+            return [box.top + view.frame.bbox.top, bottom]
+        }"""
+    )
+    assert tools <= frame
+    assert not told
+
+
 def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     """And can be taken there: the next pull begins where the first ended."""
     page = visit()

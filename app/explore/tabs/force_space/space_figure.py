@@ -14,6 +14,8 @@ from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, ho
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
+# Of no outline, for Bokeh, which finds no ranges for a plot that begins without a single point.
+NOWHERE = {"x": [0.0], "y": [0.0]}
 # The page's theme would give all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
 
@@ -28,12 +30,13 @@ class SpaceFigure:
         self.here = ColumnDataSource(none, name="here", tags=["follows", "path", tab])
         self.original, self.beside = ColumnDataSource(none), ColumnDataSource(none)
         self.inner, self.outer = (ColumnDataSource(none, name=n) for n in ("inner", "outer"))
+        self.outer.data = NOWHERE
         self.half, self.cone = ColumnDataSource(none), ColumnDataSource(none)
         around = {"range_padding": 0.06, "only_visible": True}
         self.figure = fig = figure(
             "force_space", None, "", "", x_range=DataRange1d(**around),
             y_range=DataRange1d(**around), aspect_ratio=aspect, sizing_mode="scale_width",
-            match_aspect=True, visible=False,
+            toolbar_inner=False,  # where the outline of S reaches up to the frame
         )  # fmt: skip
         fig.name = "path_figure"
         edges = [
@@ -79,12 +82,12 @@ class SpaceFigure:
         self.path.selected.on_change("indices", tapped)
 
     def clear(self) -> None:
-        """Remove everything of another plane; without dots there is no plot."""
-        self.figure.visible = False
+        """Remove everything of another plane."""
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.cone):
             source.data = {"x": [], "y": []}
         self.forget_outline()
+        self.outer.data = NOWHERE
 
     def forget_outline(self) -> None:
         """Remove the outline until the next one arrives."""
@@ -99,7 +102,7 @@ class SpaceFigure:
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.forget_outline()
         # Distances are meaningful in principal axes: both then have the same scale.
-        self.figure.update(match_aspect=not plane.components, visible=True)
+        self.figure.match_aspect = not plane.components
 
     def outline(self, found: Outlined) -> None:
         """The outline, and the half-way line to its centroid, which is omitted for stresses."""
