@@ -12,7 +12,7 @@ from bokeh.document import Document
 from panel.custom import JSComponent
 
 from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
-from .panel_patches import once_there
+from .panel_patches import once_loaded
 
 APP = Path(__file__).resolve().parents[1]
 SHARED = Path(__file__).with_name("shared.css").read_text()  # shared by all styles
@@ -111,5 +111,5 @@ class Scripted(JSComponent):
             self._heard(message)
 
     def _handle_msg(self, data: Any) -> None:
-        # An answer may change parameters, which would be lost on a page in transit.
-        once_there(pn.state.curdoc, partial(self.hear, data))
+        # The answer may change parameters, and those changes are lost while the page is in transit.
+        once_loaded(pn.state.curdoc, partial(self.hear, data))

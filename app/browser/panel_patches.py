@@ -119,11 +119,11 @@ def in_transit(document: Document) -> bool:
     return not pn.state.loaded and session is not None and session.connection_count > 0
 
 
-def once_there(document: Document | None, function: Callable[[], object]) -> None:
-    """Call a function now or, if its page is in transit, as soon as the page has arrived."""
+def once_loaded(document: Document | None, function: Callable[[], object]) -> None:
+    """Call a function now or, if its page is in transit, once the browser has confirmed it."""
     if document is None or not in_transit(document):
         function()
-    else:  # in the turn after that in which Panel begins to count the page as loaded
+    else:  # on the next tick: Panel marks the page as loaded after its onload callbacks
         pn.state.onload(lambda: document.add_next_tick_callback(function))
 
 

@@ -127,7 +127,7 @@ class _Around:
             door="explore", dark=state.looks.dark, keys=KEYS, css_classes=["header-row"], **WIDE
         )
         self.header.link(state.looks, dark="dark")
-        self.address = Address(state)  # before anything can be asked for
+        self.address = Address(state)  # created before the visitor can change the view
         self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
         self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
         self.panels = pn.Column(css_classes=["panels"], **WIDE)

@@ -6,8 +6,8 @@ import { goneBanner } from "../browser/connection_lost.js"
 
 export function render({ model, view }) {
   const banner = goneBanner(view, "What is in the page still plays.")
-  let asked = model.settled // how many views were gone back to
-  const waits = () => asked > model.settled // meanwhile the address is ahead of the view
+  let asked = model.settled // number of Back and Forward requests
+  const waits = () => asked > model.settled // until then the address is ahead of the view
 
   /** A query without the parameters that Back ignores. */
   function lasting(query) {
@@ -20,7 +20,7 @@ export function render({ model, view }) {
     const { query } = model
     if (!query || waits()) return
     const put = (how, view) => window.history[how](null, "", view)
-    // Opened without a view the address gets the first one, even if another has been asked for meanwhile.
+    // An address without a view gets the first one, even if the visitor has already selected another.
     if (!new URLSearchParams(window.location.search).has("mu")) put("replaceState", model.first)
     const now = window.location.search
     if (query !== now) put(lasting(query) === lasting(now) ? "replaceState" : "pushState", query)

@@ -19,7 +19,7 @@ class Address(Scripted):
 
     query = param.String(doc="of the address, as the state has it")
     first = param.String(doc="the query of the first view")
-    settled = param.Integer(doc="how many views that were gone back to are on screen, or refused")
+    settled = param.Integer(doc="number of Back and Forward requests that have been handled")
     passing = param.List(
         default=[key(name) for name in PASSING],
         doc="what changes the address but is not gone back to",

@@ -10,7 +10,7 @@ from tornado.ioloop import IOLoop
 
 from ..background import gc_pauses
 from ..background.jobs import Visitor
-from ..browser.panel_patches import in_transit, once_there, together, unseen_ms
+from ..browser.panel_patches import in_transit, once_loaded, together, unseen_ms
 from ..results.library import Library
 from .page_tasks import Work
 
@@ -47,7 +47,7 @@ def turns(document: Document) -> Callable[[Callable[[], object]], None]:
     def come(function: Callable[[], object]) -> None:
         call = partial(together, function)
         if document.session_context is not None:  # otherwise the page has ended
-            document.add_next_tick_callback(partial(once_there, document, call))
+            document.add_next_tick_callback(partial(once_loaded, document, call))
 
     def wake(function: Callable[[], object]) -> None:
         # From any thread; the page can end at any time except within a turn of the loop.

@@ -14,7 +14,7 @@ from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, ho
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
-# Of no outline, for Bokeh, which finds no ranges for a plot that begins without a single point.
+# Data of a missing outline: Bokeh warns about a plot that starts without any point.
 NOWHERE = {"x": [0.0], "y": [0.0]}
 # The page's theme would give all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
@@ -36,7 +36,7 @@ class SpaceFigure:
         self.figure = fig = figure(
             "force_space", None, "", "", x_range=DataRange1d(**around),
             y_range=DataRange1d(**around), aspect_ratio=aspect, sizing_mode="scale_width",
-            toolbar_inner=False,  # where the outline of S reaches up to the frame
+            toolbar_inner=False,  # the outline of S reaches up to the frame
         )  # fmt: skip
         fig.name = "path_figure"
         edges = [
