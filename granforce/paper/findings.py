@@ -118,11 +118,14 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     ]
     yield from _by_range(_values(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
     for part, word in (
-        ("response_long", "four times the implicit steps over 150"),
-        ("perturb", "steps of 0.4 of the way over steps of a tenth (other contacts)"),
+        ("response_long", "with 600 implicit steps over that with 150"),
+        (
+            "perturb",
+            "with load steps of 0.4 of the remaining distance over that with 0.1 (other contacts)",
+        ),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
-            yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
+            yield from _by_range(_ratios(table, name, part, "response"), f"{label} {word}")
     # Loads inside and outside the pressure differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
     factors = [
         {
