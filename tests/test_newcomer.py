@@ -15,8 +15,10 @@ import xarray as xr
 from packings import packed
 
 import granforce as gf
+from granforce.cli import report_lines
 from granforce.cli.parser import main
 from granforce.study.cells import scan_rows
+from granforce.study.schema import VARIABLES
 
 
 def test_tab_and_help_list_the_public_names_and_nothing_else():
@@ -191,6 +193,30 @@ def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
     assert gf.read_known("bounds.csv").contacts.tolist() == S.index.tolist()
     assert main("intervals --packing p.npz --out bounds.zarr".split()) == 0
     assert set(xr.open_zarr("bounds.zarr").coords) == {"contact", "i", "j", "x", "y"}
+
+
+def test_help_explains_the_lines_of_reports_as_the_store_does(cache, capsys):
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    for command, names in (
+        ("walk --states 4", report_lines.WALK),
+        ("uniform --states 8", report_lines.UNIFORM),
+        ("intervals", report_lines.INTERVALS),
+        ("informative --states 40 --best 2 --check 1", report_lines.INFORMATIVE),
+        ("stress", report_lines.STRESS),
+    ):
+        told = {
+            name.split(" [")[0] for name in report(capsys, *command.split(), "--packing", "p.npz")
+        }
+        assert told >= set(names)
+        with suppress(SystemExit):
+            main([command.split()[0], "--help"])
+        assert "Lines of the report:" in capsys.readouterr().out
+    stored = {
+        name: VARIABLES[name].long_name for name in report_lines.MEANINGS if name in VARIABLES
+    }
+    assert len(stored) > 12 and stored.items() <= report_lines.MEANINGS.items()
+    assert main("intervals --packing p.npz".split()) == 0
+    assert "mean extent of f_n [packing]" in capsys.readouterr().out
 
 
 def test_a_stress_that_can_be_prescribed_is_reported(cache, capsys):

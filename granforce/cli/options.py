@@ -6,6 +6,7 @@ import argparse
 from typing import TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
+from granforce.cli.report_lines import explained
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 # Commands whose names are reserved in Python or used by a package: their functions end in "_".
@@ -15,14 +16,24 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 def subcommand(
-    commands: Commands, name: str, summary: str, example: str, *, reports: bool = True
+    commands: Commands,
+    name: str,
+    summary: str,
+    example: str,
+    *,
+    reports: bool = True,
+    lines: tuple[str, ...] = (),
 ) -> Parser:
-    """Add a command, which runs the function of its name in `granforce.cli.commands`."""
+    """Add a command, which runs the function of its name in `granforce.cli.commands`.
+
+    lines: those of its report that the help explains.
+    """
+    report = f"Lines of the report:\n{explained(lines)}\n\n" if lines else ""
     command = commands.add_parser(
         name,
         help=summary,
         description=summary[0].upper() + summary[1:] + ".",
-        epilog=f"Example:\n  {example}",
+        epilog=f"{report}Example:\n  {example}",
         formatter_class=EXAMPLE,
         allow_abbrev=False,
     )

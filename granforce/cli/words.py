@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from granforce import __version__
+from granforce.cli import report_lines
 from granforce.cli.options import (
     EXAMPLE,
     Commands,
@@ -64,6 +65,7 @@ def add_walk(commands: Commands) -> None:
         "walk",
         "random walk through the force networks of a packing",
         "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000 --out states.zarr",
+        lines=report_lines.WALK,
     )
     add_source(command)
     add_states_out(command)
@@ -75,6 +77,7 @@ def add_uniform(commands: Commands) -> None:
         "uniform",
         "draw force networks of a packing uniformly, with convergence diagnostics",
         "granforce uniform -n 400 --mu 0.1 --seed 1 --states 1000 --effective 500",
+        lines=report_lines.UNIFORM,
     )
     add_any_packing(command)
     group = command.add_argument_group("the sample")
@@ -214,6 +217,7 @@ def add_informative(commands: Commands) -> None:
         "informative",
         "rank contacts by how much a measurement of their normal force would narrow all others",
         "granforce informative -n 400 --mu 0.1 --seed 1 --best 5 --known known.csv",
+        lines=report_lines.INFORMATIVE,
     )
     add_any_packing(command)
     group = command.add_argument_group("the ranking")
@@ -254,6 +258,7 @@ def add_scan(commands: Commands) -> None:
         "scan",
         "packings and walks for many μ and seeds, in parallel and resumable",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
+        lines=report_lines.WALK,
     )
     command.add_argument(
         "--mu", type=str, required=True, help="friction coefficients, separated by commas"
@@ -369,6 +374,7 @@ def add_intervals(commands: Commands) -> None:
         "intervals",
         "compute the exact interval of every contact force",
         "granforce intervals -n 400 --mu 0.1 --seed 1 --out bounds.csv",
+        lines=report_lines.INTERVALS,
     )
     add_exact(command)
 
@@ -390,6 +396,7 @@ def add_stress(commands: Commands) -> None:
         "compute the stresses that the contacts can carry at the packing's pressure, and the "
         "largest shear",
         "granforce stress -n 400 --mu 0.1 --seed 1 --out outline.csv",
+        lines=report_lines.STRESS,
     )
     add_any_packing(command)
     group = command.add_argument_group("the outline")

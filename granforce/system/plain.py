@@ -16,3 +16,8 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def spaced(name: str) -> str:
+    """A name in words; symbols such as f_n keep their form."""
+    return name.replace("_", " ").replace("f n", "f_n").replace("f t", "f_t")

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 from tqdm import tqdm
 
-from granforce.system.plain import json_text
+from granforce.system.plain import json_text, spaced
 
 
 def print_list(rows: Sequence[Mapping[str, Any]], names: Sequence[str], as_json: bool) -> None:
@@ -25,7 +25,7 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
     width = max(len(name) for name in lines)
     for name, value in lines.items():
         sentences = isinstance(value, list) and any(" " in str(part) for part in value)
-        name = name.replace("_", " ")
+        name = spaced(name)
         for part in value if sentences else [value]:
             print(f"{name:<{width}}  {text(part)}")
             name = ""

@@ -17,6 +17,7 @@ from granforce.cli.results import (
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
+from granforce.system.plain import spaced
 from granforce.system.terminal import print_report, table
 from granforce.tolerances import CARRYING
 
@@ -47,7 +48,7 @@ def informative(arguments: argparse.Namespace) -> None:
     else:
         print_report(lines, False)
         rows = [dict(zip(ranked, row, strict=True)) for row in zip(*ranked.values(), strict=True)]
-        table(rows, list(ranked), {name: name.replace("_", " ") for name in ranked})
+        table(rows, list(ranked), {name: spaced(name) for name in ranked})
     if arguments.out is not None:
         write_columns(arguments.out, columns)
 
