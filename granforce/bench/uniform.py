@@ -63,13 +63,13 @@ def uniform(
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
         walls(S)  # compile
-        setup, (made, kept) = timed(_set_up, S, clock=time.process_time)
-        runs = [_ours(S, made, kept, method, seed) for method in METHODS]
-        runs += _hopsy(S, made, kept, rounded)
+        setup, (polytope, kept) = timed(_set_up, S, clock=time.process_time)
+        runs = [_ours(S, polytope, kept, method, seed) for method in METHODS]
+        runs += _hopsy(S, polytope, kept, rounded)
         for run in runs:
-            rows.append(_row({"n": n, "mu": mu, "h": made.dimension}, S, runs[0], run, setup))
-        rows[-len(runs)]["two_cores"] = _two_cores(made, kept, seed)
-        rows[-len(runs)]["null_space_ratio"] = _null_space(S, made) / setup
+            rows.append(_row({"n": n, "mu": mu, "h": polytope.dimension}, S, runs[0], run, setup))
+        rows[-len(runs)]["two_cores"] = _two_cores(polytope, kept, seed)
+        rows[-len(runs)]["null_space_ratio"] = _null_space(S, polytope) / setup
     return rows
 
 
@@ -97,16 +97,16 @@ def _row(
     return row
 
 
-def _ours(S: Ensemble, made: Any, kept: Any, method: str, seed: int) -> _Run:
-    note(f"uniform: h = {made.dimension}, {method}")
+def _ours(S: Ensemble, polytope: Any, kept: Any, method: str, seed: int) -> _Run:
+    note(f"uniform: h = {polytope.dimension}, {method}")
     for count in (1, STATES // 4):  # the first call compiles
         begin = time.process_time()
         own = seed + METHODS.index(method)
-        ends, reach, _ = warm_up(made, 4, own, [kept], method=method)
-        _, slacks, _ = step(made, ends, count=count, reach=reach, rows=kept, method=method)
+        ends, reach, _ = warm_up(polytope, 4, own, [kept], method=method)
+        _, slacks, _ = step(polytope, ends, count=count, reach=reach, rows=kept, method=method)
         seconds = time.process_time() - begin
-    states = forces_of(S, made, slacks)
-    return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
+    states = forces_of(S, polytope, slacks)
+    return _Run(method, states, mixing(states, varying(S, polytope)), seconds, 0.0)
 
 
 def uniform_growth(
@@ -133,19 +133,19 @@ def uniform_growth(
     for k in tiles:
         note(f"uniform: N = {n * k * k}")
         S = ensemble(tile(base, k), prune=False)
-        setup, (made, _) = timed(_set_up, S, clock=time.process_time)
+        setup, (polytope, _) = timed(_set_up, S, clock=time.process_time)
         wanted: dict[str, Any] = {"seed": seed, "effective": effective}
         seconds, sample = timed(sample_uniform, S, effective, clock=time.process_time, **wanted)
         row: dict[str, Any] = {
             "n": n * k * k,
-            "h": made.dimension,
-            "walls": made.count,
+            "h": polytope.dimension,
+            "walls": polytope.count,
             "states": len(sample.flat),
         }
         row |= {"effective": sample.effective, "reached": sample.reached}
         row |= {"seconds": seconds, "peak_MB": _peak(), "setup_seconds": setup}
-        if made.count <= MOST_DENSE_WALLS:
-            row["null_space_ratio"] = _null_space(S, made) / setup
+        if polytope.count <= MOST_DENSE_WALLS:
+            row["null_space_ratio"] = _null_space(S, polytope) / setup
         worth = sample.effective / len(sample.flat)
         for place, part in ROOMS.items():
             each = _going_on(sample, part) / worth
@@ -159,16 +159,18 @@ def uniform_growth(
 
 
 def _set_up(S: Ensemble) -> tuple[Any, Any]:
-    made = walls(S)
-    return made, _all_rows(made, 1.0)
+    polytope = walls(S)
+    return polytope, _all_rows(polytope, 1.0)
 
 
-def _all_rows(made: Any, part: float) -> Any:
+def _all_rows(polytope: Any, part: float) -> Any:
     """All rows of K if they fit into a fraction of the memory, otherwise none."""
-    rows = room_for_rows(made.count, part)
+    rows = room_for_rows(polytope.count, part)
     if rows.whole:
-        for first in range(0, len(made.moving), LANES):
-            make_rows(made.rows, rows.cache, range(first, min(first + LANES, len(made.moving))))
+        for first in range(0, len(polytope.moving), LANES):
+            make_rows(
+                polytope.rows, rows.cache, range(first, min(first + LANES, len(polytope.moving)))
+            )
     return rows
 
 
@@ -178,33 +180,35 @@ def _peak() -> float:
 
 def _going_on(sample: Any, part: float) -> Any:
     """Seconds of processor time per state, with a fraction of the memory meant for rows of K."""
-    made, ends, rows = sample.walls, sample.ends, _all_rows(sample.walls, part)
+    polytope, ends, rows = sample.walls, sample.ends, _all_rows(sample.walls, part)
     for _ in range(2):
         begin = time.process_time()
-        ends, *_ = step(made, ends, count=_TIMED, reach=sample.reach, rows=rows)
+        ends, *_ = step(polytope, ends, count=_TIMED, reach=sample.reach, rows=rows)
         seconds = time.process_time() - begin
     return seconds / (_TIMED * len(ends))
 
 
-def _null_space(S: Ensemble, made: Any) -> float:
+def _null_space(S: Ensemble, polytope: Any) -> float:
     """Seconds of processor time for a dense null space by QR, which gives the same K."""
-    weighted = S.scaled_form[0].tocsc()[:, made.moving].toarray() * made.centre[made.moving]
+    weighted = (
+        S.scaled_form[0].tocsc()[:, polytope.moving].toarray() * polytope.centre[polytope.moving]
+    )
     return timed(linalg.qr, weighted.T, pivoting=True, clock=time.process_time)[0]
 
 
-def _two_cores(made: Any, kept: Any, seed: int) -> float:
+def _two_cores(polytope: Any, kept: Any, seed: int) -> float:
     wall = []
-    ends, reach, _ = warm_up(made, 2, seed, [kept])
+    ends, reach, _ = warm_up(polytope, 2, seed, [kept])
     for workers in (1, 2):
         begin = time.perf_counter()
         with ThreadPoolExecutor(workers) as pool:
-            on = partial(step, made, count=STATES, reach=reach, rows=kept)
+            on = partial(step, polytope, count=STATES, reach=reach, rows=kept)
             list(pool.map(on, [[end] for end in ends]))
         wall.append(time.perf_counter() - begin)
     return wall[0] / wall[1]
 
 
-def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
+def _hopsy(S: Ensemble, polytope: Any, kept: Any, rounded: int) -> list[_Run]:
     """Coordinate hit-and-run by hopsy, its best walk, on two roundings.
 
     One is granforce's; the other, up to dimension `rounded`, is hopsy's own. hopsy needs
@@ -214,7 +218,7 @@ def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
         import hopsy
     except ImportError:
         return [_Run("hopsy", None, None, seconds=0.0, setup=0.0, note="not installed")]
-    h, count = made.dimension, len(made.moving)
+    h, count = polytope.dimension, len(polytope.moving)
     sides = -np.linalg.eigh(kept.values[:count, :count])[1][:, count - h :]
     begin = time.process_time()
     problems = {"hopsy, our rounding": (hopsy.Problem(sides, np.ones(count)), 0.0)}
@@ -232,10 +236,10 @@ def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
         thinning = h * max(8, h // 6)
         sample = partial(hopsy.sample, chains, streams, HOPSY_STATES // 4, thinning=thinning)
         seconds, (_, places) = timed(sample, clock=time.process_time)
-        slacks = np.ones((*places.shape[:2], made.count))
+        slacks = np.ones((*places.shape[:2], polytope.count))
         slacks[..., :count] -= places @ sides.T
-        states = forces_of(S, made, slacks)[:, places.shape[1] // 10 :]  # warm-up
-        runs.append(_Run(name, states, mixing(states, varying(S, made)), seconds, setup))
+        states = forces_of(S, polytope, slacks)[:, places.shape[1] // 10 :]  # warm-up
+        runs.append(_Run(name, states, mixing(states, varying(S, polytope)), seconds, setup))
     return runs
 
 

@@ -203,24 +203,24 @@ def _draws(
     progress: Progress | None,
 ) -> Draws:
     begin, (states, chains, workers) = time.perf_counter(), numbers
-    made = walls(ensemble, weight, m)
-    stores, on = uniform.stores_for(made, chains, workers), partial(step, made)
+    polytope = walls(ensemble, weight, m)
+    stores, on = uniform.stores_for(polytope, chains, workers), partial(step, polytope)
     ready = time.perf_counter()
-    ends = uniform.begun(made, chains, seed)
+    ends = uniform.begun(polytope, chains, seed)
     ends, _, dropped = uniform.together(stores, ends, partial(on, count=_DROPPED))
     each = -(-states // chains)
-    _, found, done = uniform.drawn(ensemble, made, stores, ends, on, 0, each, progress)
+    _, found, done = uniform.drawn(ensemble, polytope, stores, ends, on, 0, each, progress)
     cancelling.check("inference")
     drawn = time.perf_counter()
-    worth = mixing(found, uniform.varying(ensemble, made))
+    worth = mixing(found, uniform.varying(ensemble, polytope))
     counts = uniform.counted({"turns": 0, "refused": 0}, dropped + done)
-    counts |= {"dropped": _DROPPED * chains, "held": len(made.centre) - len(made.moving)}
-    mixed = not made.dimension or worth.worst_r_hat <= uniform.MIXED
+    counts |= {"dropped": _DROPPED * chains, "held": len(polytope.centre) - len(polytope.moving)}
+    mixed = not polytope.dimension or worth.worst_r_hat <= uniform.MIXED
     return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
 
 
 def step(
-    made: Walls,
+    polytope: Walls,
     ends: Sequence[uniform.ChainState],
     rows: billiard.RowStore | None = None,
     *,
@@ -233,28 +233,28 @@ def step(
     around a point that one solve gives, truncated by the walls: a harmonic path of a quarter
     oscillation draws from it. Without a measurement this gives uniform states.
     """
-    rows, times = rows or billiard.room_for_rows(made.count), np.array([_TIME])
-    pulls = np.tile(made.pull, (len(ends), 1))
+    rows, times = rows or billiard.room_for_rows(polytope.count), np.array([_TIME])
+    pulls = np.tile(polytope.pull, (len(ends), 1))
     ahead: list[Any] = []
 
     def on(ends: list[uniform.ChainState], left: int) -> uniform.Flown:
         if not ahead:
-            drawn = [_drawn(made, end.rng, min(_AT_ONCE, left)) for end in ends]
+            drawn = [_drawn(polytope, end.rng, min(_AT_ONCE, left)) for end in ends]
             ahead.extend(zip(*(zip(*one, strict=True) for one in drawn), strict=True))
         speeds, errors = zip(*ahead.pop(0), strict=True)
         shifts = [error + end.slacks for error, end in zip(errors, ends, strict=True)]
-        middles = 1.0 + made.moved(np.stack(shifts) - 1.0, pulls)
+        middles = 1.0 + polytope.moved(np.stack(shifts) - 1.0, pulls)
         paths = [(w[None], times, m[None]) for w, m in zip(speeds, middles, strict=True)]
-        return uniform.flown(made, rows, ends, paths)
+        return uniform.flown(polytope, rows, ends, paths)
 
-    return uniform.walked(made, ends, count, _PATHS, on)
+    return uniform.walked(polytope, ends, count, _PATHS, on)
 
 
-def _drawn(made: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
+def _drawn(polytope: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
     """Speeds (count, walls) with covariance K, and errors (count, walls) of companions."""
-    push, error = (np.empty((count, made.count)) for _ in range(2))
-    pull = np.empty((count, made.root.size))
+    push, error = (np.empty((count, polytope.count)) for _ in range(2))
+    pull = np.empty((count, polytope.root.size))
     for path in range(count):
-        push[path], error[path] = rng.standard_normal((2, made.count))
-        pull[path] = made.root * rng.standard_normal(made.root.size)
-    return made.moved(push, pull), error
+        push[path], error[path] = rng.standard_normal((2, polytope.count))
+        pull[path] = polytope.root * rng.standard_normal(polytope.root.size)
+    return polytope.moved(push, pull), error

@@ -250,11 +250,11 @@ def _finding_lines(account: Account) -> list[str]:
     """The findings of each kind, in lines of words, only the first ones of many."""
     lines = []
     for kind, (words, *_) in KINDS.items():
-        found = account.of(kind)
-        if found:
-            more = f"; and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
-            text = "; ".join(one.text for one in found[:_LISTED])
-            lines.append(f"{words} ({len(found)}): {text}{more}")
+        findings = account.of(kind)
+        if findings:
+            more = f"; and {len(findings) - _LISTED} more" if len(findings) > _LISTED else ""
+            text = "; ".join(one.text for one in findings[:_LISTED])
+            lines.append(f"{words} ({len(findings)}): {text}{more}")
     return lines
 
 
@@ -384,10 +384,10 @@ def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
     model = highs.standard_form(sparse.hstack([both, slack, -slack]), right, solver="ipm")
     model.setOptionValue("ipm_iteration_limit", _ITERATIONS)
     highs.set_cost(model, np.concatenate([np.zeros(columns), cost, cost]))
-    found = highs.optimal(model)
-    if found is None:
+    solution = highs.optimal(model)
+    if solution is None:
         raise UndecidedError("which grains can be balanced is undecided: no solver reached an end")
-    off = np.abs(A @ np.maximum(found[:columns], 0.0)).reshape(-1, 1 + S.per_contact)
+    off = np.abs(A @ np.maximum(solution[:columns], 0.0)).reshape(-1, 1 + S.per_contact)
     unbalance = np.zeros(len(packing.r))
     unbalance[S.grains] = off.sum(axis=1)
     return np.where(unbalance > _BALANCED, unbalance, 0.0)

@@ -269,8 +269,8 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
     centre = x[~inner].mean(axis=0)
     away = np.hypot(*(x - centre).T)
     start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
-    found = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
-    cut = found if shape == "annulus" else found[[0, 1, 3]]
+    fitted = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
+    cut = fitted if shape == "annulus" else fitted[[0, 1, 3]]
     return _outline(shape, ",".join(repr(float(value)) for value in cut))
 
 

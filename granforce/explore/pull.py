@@ -114,8 +114,8 @@ def _pulled_all(
     width = 1 if len(state) > _ALONE else LANES
     groups = [values[first : first + width] for first in range(0, len(values), width)]
     with cancelling.threads(workers) as pool:
-        found = pool.map(lambda some: _pulled(ensemble, position, some, state), groups)
-        return np.concatenate(list(found))
+        pulls = pool.map(lambda some: _pulled(ensemble, position, some, state), groups)
+        return np.concatenate(list(pulls))
 
 
 def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
@@ -144,14 +144,14 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
 
     Multipliers diverge at an end, so its network is computed slightly inside.
     """
-    found = reach(ensemble, contact)
+    reached = reach(ensemble, contact)
     beyond = INTERVAL_GAP * ensemble.force_scale
-    for value in values[(values < found.low - beyond) | (values > found.high + beyond)]:
+    for value in values[(values < reached.low - beyond) | (values > reached.high + beyond)]:
         raise InputError(
             f"a normal force of {value:.9g} on contact {contact} is outside its exact interval, "
-            f"{found.low:.9g} to {found.high:.9g}: no admissible network has it"
+            f"{reached.low:.9g} to {reached.high:.9g}: no admissible network has it"
         )
-    width = found.high - found.low
+    width = reached.high - reached.low
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
         states = np.stack([some_network(ensemble, state)] * len(values))
         if np.all(ensemble.admits(states)):
@@ -162,14 +162,14 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         )
     position = ensemble.position(contact)
     for part in _INWARD:
-        inside = found.low + part * width, found.high - part * width
+        inside = reached.low + part * width, reached.high - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
         if np.all(admitted := ensemble.admits(states)):
             return states
-    between = np.clip((values - found.low) / width, 0.0, 1.0)[:, None, None]
+    between = np.clip((values - reached.low) / width, 0.0, 1.0)[:, None, None]
     # The segment between both ends contains a network with each value, so S with that value known
     # is not empty.
-    on_the_line = (1 - between) * found.states[0] + between * found.states[1]
+    on_the_line = (1 - between) * reached.states[0] + between * reached.states[1]
     for k in np.flatnonzero(~admitted):
         states[k] = some_network(ensemble.with_normal(position, on_the_line[k]), state)
     if np.all(admitted := ensemble.admits(states)):
@@ -177,7 +177,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not found; choose a value further from the ends of its interval, "
-        f"{found.low:.9g} to {found.high:.9g}"
+        f"{reached.low:.9g} to {reached.high:.9g}"
     )
 
 
@@ -199,13 +199,13 @@ def reach(
     points: dict[Any, Floats] = {}
     system = make_system(ensemble)
     if needs_no_program(ensemble, system):
-        found = determined(ensemble, keys)
+        bounds = determined(ensemble, keys)
         states = np.stack([starting_network(ensemble)] * 2)
     else:
-        found = solved(ensemble, Solver(system, workers=workers), keys, points)
+        bounds = solved(ensemble, Solver(system, workers=workers), keys, points)
         cancelling.check("exact interval")
         states = np.stack([_balanced(ensemble, points[key]) for key in keys])
-    attained, gap = values_and_gaps(found, keys)
+    attained, gap = values_and_gaps(bounds, keys)
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
     if not np.all(ensemble.admits(states)):

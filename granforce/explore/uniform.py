@@ -110,19 +110,19 @@ class UniformSample(NamedTuple):
         return np.repeat(np.arange(self.states.shape[0]), self.states.shape[1])
 
 
-def init(made: Walls, seed: int | np.random.SeedSequence) -> ChainState:
+def init(polytope: Walls, seed: int | np.random.SeedSequence) -> ChainState:
     """A chain on a random ray from the centre, nine tenths of the way to the wall.
 
     Chains thus start far from each other, as R̂ requires. seed: as for numpy.random.default_rng.
     """
     rng = np.random.default_rng(seed)
-    direction = made.moved(rng.standard_normal((1, made.count)))[0]
+    direction = polytope.moved(rng.standard_normal((1, polytope.count)))[0]
     approach = -direction.min(initial=0.0)
     return ChainState(1 + (0.9 / approach if approach > 0 else 1.0) * direction, rng)
 
 
 def step(
-    made: Walls,
+    polytope: Walls,
     ends: Sequence[ChainState],
     rows: RowStore | None = None,
     *,
@@ -137,21 +137,21 @@ def step(
     fixed number leaves the measure uniform.
     """
     if method == "hit_and_run":
-        return walked(made, ends, count, 1, lambda ends, left: _chords(made, ends))
-    rows = rows or billiard.room_for_rows(made.count)
-    straight = np.ones((0, made.count))
+        return walked(polytope, ends, count, 1, lambda ends, left: _chords(polytope, ends))
+    rows = rows or billiard.room_for_rows(polytope.count)
+    straight = np.ones((0, polytope.count))
 
     def on(ends: list[ChainState], left: int) -> Flown:
         paths = min(left, BATCH - ends[0].paths % BATCH)
-        drawn = [directions(made, end.rng, paths) for end in ends]
+        drawn = [directions(polytope, end.rng, paths) for end in ends]
         paths_of = [(speeds, PATH * reach * (0.5 + parts), straight) for speeds, parts in drawn]
-        return flown(made, rows, ends, paths_of)
+        return flown(polytope, rows, ends, paths_of)
 
-    return walked(made, ends, count, PATHS_PER_STATE, on)
+    return walked(polytope, ends, count, PATHS_PER_STATE, on)
 
 
 def walked(
-    made: Walls,
+    polytope: Walls,
     ends: Sequence[ChainState],
     count: int,
     paths: int,
@@ -164,50 +164,52 @@ def walked(
     ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
     counts = np.zeros((len(ends), 2), dtype=int)
     found: list[Floats] = []
-    while left and made.dimension:
+    while left and polytope.dimension:
         ends, outs, done = on(ends, left)
         found.append(outs)
         counts += done
         left -= outs.shape[1]
     if not found:
-        return ends, np.ones((len(ends), count, made.count)), counts
+        return ends, np.ones((len(ends), count, polytope.count)), counts
     slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
-    return ends, np.stack([made.on_hull(s) for s in slacks]), counts
+    return ends, np.stack([polytope.on_hull(s) for s in slacks]), counts
 
 
-def flown(made: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
+def flown(
+    polytope: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequence[Any]
+) -> Flown:
     """Advance chains by a batch of paths; drawn: speeds, times and middles (`billiard.fly`)."""
     slacks, outs, counts = billiard.follow(
-        made.rows, made.dimension, rows, [end.slacks for end in ends], drawn
+        polytope.rows, polytope.dimension, rows, [end.slacks for end in ends], drawn
     )
     paths = ends[0].paths + outs.shape[1]
     if paths % BATCH == 0:
-        slacks = made.on_hull(slacks)
+        slacks = polytope.on_hull(slacks)
     ends = [ChainState(s, end.rng, paths) for s, end in zip(slacks, ends, strict=True)]
     return ends, outs, counts
 
 
 def directions(
-    made: Walls, rng: np.random.Generator, count: int, unit: bool = True
+    polytope: Walls, rng: np.random.Generator, count: int, unit: bool = True
 ) -> tuple[Floats, Floats]:
     """Speeds (count, walls) of covariance K, or its uniform directions, and numbers in [0, 1]."""
-    g, parts = np.empty((count, made.count)), np.empty(count)
+    g, parts = np.empty((count, polytope.count)), np.empty(count)
     for path in range(count):
-        g[path], parts[path] = rng.standard_normal(made.count), rng.random()
-    speeds = made.moved(g)
+        g[path], parts[path] = rng.standard_normal(polytope.count), rng.random()
+    speeds = polytope.moved(g)
     if not unit:
         return speeds, parts
     return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
 
 
-def _chords(made: Walls, ends: list[ChainState]) -> Flown:
+def _chords(polytope: Walls, ends: list[ChainState]) -> Flown:
     """Advance chains by one state of hit-and-run."""
-    slacks, moves = np.stack([end.slacks for end in ends]), MOVES_PER_DIMENSION * made.dimension
+    slacks, moves = np.stack([end.slacks for end in ends]), MOVES_PER_DIMENSION * polytope.dimension
     for s, end in zip(slacks, ends, strict=True):
         for first in range(0, moves, BATCH):
             cancelling.check("uniform sample")
-            billiard.chords(*directions(made, end.rng, min(BATCH, moves - first)), s)
-    pairs = zip(ends, made.on_hull(slacks), strict=True)
+            billiard.chords(*directions(polytope, end.rng, min(BATCH, moves - first)), s)
+    pairs = zip(ends, polytope.on_hull(slacks), strict=True)
     ends = [end._replace(slacks=s) for end, s in pairs]
     return ends, slacks[:, None], np.zeros((len(ends), 2), dtype=int)
 
@@ -283,31 +285,31 @@ def _check_same(previous: UniformSample, chains: int, seed: int, method: str) ->
             )
 
 
-def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:
+def begun(polytope: Walls, chains: int, seed: int) -> list[ChainState]:
     """Initial states of the chains, each with its own random stream."""
-    return [init(made, own) for own in np.random.SeedSequence(seed).spawn(chains)]
+    return [init(polytope, own) for own in np.random.SeedSequence(seed).spawn(chains)]
 
 
 def warm_up(
-    made: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
+    polytope: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
 ) -> tuple[list[ChainState], float, Integers]:
     """Chains ready to draw from: (ChainState of each, reach, turns and rejected paths of each)."""
-    ends, counts = begun(made, chains, seed), np.zeros((chains, 2), dtype=int)
-    reach = float(np.sqrt(made.dimension))
-    for count in WARM_UP if made.dimension else ():
-        on = partial(step, made, count=count, reach=reach, method=method)
+    ends, counts = begun(polytope, chains, seed), np.zeros((chains, 2), dtype=int)
+    reach = float(np.sqrt(polytope.dimension))
+    for count in WARM_UP if polytope.dimension else ():
+        on = partial(step, polytope, count=count, reach=reach, method=method)
         ends, slacks, done = together(stores, ends, on)
         counts += done
         reach = float(np.sqrt(np.mean(np.sum((slacks - 1) ** 2, axis=2))))
     return ends, reach, counts
 
 
-def stores_for(made: Walls, chains: int, workers: int) -> list[RowStore]:
+def stores_for(polytope: Walls, chains: int, workers: int) -> list[RowStore]:
     """Rows of K for each thread: shared if they fit, otherwise in parts of the memory."""
-    threads, whole = min(workers, chains), billiard.room_for_rows(made.count)
+    threads, whole = min(workers, chains), billiard.room_for_rows(polytope.count)
     if whole.whole:
         return [whole] * threads
-    return [billiard.room_for_rows(made.count, 1 / threads) for _ in range(threads)]
+    return [billiard.room_for_rows(polytope.count, 1 / threads) for _ in range(threads)]
 
 
 def shared(
@@ -331,7 +333,7 @@ def together(
 
 def drawn(
     ensemble: Ensemble,
-    made: Walls,
+    polytope: Walls,
     stores: Sequence[RowStore],
     ends: Sequence[ChainState],
     on: Callable[..., Flown],
@@ -351,7 +353,7 @@ def drawn(
             cancelling.check("uniform sample")
             count = min(ROUND, target - have)
             ends, slacks, done = together(stores, ends, partial(on, count=count))
-            found.append(forces_of(ensemble, made, slacks))
+            found.append(forces_of(ensemble, polytope, slacks))
             counts, have = counts + done, have + count
             if progress is not None:
                 progress(have * len(ends), target * len(ends))
@@ -369,11 +371,11 @@ def _start(
 ) -> tuple[UniformSample, list[RowStore]]:
     """A sample without states yet, its chains warmed up, and rows of K for each thread."""
     begin = time.perf_counter()
-    made = walls(ensemble)
+    polytope = walls(ensemble)
     ready = time.perf_counter()
-    stores = stores_for(made, chains, workers)
-    ends, reach, done = warm_up(made, chains, seed, stores, method=method)
-    dropped = chains * sum(WARM_UP) if made.dimension else 0
+    stores = stores_for(polytope, chains, workers)
+    ends, reach, done = warm_up(polytope, chains, seed, stores, method=method)
+    dropped = chains * sum(WARM_UP) if polytope.dimension else 0
     counts = {"turns": 0, "refused": 0, "dropped": dropped}
     nothing = np.zeros((chains, 0))
     sample = UniformSample(
@@ -382,12 +384,12 @@ def _start(
         violation=nothing,
         mixing=cast("Mixing", None),  # until there are states
         reached=False,
-        counts=counted(counts | {"held": len(made.centre) - len(made.moving)}, done),
+        counts=counted(counts | {"held": len(polytope.centre) - len(polytope.moving)}, done),
         setup_seconds=ready - begin,
         sampling_seconds=time.perf_counter() - ready,
         diagnosis_seconds=0.0,
         method=method,
-        walls=made,
+        walls=polytope,
         reach=reach,
         ends=ends,
     )
@@ -402,14 +404,14 @@ def _extend(
     progress: Progress | None,
 ) -> tuple[UniformSample, bool]:
     """The sample with at least `states` states, diagnosed, and whether it was not cancelled."""
-    made, (chains, have) = sample.walls, sample.residual.shape
+    polytope, (chains, have) = sample.walls, sample.residual.shape
     target = -(-states // chains)
     begin = time.perf_counter()
-    on = partial(step, made, reach=sample.reach, method=sample.method)
-    ends, new, done = drawn(ensemble, made, stores, sample.ends, on, have, target, progress)
+    on = partial(step, polytope, reach=sample.reach, method=sample.method)
+    ends, new, done = drawn(ensemble, polytope, stores, sample.ends, on, have, target, progress)
     forces = np.concatenate([sample.states, new], axis=1)
     ready = time.perf_counter()
-    varies = varying(ensemble, made)
+    varies = varying(ensemble, polytope)
     try:
         diagnosis = mixing(forces, varies)
     except Cancelled:
@@ -432,23 +434,23 @@ def inside(residual: Floats, violation: Floats) -> bool:
     return bool(np.all(residual <= BALANCED) and np.all(violation <= ADMISSIBLE))
 
 
-def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:
+def forces_of(ensemble: Ensemble, polytope: Walls, slacks: Floats) -> Floats:
     """Forces (…, N_c, 2) of slacks (…, walls)."""
-    y = made.points(slacks)
+    y = polytope.points(slacks)
     T = ensemble.scaled_form[2]
     x = (T @ y.reshape(-1, y.shape[-1]).T).T * ensemble.force_scale
     return ensemble.pin(ensemble.to_forces(x.reshape(*y.shape[:-1], -1)))
 
 
-def varying(ensemble: Ensemble, made: Walls) -> Mask:
+def varying(ensemble: Ensemble, polytope: Walls) -> Mask:
     """Mask (N_c, 2) of components that vary in S, from random changes.
 
     Changes count if they exceed a tenth of the resolution of S. The random numbers are always the
     same.
     """
     T = ensemble.scaled_form[2].tocsc()
-    g = np.random.default_rng(0).standard_normal((PROBES, made.count))
-    relative = made.moved(g)[:, : len(made.moving)]
-    change = T[:, made.moving] @ (made.centre[made.moving] * relative).T
+    g = np.random.default_rng(0).standard_normal((PROBES, polytope.count))
+    relative = polytope.moved(g)[:, : len(polytope.moving)]
+    change = T[:, polytope.moving] @ (polytope.centre[polytope.moving] * relative).T
     least = 0.1 * ensemble.hull.resolution * norm(T, axis=1) * np.sqrt(PROBES)
     return ensemble.to_forces(np.linalg.norm(change, axis=1) > least) > 0

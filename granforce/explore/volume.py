@@ -112,9 +112,9 @@ def volume(
     begin = time.perf_counter()
     accuracy, seed = positive(accuracy, "accuracy", least=LEAST_ACCURACY), random_seed(seed)
     workers = worker_count(workers)
-    made = walls(ensemble)
+    polytope = walls(ensemble)
     grains = max(1, len(ensemble.grains))
-    if not made.dimension:
+    if not polytope.dimension:
         counts = dict.fromkeys(("rungs", "paths", *_COUNTS), 0)
         return Volume(
             log_volume=0.0,
@@ -126,18 +126,18 @@ def volume(
             counts=counts,
             seconds=time.perf_counter() - begin,
         )
-    top, log_top, top_variance = _top(made, np.random.default_rng([seed, 0]))
-    stores = uniform.stores_for(made, workers, workers)
-    rungs = _climbed(made, stores[0], top, seed)
-    rungs = _extended(made, stores, rungs, np.full((2, len(rungs[0])), _FIRST), progress)
+    top, log_top, top_variance = _top(polytope, np.random.default_rng([seed, 0]))
+    stores = uniform.stores_for(polytope, workers, workers)
+    rungs = _climbed(polytope, stores[0], top, seed)
+    rungs = _extended(polytope, stores, rungs, np.full((2, len(rungs[0])), _FIRST), progress)
     for _ in range(_MOST_ROUNDS):
         ladders, variance = _summed(rungs)
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
         wanted = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
-        rungs = _extended(made, stores, rungs, _more(rungs, variance, wanted), progress)
-    ladders += made.units + log_top
+        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, wanted), progress)
+    ladders += polytope.units + log_top
     found, own = float(ladders.mean()), 2 * np.sqrt(variance.sum())
     agree = abs(ladders[1] - ladders[0]) <= AGREE * own
     counts = {"rungs": len(rungs[0]), "paths": int(sum(len(r.q) for way in rungs for r in way))}
@@ -145,7 +145,7 @@ def volume(
     return Volume(
         log_volume=found,
         error=float(error),
-        dimension=made.dimension,
+        dimension=polytope.dimension,
         per_grain=found / grains,
         ladders=ladders,
         reached=bool(error <= accuracy and agree),
@@ -154,13 +154,13 @@ def volume(
     )
 
 
-def _top(made: Walls, rng: np.random.Generator) -> tuple[float, float, float]:
+def _top(polytope: Walls, rng: np.random.Generator) -> tuple[float, float, float]:
     """The largest β, ln Z there, and its variance."""
 
     def reach(count: int) -> Floats:
         # Normal states of β = 1: how far each is outside S, as the β at which it would be on a
         # wall.
-        w = made.moved(rng.standard_normal((count, made.count)))
+        w = polytope.moved(rng.standard_normal((count, polytope.count)))
         return np.maximum(-w.min(axis=1), 0.0) ** 2
 
     beta = float(np.quantile(reach(_TRIED), _INSIDE))
@@ -169,7 +169,7 @@ def _top(made: Walls, rng: np.random.Generator) -> tuple[float, float, float]:
         cancelling.check("volume")
         inside += int(np.sum(reach(_TRIED) < beta))
     part = inside / _COUNTED
-    log = 0.5 * made.dimension * np.log(2 * np.pi / beta) + np.log(part)
+    log = 0.5 * polytope.dimension * np.log(2 * np.pi / beta) + np.log(part)
     return beta, log, (1 - part) / (part * _COUNTED)
 
 
@@ -185,12 +185,12 @@ class _Rung(NamedTuple):
     refused: int
 
 
-def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> list[list[_Rung]]:
+def _climbed(polytope: Walls, rows: billiard.RowStore, top: float, seed: int) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
     down: list[_Rung] = []
-    beta, slacks, reach = top, np.ones(made.count), float(np.sqrt(made.dimension / top))
+    beta, slacks, reach = top, np.ones(polytope.count), float(np.sqrt(polytope.dimension / top))
     while not down or down[-1].beta > 0:
-        down.append(_settled(made, rows, beta, reach, slacks, [seed, 1, len(down)]))
+        down.append(_settled(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
         spread = max(float(q.std()), 1e-300)
@@ -199,7 +199,7 @@ def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> lis
     up = []
     for number in range(len(down) - 1, -1, -1):
         beta, reach = down[number].beta, down[number].reach
-        up.append(_settled(made, rows, beta, reach, slacks, [seed, 2, number]))
+        up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
         slacks = up[-1].end.slacks
     rungs = down, up[::-1]
     # New paths: those that built the ladder are not used in the result.
@@ -210,7 +210,7 @@ def _climbed(made: Walls, rows: billiard.RowStore, top: float, seed: int) -> lis
 
 
 def _settled(
-    made: Walls,
+    polytope: Walls,
     rows: billiard.RowStore,
     beta: float,
     reach: float,
@@ -227,24 +227,24 @@ def _settled(
         turns=0,
         refused=0,
     )
-    begun = _flown(made, rows, fresh, _PILOT)
+    begun = _flown(polytope, rows, fresh, _PILOT)
     return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
 
 
-def _flown(made: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
+def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
     """The rung with this many more paths, in whole batches."""
-    h, beta, end, found, drawn = made.dimension, rung.beta, rung.end, [rung.q], [rung.x]
+    h, beta, end, found, drawn = polytope.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)
-    middle = np.ones((1 if beta > 0 else 0, made.count))
+    middle = np.ones((1 if beta > 0 else 0, polytope.count))
     for _ in range(0, count, _BATCH):
-        speeds, parts = uniform.directions(made, end.rng, _BATCH, unit=not beta)
+        speeds, parts = uniform.directions(polytope, end.rng, _BATCH, unit=not beta)
         drawn.append(((speeds**2).sum(axis=1) - (h if beta else 1)) / np.sqrt(2 * h))
         lengths = uniform.PATH * rung.reach * (0.5 + parts)
         if beta > 0:
             # As long as those of uniform states, or a quarter of an oscillation.
             speeds /= np.sqrt(beta)
             lengths = np.minimum(lengths * np.sqrt(beta / h), 0.5 * np.pi)
-        (end,), outs, done = uniform.flown(made, rows, [end], [(speeds, lengths, middle)])
+        (end,), outs, done = uniform.flown(polytope, rows, [end], [(speeds, lengths, middle)])
         found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
     return rung._replace(
@@ -309,7 +309,7 @@ def _more(rungs: list[list[_Rung]], variance: Floats, wanted: float) -> Integers
 
 
 def _extended(
-    made: Walls,
+    polytope: Walls,
     stores: Sequence[Any],
     rungs: list[list[_Rung]],
     more: Integers,
@@ -326,7 +326,7 @@ def _extended(
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
     parts = uniform.shared(
-        stores, tasks, lambda some, rows: [_flown(made, rows, *task) for task in some]
+        stores, tasks, lambda some, rows: [_flown(polytope, rows, *task) for task in some]
     )
     found = [list(way) for way in rungs]
     for (way, k), rung in zip(order, itertools.chain(*parts), strict=True):

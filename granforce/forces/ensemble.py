@@ -273,19 +273,19 @@ class Ensemble:
             return np.tile([-np.inf, np.inf], (len(self.index), 2, 1))
         return self.force_scale * np.stack([self.known.low, self.known.high], axis=-1)
 
-    def with_bounds(self, bounds: Floats, found: Floats) -> Ensemble:
+    def with_bounds(self, bounds: Floats, network: Floats) -> Ensemble:
         """The same with other `bounds`; found (N_c, 2): a network of S, force."""
         known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
-        return replace(self, known=known, found=found)
+        return replace(self, known=known, network=network)
 
-    def with_normal(self, position: int, found: Floats) -> Ensemble:
+    def with_normal(self, position: int, network: Floats) -> Ensemble:
         """The same with f_n of the contact at `position` known as well.
 
         found (N_c, 2): a network of S with that f_n, which becomes its `member`.
         """
         bounds = self.bounds
-        bounds[position, 0] = found[position, 0]
-        return self.with_bounds(bounds, found)
+        bounds[position, 0] = network[position, 0]
+        return self.with_bounds(bounds, network)
 
     def positions(self, contacts: npt.ArrayLike) -> Integers:
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
@@ -321,12 +321,12 @@ class Ensemble:
 
         NaN is not refused: no solver converges from it.
         """
-        found = real_array(forces, name)
-        if found.shape != (len(self.index), 2):
-            raise InputError(f"{name} must have shape {(len(self.index), 2)}, got {found.shape}")
-        if np.abs(found).max(initial=0.0) > LARGEST_UNIT * self.force_scale:
+        network = real_array(forces, name)
+        if network.shape != (len(self.index), 2):
+            raise InputError(f"{name} must have shape {(len(self.index), 2)}, got {network.shape}")
+        if np.abs(network).max(initial=0.0) > LARGEST_UNIT * self.force_scale:
             raise InputError(f"{name} is beyond {LARGEST_UNIT:g} times the mean normal force")
-        return found
+        return network
 
     def refuse_foreign(self, forces: Any, residual: Any, name: str) -> None:
         """InputError unless networks (…, N_c, 2) of a result belong to this ensemble.

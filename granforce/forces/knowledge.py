@@ -259,13 +259,13 @@ def _statements(
     relation += ["="] * (len(contact) - len(relation))
     size = np.abs(multiplier) / np.abs(multiplier).max()
     given = given * units(mu)[component] * scale
-    told = []
+    texts = []
     for k in np.argsort(-size, kind="stable"):
         if size[k] > _WEIGHTY:
             c = index[contact[k]]
             text = f"{_NAMES[component[k]]} {relation[k]} {value[k]:.6g} on contact {c}"
             if given[k] > BALANCED * scale:
                 text += f" (would have to give {given[k]:.3g})"
-            told.append(text)
-    together = "; ".join(told)
+            texts.append(text)
+    together = "; ".join(texts)
     return f"no network agrees with all known forces; these conflict: {together}"

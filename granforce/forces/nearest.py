@@ -64,10 +64,10 @@ def nearest(
     empty, or max_iterations were too few): forces are the last iterate, inside the cones.
     cancel() returning True raises Cancelled.
     """
-    (found,) = nearest_of_many(
+    (relaxation,) = nearest_of_many(
         ensemble, [start], tolerance=tolerance, max_iterations=max_iterations, cancel=cancel
     )
-    return found
+    return relaxation
 
 
 @takes(Ensemble)
@@ -91,11 +91,13 @@ def nearest_of_many(
     tolerance = positive(tolerance, "tolerance", or_zero=True)
     max_iterations = whole(max_iterations, "max_iterations", 1)
     starts = [ensemble.network(start, "start") for start in _each(starts)]
-    found: list[Relaxation] = []
-    while len(found) < len(starts):
-        left = starts[len(found) :]
-        found += _batch(ensemble, left[: LANES if len(left) > 1 else 1], tolerance, max_iterations)
-    return found
+    relaxations: list[Relaxation] = []
+    while len(relaxations) < len(starts):
+        left = starts[len(relaxations) :]
+        relaxations += _batch(
+            ensemble, left[: LANES if len(left) > 1 else 1], tolerance, max_iterations
+        )
+    return relaxations
 
 
 def _each(starts: Any) -> list[Any]:
@@ -145,17 +147,17 @@ def starting_network(ensemble: Ensemble) -> Floats:
     """
     if ensemble.admits(ensemble.original):
         return ensemble.original
-    found = nearest(ensemble, ensemble.original).forces
-    if ensemble.admits(found):
-        return found
+    network = nearest(ensemble, ensemble.original).forces
+    if ensemble.admits(network):
+        return network
     member = ensemble.member
     if member is not None:
         return member
-    found = some_network(ensemble, ensemble.original)
-    if not ensemble.admits(found):
+    network = some_network(ensemble, ensemble.original)
+    if not ensemble.admits(network):
         A, b, _ = ensemble.scaled_form
         raise certificates.why_unsolved(A, b, slack=ensemble.slack)
-    return found
+    return network
 
 
 def some_network(ensemble: Ensemble, start: Floats) -> Floats:
@@ -165,9 +167,9 @@ def some_network(ensemble: Ensemble, start: Floats) -> Floats:
     result is the known network if it is the only one, or else the last iterate, which is not
     admitted.
     """
-    found = nearest(ensemble, start).forces
-    if ensemble.admits(found):
-        return found
+    network = nearest(ensemble, start).forces
+    if ensemble.admits(network):
+        return network
     other = likeliest_piqp(ensemble, np.ones_like(start), start)
     if ensemble.admits(other):
         return other
@@ -177,7 +179,7 @@ def some_network(ensemble: Ensemble, start: Floats) -> Floats:
         if ensemble.admits(other):
             return other
     only = ensemble.member
-    return found if only is None or ensemble.dimension else only
+    return network if only is None or ensemble.dimension else only
 
 
 class Search:

@@ -81,13 +81,13 @@ def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     kind = every[name]
     mu = kind.mu if mu is None else friction(mu)
     try:
-        made = kind.make(mu, **options)
+        sketch = kind.make(mu, **options)
     except TypeError:
         unknown = ", ".join(options)
         raise InputError(f"the scene {name} has no option {unknown}") from None
-    if isinstance(made, Sketch):
-        made = assembled(*made[:4], mu, pressing=made.pressing)
-    return made._replace(info=made.info | {"scene": name})
+    if isinstance(sketch, Sketch):
+        sketch = assembled(*sketch[:4], mu, pressing=sketch.pressing)
+    return sketch._replace(info=sketch.info | {"scene": name})
 
 
 def assembled(

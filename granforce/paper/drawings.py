@@ -119,15 +119,15 @@ def draw(
     progress(figures drawn, figures in all).
     """
     make_folder(folder)
-    made = all_figures(table) if formats else {}
+    drawings = all_figures(table) if formats else {}
     texts, paths = captions(table), []
-    for done, (name, figure) in enumerate(made.items()):
+    for done, (name, figure) in enumerate(drawings.items()):
         for form in formats:
             backend = "bokeh" if form == "html" else "matplotlib"
             paths.append(folder / f"{name}.{form}")
             figures.save(figure(backend=backend), paths[-1], texts[name])
         if progress is not None:
-            progress(done + 1, len(made))
+            progress(done + 1, len(drawings))
     return paths
 
 
@@ -138,26 +138,26 @@ def all_figures(table: StudyTable) -> dict[str, Callable[..., Any]]:
 
 def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures 1 to 6, by one sampler."""
-    sampler, made = paper_sampler(table), {}
+    sampler, drawings = paper_sampler(table), {}
     part = SAMPLERS[sampler]
     walk = drawn(table, sampler)
     if walk:
-        made["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
-        made["figure6"] = _later(figures.correlations, walk, chance=_chance(walk))
+        drawings["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
+        drawings["figure6"] = _later(figures.correlations, walk, chance=_chance(walk))
     groups = _some(_loose(_in_S(table, part)))
     if groups:
         options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
-        made["figure4"] = _later(figures.extents, groups, **options)
+        drawings["figure4"] = _later(figures.extents, groups, **options)
     answers = [row for row in table.answers(part) if np.isfinite(row.get("decay_exponent", np.nan))]
     if answers:
-        made["figure2"] = _later(figures.perturbation, answers)
-        made["figure2_limit"] = _later(figures.perturbation, answers, limit=True)
+        drawings["figure2"] = _later(figures.perturbation, answers)
+        drawings["figure2_limit"] = _later(figures.perturbation, answers, limit=True)
     forces, places = _shown_forces(table, part), _shown_places(table, part)
     if forces:
-        made["figure3"] = _later(figures.force_densities, forces)
+        drawings["figure3"] = _later(figures.force_densities, forces)
     if places:
-        made["figure5"] = _later(figures.overlaid, places)
-    return made
+        drawings["figure5"] = _later(figures.overlaid, places)
+    return drawings
 
 
 def _in_S(table: StudyTable, part: str) -> dict[float, list[Floats]]:
@@ -175,49 +175,53 @@ def _beyond_S(table: StudyTable, part: str) -> list[dict[str, Any]]:
 def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures that the paper does not have."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
-    part, made = SAMPLERS[paper_sampler(table)], {}
+    part, drawings = SAMPLERS[paper_sampler(table)], {}
     sources = {_SWEPT.get(p, name): drawn(table, name) for name, p in SAMPLERS.items()}
     sources = {name: rows for name, rows in sources.items() if rows}
     if len(sources) > 1:
-        made["samplers"] = _later(figures.samplers, sources)
+        drawings["samplers"] = _later(figures.samplers, sources)
     efforts = {words: table.part(p) for p, words in _SWEPT.items() if table.part(p)}
     if efforts:
-        made["effort"] = _later(figures.effort, efforts)
+        drawings["effort"] = _later(figures.effort, efforts)
     if walk and exact:
         sources = {"exact": exact, "volume": table.part("volume")}
-        made["figure1_exact"] = _later(figures.indeterminacy, walk, beside=sources)
+        drawings["figure1_exact"] = _later(figures.indeterminacy, walk, beside=sources)
         both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
-        made["figure6_exact"] = _later(figures.correlations, walk, beside=both)
+        drawings["figure6_exact"] = _later(figures.correlations, walk, beside=both)
     if walk and uniform:
-        made["figure1_uniform"] = _later(figures.indeterminacy, walk, beside={"uniform": uniform})
+        drawings["figure1_uniform"] = _later(
+            figures.indeterminacy, walk, beside={"uniform": uniform}
+        )
     groups = _some(_loose(_in_S(table, part)))
     if groups:
-        made["figure4_mean"] = _later(figures.extents, groups)
+        drawings["figure4_mean"] = _later(figures.extents, groups)
     groups = _some(_loose(table.extents("exact")))
     if groups:
         options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
-        made["figure4_exact"] = _later(figures.extents, groups, **options)
+        drawings["figure4_exact"] = _later(figures.extents, groups, **options)
     places = _shown_places(table, part)
     if places:
-        made["places"] = _later(figures.places, places)
+        drawings["places"] = _later(figures.places, places)
     if table.part("size"):
-        made["sizes"] = _later(figures.sizes, _with_sizes(table))
+        drawings["sizes"] = _later(figures.sizes, _with_sizes(table))
     if table.part("opened"):
-        made["opened"] = _later(figures.opened, table.part("opened"), walk)
+        drawings["opened"] = _later(figures.opened, table.part("opened"), walk)
     if table.part("frozen"):
         periodic = [row for row in exact if row["mu"] > 0]
         inner = table.part("frozen"), table.part("frozen_large")
-        made["frozen"] = _later(figures.frozen, periodic, *inner)
+        drawings["frozen"] = _later(figures.frozen, periodic, *inner)
     if any("walk_ratio" in row for row in uniform):
-        made["distances"] = _later(figures.distances, uniform)
+        drawings["distances"] = _later(figures.distances, uniform)
     if table.part("stress"):
         stress = table.part("stress"), table.part("stress_uniform")
-        made["stresses"] = _later(figures.stresses, *stress)
+        drawings["stresses"] = _later(figures.stresses, *stress)
     if table.part("volume"):
-        made["volumes"] = _later(figures.volumes, table.part("volume"), table.part("volume_size"))
+        drawings["volumes"] = _later(
+            figures.volumes, table.part("volume"), table.part("volume_size")
+        )
     if table.tails:
-        made["tails"] = _later(figures.tails, _densities(table))
-    return made
+        drawings["tails"] = _later(figures.tails, _densities(table))
+    return drawings
 
 
 def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, float]]]]:

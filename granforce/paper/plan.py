@@ -164,12 +164,12 @@ class Task(NamedTuple):
 
 def tasks(plan: Plan) -> list[Task]:
     """All cells except the packings, part by part, each with the first packings first."""
-    found: dict[str, list[Task]] = {}
+    by_part: dict[str, list[Task]] = {}
     for applies in _PARTS.values():
         for seed in range(1, plan.packings + 1):
             for task in applies(plan, seed):
-                found.setdefault(task.part, []).append(task)
-    return list(itertools.chain(*found.values()))
+                by_part.setdefault(task.part, []).append(task)
+    return list(itertools.chain(*by_part.values()))
 
 
 def packings(wanted: Iterable[Task]) -> list[StudyCell]:
@@ -293,19 +293,19 @@ def _swept(
 
 def _repeated(plan: Plan, seed: int) -> list[Task]:
     """Walks with other seeds, numbered in the name of their part, and longer ones."""
-    found = []
+    family = []
     for mu in plan.repeat_frictions if seed <= plan.repeat_packings else ():
         for part, walk in (("repeat_sweeps", _swept), ("repeat_walk", _nearest)):
             for k in range(1, plan.repeats + 1):
-                found.append(walk(f"{part}_{k}", seed, mu, plan, walk_seed=k))
+                family.append(walk(f"{part}_{k}", seed, mu, plan, walk_seed=k))
             longer = LONGER_WALK * plan.states
-            found.append(walk(f"{part}_long", seed, mu, plan, states=longer))
-    return found
+            family.append(walk(f"{part}_long", seed, mu, plan, states=longer))
+    return family
 
 
 def _responses(plan: Plan, seed: int) -> list[Task]:
     longer = {"max_steps": LONGER * MOST_STEPS}
-    found = []
+    family = []
     for part, packings, contacts, protocol in (
         ("response", plan.response_packings, plan.response_contacts, {"rise": RISE}),
         ("response_long", plan.perturb_packings, plan.response_contacts, {"rise": RISE, **longer}),
@@ -315,30 +315,30 @@ def _responses(plan: Plan, seed: int) -> list[Task]:
             if 0 < mu < LEAST_FOLLOWED:
                 continue
             how: dict[str, Any] = {"random": contacts, **protocol}
-            found.append(_task(part, kinds.PERTURBATION, plan.n, seed, mu, **how))
-    return found
+            family.append(_task(part, kinds.PERTURBATION, plan.n, seed, mu, **how))
+    return family
 
 
 def _frozen(plan: Plan, seed: int) -> list[Task]:
-    found = []
+    family = []
     if seed <= plan.frozen_packings:
         frictions = [mu for mu in plan.frictions if mu >= plan.frozen_from]
-        found += [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
+        family += [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
     if seed <= plan.frozen_large_packings:
         n, large = plan.frozen_large, plan.frozen_large_frictions
-        found += [_exact("frozen_large", n, seed, mu, slice_=SLICE) for mu in large]
-    return found
+        family += [_exact("frozen_large", n, seed, mu, slice_=SLICE) for mu in large]
+    return family
 
 
 def _prepared(plan: Plan, seed: int) -> list[Task]:
     if seed > plan.prepared_packings:
         return []
-    found = []
+    family = []
     for mu in plan.prepared_frictions:
         for name, made in variations(mu).items():
-            found.append(_nearest(f"prepared_{name}", seed, mu, plan, made=made))
-            found.append(_exact(f"prepared_{name}_exact", plan.n, seed, mu, made=made))
-    return found
+            family.append(_nearest(f"prepared_{name}", seed, mu, plan, made=made))
+            family.append(_exact(f"prepared_{name}_exact", plan.n, seed, mu, made=made))
+    return family
 
 
 def _opened(plan: Plan, seed: int) -> list[Task]:
@@ -346,25 +346,25 @@ def _opened(plan: Plan, seed: int) -> list[Task]:
         return []
     n, widest = plan.n, max(plan.frictions)
     frictions = [mu for mu in plan.frictions if mu > 0]
-    found = [_walk("opened", n, seed, mu, plan, packing_mu=0) for mu in frictions]
-    found += [_exact("opened_exact", n, seed, mu, packing_mu=0) for mu in frictions]
+    family = [_walk("opened", n, seed, mu, plan, packing_mu=0) for mu in frictions]
+    family += [_exact("opened_exact", n, seed, mu, packing_mu=0) for mu in frictions]
     # Frictionless packings, and those with the largest friction, exist already.
     between = [mu for mu in frictions if mu < widest]
-    return found + [_exact("widest_exact", n, seed, widest, packing_mu=mu) for mu in between]
+    return family + [_exact("widest_exact", n, seed, widest, packing_mu=mu) for mu in between]
 
 
 def _sizes(plan: Plan, seed: int) -> list[Task]:
-    found = []
+    family = []
     for n in plan.sizes:
         # Large packings average over more contacts, so fewer are needed.
         if seed > _of_size(plan.size_packings, n, plan):
             continue
         for mu in plan.size_frictions:
-            found.append(_walk("size", n, seed, mu, plan))
-            found.append(_swept("size_sweeps", seed, mu, plan, n=n))
+            family.append(_walk("size", n, seed, mu, plan))
+            family.append(_swept("size_sweeps", seed, mu, plan, n=n))
             if n <= plan.largest_exact:
-                found.append(_exact("size_exact", n, seed, mu))
-    return found
+                family.append(_exact("size_exact", n, seed, mu))
+    return family
 
 
 def _of_size(packings: int, n: int, plan: Plan) -> int:
@@ -375,19 +375,19 @@ def _of_size(packings: int, n: int, plan: Plan) -> int:
 def _stresses(plan: Plan, seed: int) -> list[Task]:
     # Without friction there is one network, with one stress.
     frictions = [mu for mu in plan.frictions if mu > 0] if seed <= plan.stress_packings else []
-    found = [_task("stress", kinds.STRESS, plan.n, seed, mu) for mu in frictions]
+    family = [_task("stress", kinds.STRESS, plan.n, seed, mu) for mu in frictions]
     drawn = ("stress_uniform", kinds.UNIFORM, plan.n, seed)
-    return found + [_task(*drawn, mu, plan.stress_states) for mu in frictions]
+    return family + [_task(*drawn, mu, plan.stress_states) for mu in frictions]
 
 
 def _volumes(plan: Plan, seed: int) -> list[Task]:
     if seed > plan.volume_packings:
         return []
-    found = [_volume("volume", plan.n, seed, mu, plan) for mu in plan.frictions if mu > 0]
+    family = [_volume("volume", plan.n, seed, mu, plan) for mu in plan.frictions if mu > 0]
     for n in plan.sizes:
         if seed <= _of_size(plan.volume_packings, n, plan):
-            found += [_volume("volume_size", n, seed, mu, plan) for mu in plan.size_frictions]
-    return found
+            family += [_volume("volume_size", n, seed, mu, plan) for mu in plan.size_frictions]
+    return family
 
 
 def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:

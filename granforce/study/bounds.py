@@ -50,14 +50,16 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
     )
 
 
-def informative_dataset(S: Ensemble, found: Informative, *, seconds: float = 0.0) -> xr.Dataset:
+def informative_dataset(
+    S: Ensemble, informative: Informative, *, seconds: float = 0.0
+) -> xr.Dataset:
     """An Informative as a dataset; its backbone lists its contacts, the best first."""
     return labelled(
         {
-            "backbone": found.contacts,
-            "part_expected": found.expected,
-            "mean_before": found.before,
-            "mean_after": found.after,
+            "backbone": informative.contacts,
+            "part_expected": informative.expected,
+            "mean_before": informative.before,
+            "mean_after": informative.after,
             **extension(S),
             "force_scale": S.force_scale,
             "seconds": seconds,
@@ -81,59 +83,59 @@ def limit_loads_dataset(S: Ensemble, loads: LimitLoads, *, seconds: float = 0.0)
     )
 
 
-def stress_dataset(S: Ensemble, found: StressOutline, *, seconds: float = 0.0) -> xr.Dataset:
+def stress_dataset(S: Ensemble, outline: StressOutline, *, seconds: float = 0.0) -> xr.Dataset:
     """A StressOutline as a dataset."""
     return labelled(
         {
-            "stress_angle": found.angles,
-            "stress_support": found.support,
-            "stress_gap": found.gap,
-            "stress_inner": found.inner,
-            "stress_outer": found.outer,
-            "stress_own": found.own,
-            "friction": found.friction,
-            "friction_bound": found.friction_bound,
+            "stress_angle": outline.angles,
+            "stress_support": outline.support,
+            "stress_gap": outline.gap,
+            "stress_inner": outline.inner,
+            "stress_outer": outline.outer,
+            "stress_own": outline.own,
+            "friction": outline.friction,
+            "friction_bound": outline.friction_bound,
             **extension(S),
             "seconds": seconds,
         },
-        {"counts": json.dumps(found.counts)},
+        {"counts": json.dumps(outline.counts)},
     )
 
 
-def volume_dataset(S: Ensemble, found: Volume) -> xr.Dataset:
+def volume_dataset(S: Ensemble, volume: Volume) -> xr.Dataset:
     """A Volume as a dataset."""
     return labelled(
         {
-            "log_volume": found.log_volume,
-            "log_volume_error": found.error,
-            "log_volume_ladders": found.ladders,
-            "log_volume_per_grain": found.per_grain,
-            "extent": found.extent,
-            "reached": found.reached,
+            "log_volume": volume.log_volume,
+            "log_volume_error": volume.error,
+            "log_volume_ladders": volume.ladders,
+            "log_volume_per_grain": volume.per_grain,
+            "extent": volume.extent,
+            "reached": volume.reached,
             **extension(S),
             "coordination": S.coordination,
             "force_scale": S.force_scale,
             **S.skipped,
-            "seconds": found.seconds,
+            "seconds": volume.seconds,
         },
-        {"counts": json.dumps(found.counts)},
+        {"counts": json.dumps(volume.counts)},
     )
 
 
 def outline_dataset(
-    S: Ensemble, axes: Floats, found: Outline, *, seconds: float = 0.0
+    S: Ensemble, axes: Floats, outline: Outline, *, seconds: float = 0.0
 ) -> xr.Dataset:
     """An Outline in the plane of axes (2, N_c, 2) as a dataset."""
     return labelled(
         {
             "backbone": S.index,
             "axes": axes,
-            "inner": found.inner,
-            "outer": found.outer,
-            "outline_gap": found.gap,
-            "programs": found.counts["programs"],
+            "inner": outline.inner,
+            "outer": outline.outer,
+            "outline_gap": outline.gap,
+            "programs": outline.counts["programs"],
             "force_scale": S.force_scale,
             "seconds": seconds,
         },
-        {"counts": json.dumps(found.counts)},
+        {"counts": json.dumps(outline.counts)},
     )

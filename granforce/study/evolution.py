@@ -67,45 +67,45 @@ def evolution(
     read: list[tuple[int, Snapshot, list[StudyCell]]] = []
     for number in snapshots.numbers if numbers is None else numbers:
         try:
-            found = snapshots.snapshot(number)
+            snapshot = snapshots.snapshot(number)
         except InputError as error:
             failed.append((number, str(error)))
             continue
-        named = kinds.imported_parameters(found.packing)
-        kinds.keep_packing(store, named, found.packing)
+        named = kinds.imported_parameters(snapshot.packing)
+        kinds.keep_packing(store, named, snapshot.packing)
         cells = [StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
         if states:
             cells.append(StudyCell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))
-        read.append((number, found, cells))
+        read.append((number, snapshot, cells))
     work = [cell for *_, cells in read for cell in cells]
     refused = run(path, work, workers=workers, scheduler=scheduler, progress=progress)
     lost = {id(cell): message for cell, message in refused}
     done = []
-    for number, found, cells in read:
+    for number, snapshot, cells in read:
         messages = [lost[id(cell)] for cell in cells if id(cell) in lost]
         failed += [(number, message) for message in messages[:1]]
         if not messages:
             results = [get(store, *cell, workers=workers)[0] for cell in cells]
-            done.append((number, found, results))
+            done.append((number, snapshot, results))
     return (_combined(done) if done else None), sorted(failed)
 
 
 def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Dataset:
     """One dataset of [(number, its snapshot, intervals and perhaps a walk), …]."""
     names = []
-    for _, found, _ in done:
-        contacts = found.packing.contacts
-        names.append(pair_names(found.ids, contacts.i, contacts.j))
+    for _, snapshot, _ in done:
+        contacts = snapshot.packing.contacts
+        names.append(pair_names(snapshot.ids, contacts.i, contacts.j))
     pairs, places = over_frames(names)
     arrays = {name: np.full((len(done), len(pairs), 2), np.nan) for name in _FORCES}
-    for k, ((_, found, (bounds, *_)), (here, into)) in enumerate(zip(done, places, strict=True)):
-        arrays["forces"][k, into] = found.packing.forces[here]
+    for k, ((_, snapshot, (bounds, *_)), (here, into)) in enumerate(zip(done, places, strict=True)):
+        arrays["forces"][k, into] = snapshot.packing.forces[here]
         for name in ("low", "high"):
             # Contacts outside the backbone carry no force in any network.
-            own = np.zeros_like(found.packing.forces)
+            own = np.zeros_like(snapshot.packing.forces)
             own[bounds["backbone"].values] = bounds[name].values
             arrays[name][k, into] = own[here]
-    rows = [_scalars(number, found.packing, *results) for number, found, results in done]
+    rows = [_scalars(number, snapshot.packing, *results) for number, snapshot, results in done]
     variables: dict[str, Any] = {}
     for name, meaning in _FORCES.items():
         attributes = {"units": "force", "long_name": meaning}
@@ -114,7 +114,7 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
         numbers = [row[name] for row in rows]
         variables[name] = (("frame",), numbers, {"units": units, "long_name": meaning})
     coordinates = {"frame": [number for number, *_ in done], "component": ["f_n", "f_t"]}
-    notes = {str(number): found.packing.info.get("notes", []) for number, found, _ in done}
+    notes = {str(number): snapshot.packing.info.get("notes", []) for number, snapshot, _ in done}
     return xr.Dataset(variables, coordinates | ends_of(pairs), {"notes": json.dumps(notes)})
 
 

@@ -84,9 +84,9 @@ def _inferred(
     columns = chosen.pop("columns", None)
     frames = open_frames(parameters["positions"], parameters["adjacency"], columns=columns)
     number = parameters["frame"] if len(frames.frames) > 1 else None
-    found = read_pegs(frames, frame=number, **chosen)
+    photoelastic = read_pegs(frames, frame=number, **chosen)
     return infer_frame(
-        found,
+        photoelastic,
         states=parameters["states"],
         seed=parameters["seed"],
         unmeasured=parameters["unmeasured"],
@@ -97,7 +97,7 @@ def _inferred(
 
 
 def infer_frame(
-    found: Photoelastic,
+    photoelastic: Photoelastic,
     *,
     states: int = STATES,
     unmeasured: float = UNMEASURED,
@@ -109,30 +109,33 @@ def infer_frame(
     Forces are those of `remeasured`, on all contacts (0 for contacts that cannot carry force), with
     its options. Without states there are no errors.
     """
-    S = ensemble(found.packing)
+    S = ensemble(photoelastic.packing)
     drawn = (remeasured if states else infer)(
-        *(S, found.measured[S.index], found.sigma[S.index]),
+        *(S, photoelastic.measured[S.index], photoelastic.sigma[S.index]),
         states=states,
         unmeasured=unmeasured,
         **options,
     )
     stress_of = partial(
-        regional_stress, S.contacts, found.packing.x, len(found.packing.r) - len(found.walls)
+        regional_stress,
+        S.contacts,
+        photoelastic.packing.x,
+        len(photoelastic.packing.r) - len(photoelastic.walls),
     )
     stress, errors = stress_of(drawn.forces), {}
     if states:
         off = stress_of(drawn.drawn.flat) - stress
-        errors["standard_error"] = _on_all(found, S, drawn.error, 0.0)
+        errors["standard_error"] = _on_all(photoelastic, S, drawn.error, 0.0)
         errors["regional_stress_error"] = np.sqrt(np.mean(off**2, axis=0))
-    dataset = packing_dataset(found.packing).merge(
+    dataset = packing_dataset(photoelastic.packing).merge(
         labelled(
             {
-                "grain_id": found.ids,
-                "added": found.added,
-                "measured": found.measured,
-                "sigma": found.sigma,
-                "inferred": _on_all(found, S, drawn.forces, 0.0),
-                "deviation": _on_all(found, S, drawn.deviation, np.nan),
+                "grain_id": photoelastic.ids,
+                "added": photoelastic.added,
+                "measured": photoelastic.measured,
+                "sigma": photoelastic.sigma,
+                "inferred": _on_all(photoelastic, S, drawn.forces, 0.0),
+                "deviation": _on_all(photoelastic, S, drawn.deviation, np.nan),
                 "suspect": drawn.suspects,
                 "chi_square": drawn.chi_square,
                 "freedom": drawn.freedom,
@@ -141,18 +144,18 @@ def infer_frame(
             }
         )
     )
-    findings = [one._asdict() for one in found.findings]
-    report = found.report if number is None else found.report | {"frame": number}
+    findings = [one._asdict() for one in photoelastic.findings]
+    report = photoelastic.report if number is None else photoelastic.report | {"frame": number}
     attrs: dict[str, Any] = {"report": report, "findings": findings}
-    attrs |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
-    attrs |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
+    attrs |= {"walls": list(photoelastic.walls), "left_open": photoelastic.left_open.tolist()}
+    attrs |= {"at_wall": np.flatnonzero(photoelastic.at_wall).tolist()}
     dataset.attrs["account"] = json.dumps(attrs, default=to_builtin)
     return dataset
 
 
-def _on_all(found: Photoelastic, S: Ensemble, values: Floats, elsewhere: float) -> Floats:
+def _on_all(photoelastic: Photoelastic, S: Ensemble, values: Floats, elsewhere: float) -> Floats:
     """Values (N_c of S, 2) on all contacts of the frame, with `elsewhere` on the others."""
-    whole_packing = np.full(found.measured.shape, elsewhere)
+    whole_packing = np.full(photoelastic.measured.shape, elsewhere)
     whole_packing[S.index] = values
     return whole_packing
 
