@@ -276,7 +276,7 @@ class Ensemble:
     def with_bounds(self, bounds: Floats, network: Floats) -> Ensemble:
         """The same with other `bounds`; found (N_c, 2): a network of S, force."""
         known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
-        return replace(self, known=known, network=network)
+        return replace(self, known=known, found=network)
 
     def with_normal(self, position: int, network: Floats) -> Ensemble:
         """The same with f_n of the contact at `position` known as well.
