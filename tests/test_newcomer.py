@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import pydoc
 import subprocess
 import sys
@@ -217,6 +218,16 @@ def test_help_explains_the_lines_of_reports_as_the_store_does(cache, capsys):
     assert len(stored) > 12 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals --packing p.npz".split()) == 0
     assert "mean extent of f_n [packing]" in capsys.readouterr().out
+
+
+def test_a_reader_of_the_report_that_leaves_costs_no_file(cache):
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    words = "-m granforce intervals --packing p.npz --out bounds.csv"
+    reader, writer = os.pipe()
+    os.close(reader)  # as `granforce … | head -1`, sooner
+    subprocess.run([sys.executable, *words.split()], stdout=writer, stderr=subprocess.DEVNULL)
+    os.close(writer)
+    assert len(pd.read_csv("bounds.csv")) == len(gf.ensemble(packed(30, 0.3)).index)
 
 
 def test_a_stress_that_can_be_prescribed_is_reported(cache, capsys):

@@ -2,7 +2,8 @@
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, ClassVar, Self
 
 from tqdm import tqdm
@@ -29,6 +30,15 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
         for part in value if sentences else [value]:
             print(f"{name:<{width}}  {text(part)}")
             name = ""
+
+
+@contextmanager
+def report_after(lines: Mapping[str, Any], as_json: bool) -> Iterator[None]:
+    """Print a report once the files are written, or cannot be: a closed pipe costs no file."""
+    try:
+        yield
+    finally:
+        print_report(lines, as_json)
 
 
 def table(

@@ -21,7 +21,7 @@ from granforce.cli.results import (
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
-from granforce.system.terminal import print_report
+from granforce.system.terminal import report_after
 
 
 def perturb(arguments: argparse.Namespace) -> None:
@@ -55,13 +55,13 @@ def perturb(arguments: argparse.Namespace) -> None:
         "largest_breach": float(dataset["motion_breach"].max()),
         **ends,
     }
-    print_report(lines, arguments.json)
-    if arguments.out is not None:
-        names = ("limit_load", "critical_low", "critical_high")
-        columns = contact_labels(arguments, parameters, dataset)
-        columns |= forces.named({name: dataset[name].values for name in names})
-        names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
-        write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
+    with report_after(lines, arguments.json):
+        if arguments.out is not None:
+            names = ("limit_load", "critical_low", "critical_high")
+            columns = contact_labels(arguments, parameters, dataset)
+            columns |= forces.named({name: dataset[name].values for name in names})
+            names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
+            write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
 
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
@@ -93,15 +93,15 @@ def intervals(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    print_report(lines, arguments.json)
-    if arguments.out is not None:
-        bounds = {
-            f"{part}_{side}": dataset[side].values[:, k]
-            for side in ("low", "high")
-            for k, part in enumerate(("f_n", "f_t"))
-        }
-        columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
-        write_columns(arguments.out, columns | {"cluster": cluster})
+    with report_after(lines, arguments.json):
+        if arguments.out is not None:
+            bounds = {
+                f"{part}_{side}": dataset[side].values[:, k]
+                for side in ("low", "high")
+                for k, part in enumerate(("f_n", "f_t"))
+            }
+            columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
+            write_columns(arguments.out, columns | {"cluster": cluster})
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
@@ -121,10 +121,10 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    print_report(lines, arguments.json)
-    if arguments.out is not None:
-        columns = contact_labels(arguments, parameters, dataset)
-        write_columns(arguments.out, columns | forces.named({"limit_load": load}))
+    with report_after(lines, arguments.json):
+        if arguments.out is not None:
+            columns = contact_labels(arguments, parameters, dataset)
+            write_columns(arguments.out, columns | forces.named({"limit_load": load}))
 
 
 def stress(arguments: argparse.Namespace) -> None:
@@ -149,7 +149,7 @@ def stress(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": float(dataset["stress_gap"].max()),
         **ends,
     }
-    print_report(lines, arguments.json)
-    if arguments.out is not None:
-        names = {"angle [rad]": "stress_angle", "largest [pressure]": "stress_support"}
-        write_columns(arguments.out, {k: dataset[v].values for k, v in names.items()})
+    with report_after(lines, arguments.json):
+        if arguments.out is not None:
+            names = {"angle [rad]": "stress_angle", "largest [pressure]": "stress_support"}
+            write_columns(arguments.out, {k: dataset[v].values for k, v in names.items()})

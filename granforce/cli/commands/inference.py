@@ -18,7 +18,7 @@ from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.system.plain import spaced
-from granforce.system.terminal import print_report, table
+from granforce.system.terminal import report_after, table
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -43,14 +43,12 @@ def informative(arguments: argparse.Namespace) -> None:
     }
     lines = {"entry": entry, "mean_interval_now [mean]": dataset["mean_before"].item(), **ends}
     ranked = {name: values.tolist() for name, values in columns.items()}
-    if arguments.json:
-        print_report(lines | ranked, True)
-    else:
-        print_report(lines, False)
+    with report_after(lines | ranked if arguments.json else lines, arguments.json):
+        if arguments.out is not None:
+            write_columns(arguments.out, columns)
+    if not arguments.json:
         rows = [dict(zip(ranked, row, strict=True)) for row in zip(*ranked.values(), strict=True)]
         table(rows, list(ranked), {name: spaced(name) for name in ranked})
-    if arguments.out is not None:
-        write_columns(arguments.out, columns)
 
 
 def infer(arguments: argparse.Namespace) -> int | None:
@@ -111,7 +109,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         for k, part in enumerate(("f_n", "f_t")):
             expected = dataset["expected"].values[:, k]
             columns |= forces.named({f"mean_{part}": expected, f"error_{part}": error[:, k]})
-    print_report(lines | ends, arguments.json)
-    if arguments.csv is not None:
-        write_csv(arguments.csv, columns)
+    with report_after(lines | ends, arguments.json):
+        if arguments.csv is not None:
+            write_csv(arguments.csv, columns)
     return None

@@ -26,7 +26,7 @@ from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.memory import check_memory
-from granforce.system.terminal import Bar, print_report, table
+from granforce.system.terminal import Bar, print_report, report_after, table
 from granforce.types import Rows
 
 
@@ -127,12 +127,12 @@ def measure(arguments: argparse.Namespace) -> None:
         "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
         "original_distance": dataset["original_distance"].item(),
     }
-    print_report(lines, arguments.json)
-    if arguments.contacts is not None:
-        sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
-        columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
-        labels = contact_labels(arguments, parameters, dataset)
-        write_csv(arguments.contacts, labels | forces.named(columns))
+    with report_after(lines, arguments.json):
+        if arguments.contacts is not None:
+            sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
+            columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
+            labels = contact_labels(arguments, parameters, dataset)
+            write_csv(arguments.contacts, labels | forces.named(columns))
 
 
 def scan(arguments: argparse.Namespace) -> int:
