@@ -125,19 +125,18 @@ def _plane(
 
 
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
-    """Labels of the two axes, in words."""
+    """Labels of the two axes, short enough for the height of the plot on a phone."""
     if plane.pair:  # its lines have colours
-        return tuple(f"normal force at the {colour} line (mean force = 1)" for colour in PAIR)
+        return tuple(f"fₙ at the {colour} line, in ⟨fₙ⟩" for colour in PAIR)
     if plane.components:
         return tuple(
-            f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "
-            f"{replay.backbone[contact]} (mean force = 1)"
+            f"{'fₙ' if component == 0 else 'fₜ'} of contact {replay.backbone[contact]}, in ⟨fₙ⟩"
             for contact, component in plane.components
         )
     if plane.kind == STRESS:
         return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
     return (
-        "the direction in which networks differ most (mean force = 1)",
+        "the direction in which networks differ most, in ⟨fₙ⟩",
         "the second such direction",
     )
 

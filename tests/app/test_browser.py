@@ -228,8 +228,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     x, y = (round(value) for value in at(page, *free))
     page.mouse.move(x, y)
     zoomed(page, -400)
-    page.wait_for_timeout(100)
-    assert scene(page, "scene.view.half") < 0.7 * whole
+    until(page, f"scene.view.half < 0.7 * {whole}")
     assert at(page, *free) == pytest.approx((x, y), abs=2)
     place = at(page, *free)
     outside = scene(page, "scene.counts.outside")
@@ -240,8 +239,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     page.mouse.up()
     assert at(page, *free) == pytest.approx((place[0] + 40, place[1] + 25), abs=0.1)
     page.mouse.dblclick(x, y)
-    page.wait_for_timeout(100)
-    assert scene(page, "scene.view.half") == whole
+    until(page, f"scene.view.half === {whole}")
     no_more(page, "zoom=")
 
 
@@ -249,9 +247,8 @@ def test_leaving_out_thin_and_unseen_chains_changes_no_pixel(page):
     """Contacts out of view and thinner than a tenth of a pixel are counted, not drawn."""
     page.mouse.move(*at(page, 4, 4))
     zoomed(page, -500)
-    page.wait_for_timeout(200)
+    until(page, "scene.counts.outside > 0")
     counts = scene(page, "scene.counts")
-    assert counts["outside"] > 0
     assert counts["drawn"] + counts["outside"] + counts["thin"] == counts["segments"]
     before = pixels(page)
     all_drawn = page.locator(".scene").evaluate(
@@ -292,23 +289,29 @@ def test_chains_are_coloured_by_what_is_chosen(visit, colour):
 # Playing
 
 
+FRAMES = """count => new Promise((done) => {
+    const next = () => (count-- > 0 ? requestAnimationFrame(next) : done())
+    next()
+})"""
+
+
 def test_play_changes_the_chains_without_the_server(page):
-    page.wait_for_timeout(500)
+    searched(page, "paused=1", "open=check")
     page.locator("input.speed").fill("2")
     before = scene(page, "[scene.painted, Array.from(scene.style.width)]")
     page.locator("button.play").click()
-    page.wait_for_timeout(400)  # the page reports once that it plays
+    no_more(page, "paused=")  # the page reports once that it plays
     page.evaluate("""() => {
         window.told = 0
         const send = WebSocket.prototype.send
         WebSocket.prototype.send = function (...given) { window.told += 1; send.apply(this, given) }
     }""")
-    page.wait_for_timeout(800)
-    assert page.evaluate("told") <= 1  # a ping may fall in
+    until(page, f"scene.painted > {scene(page, 'scene.painted')} + 30")
+    assert page.evaluate("told") < 10  # in 30 frames: a ping, or a message of three parts
     page.locator("button.play").click()
     after = scene(page, "[scene.painted, Array.from(scene.style.width)]")
-    assert after[1] != before[1] and after[0] - before[0] >= 8
-    page.wait_for_timeout(400)
+    assert after[1] != before[1]
+    page.evaluate(FRAMES, 20)
     assert scene(page, "scene.painted") <= after[0] + 1
 
 
@@ -335,9 +338,9 @@ def test_a_pause_goes_to_the_nearest_state(visit, motion):
     page.emulate_media(reduced_motion=motion)
     page.locator("input.speed").fill("1")
     page.locator("button.play").click()
-    page.wait_for_timeout(700)
-    page.locator("button.play").click()
     player = "scene.hand.player"
+    until(page, f"{player}.replay.position > 0.5")
+    page.locator("button.play").click()
     until(page, f"!{player}.playing && {player}.replay.position % 1 === 0")
     shown, frames, frame, told = scene(
         page,
@@ -541,7 +544,6 @@ def test_the_command_line_is_copied(page):
 @pytest.mark.parametrize("width, dark", [(1280, 1), (400, 0)])
 def test_pictures_by_day_and_by_night(visit, width, dark):
     page = visit(f"?dark={dark}&frame=7&colour=extent", width)
-    page.wait_for_timeout(800)
     background = page.evaluate("getComputedStyle(document.body).backgroundColor")
     brightness = sum(int(value) for value in re.findall(r"\d+", background)[:3]) / 3
     assert (brightness < 80) == bool(dark)

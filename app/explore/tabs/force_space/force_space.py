@@ -22,7 +22,7 @@ from .space_figure import Columns, SpaceFigure
 WHOLE = "principal", "stress"  # planes that do not depend on the selected contact
 # Width over height: next to the packing a window is no higher than this; on a wide screen force
 # space has its own column.
-ASPECT, WIDE_ASPECT = 1.6, 1.15
+ASPECT, WIDE_ASPECT = 1.7, 1.15
 COMING = "Networks appear as they are sampled."
 GROWS = "Networks appear as they are sampled; the exact outline of S follows."
 ONE_POINT = "At h = 0 the forces are determined: S is one point."
