@@ -90,10 +90,10 @@ def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> P
 
 
 def strong_pair(replay: Replay) -> tuple[int, int]:
-    """Two contacts, positions in the backbone: the strongest as packed, and the next without a
-    disk in common.
+    """The strongest contact as packed, and the next without a disk in common, as positions.
 
-    If there is none, the second strongest. InputError for fewer than two.
+    If there is none, the second strongest. Positions are in the backbone. InputError for fewer
+    than two.
     """
     if replay.normal.shape[1] < 2:
         raise InputError("there are not two contacts to compare")
