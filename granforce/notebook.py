@@ -5,7 +5,7 @@ Plain arrays and numbers in, text out: every package may use this; it needs no p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple, TypeVar
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from granforce.cell import Cell
 from granforce.glossary import TERMS
-from granforce.types import Floats, Integers
+from granforce.types import Floats
 
 T = TypeVar("T")
 
@@ -90,11 +90,12 @@ class Picture(NamedTuple):
     cell: Cell
     x: Floats  # (N, 2) centres, length
     r: Floats  # (N,) radii
-    first: Integers  # (N_c,) the grain from which each branch starts
-    branch: Floats  # (N_c, 2) from centre to centre
+    begin: Floats  # (N_c, 2) one end of each line of force
+    branch: Floats  # (N_c, 2) from there to the other
     forces: Floats  # (N_c, 2) f_n, f_t
     mu: float
     packing_fraction: float  # NaN in an open box
+    polygons: Sequence[Floats]  # (k, 2) corners of each body, empty for a disk; none if all are
 
 
 def packing_svg(packing: Picture) -> str:
@@ -109,7 +110,7 @@ def packing_svg(packing: Picture) -> str:
         return (points - low) * [scale, -scale] + [0, height]
 
     words = _words(packing)
-    drawn = [*_disks(packing, place, x, scale), *_chains(packing, place, x, scale)]
+    drawn = [*_disks(packing, place, x, scale), *_chains(packing, place, scale)]
     drawn = _cut(packing, place, drawn)
     text = "".join(
         f'<text x="4" y="{height + LINE * (k + 1):.0f}">{escape(line)}</text>'
@@ -129,12 +130,20 @@ def _window(packing: Picture) -> tuple[Floats, Floats]:
     """Lower left corner (2,) and sides (2,) of the picture: the cell, or the disks if open."""
     if not len(packing.r):
         return np.zeros(2), np.ones(2)
-    low = (packing.x - packing.r[:, None]).min(axis=0)
-    high = (packing.x + packing.r[:, None]).max(axis=0)
+    radius = _radii(packing)[:, None]
+    low = np.min([*(packing.x - radius), *np.concatenate([packing.x, *packing.polygons])], axis=0)
+    high = np.max([*(packing.x + radius), *np.concatenate([packing.x, *packing.polygons])], axis=0)
     closed = np.isfinite(packing.cell.box)
     corner, opposite = packing.cell.extent
     low = np.where(closed, corner, low)
     return low, np.where(closed, opposite, high) - low
+
+
+def _radii(packing: Picture) -> Floats:
+    """Radii (N,) of disks, 0 for polygons."""
+    radius = packing.r.copy()
+    radius[[k for k, corners in enumerate(packing.polygons) if len(corners)]] = 0.0
+    return radius
 
 
 def _cut(packing: Picture, place: Callable[[Floats], Floats], drawn: list[str]) -> list[str]:
@@ -158,18 +167,22 @@ def _disks(
     if not len(x) or len(x) > MOST_DRAWN:
         return
     yield '<g fill="#eeeeee" stroke="#aaaaaa" stroke-width="0.5">'
-    cell, radius = packing.cell, packing.r[:, None]
-    at = cell.across(x)
-    for moved, grains in cell.images(at - radius, at + radius):
-        for (a, b), r in zip(place(x[grains] + moved), packing.r[grains], strict=True):
+    for corners in packing.polygons:
+        outline = " ".join(f"{a:.1f},{b:.1f}" for a, b in place(corners))
+        yield f'<polygon points="{outline}"/>' if len(corners) else ""
+    # Polygons lie in an open box, and have no circle.
+    radius = _radii(packing)
+    cell, at = packing.cell, packing.cell.across(x)
+    for moved, grains in cell.images(at - radius[:, None], at + radius[:, None]):
+        for (a, b), r in zip(place(x[grains] + moved), radius[grains], strict=True):
+            if r == 0:
+                continue
             yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{r * scale:.1f}"/>'
     yield "</g>"
 
 
-def _chains(
-    packing: Picture, place: Callable[[Floats], Floats], x: Floats, scale: float
-) -> Iterator[str]:
-    """Pressing contacts as lines between centres: one path for each width and colour."""
+def _chains(packing: Picture, place: Callable[[Floats], Floats], scale: float) -> Iterator[str]:
+    """Pressing contacts as lines: one path for each width and colour."""
     normal, tangential = packing.forces.T
     pressing = np.flatnonzero(normal > 0)
     if not len(pressing):
@@ -181,7 +194,7 @@ def _chains(
     mobilised = np.divide(tangential[pressing], friction, np.zeros_like(force), where=friction > 0)
     colour = ((np.clip(mobilised, -1, 1) + 1) / 2 * len(COLOURS)).astype(int)
     colour = np.minimum(colour, len(COLOURS) - 1)
-    begin = x[packing.first[pressing]]
+    begin = packing.begin[pressing]
     end = begin + packing.branch[pressing]
     paths: dict[tuple[int, int], list[str]] = {}
     cell = packing.cell
@@ -204,7 +217,8 @@ def _words(packing: Picture) -> list[str]:
     """The numbers of a packing in two lines."""
     normal = packing.forces[:, 0]
     pressing = normal[normal > 0]
-    first = [f"{len(packing.r)} disks", f"μ = {packing.mu:g}"]
+    kind = "bodies" if packing.polygons else "disks"
+    first = [f"{len(packing.r)} {kind}", f"μ = {packing.mu:g}"]
     if np.isfinite(packing.cell.box).all():
         first.append(f"φ = {packing.packing_fraction:.4f}")
     second = [f"{len(pressing)} of {len(normal)} contacts press"]

@@ -149,19 +149,36 @@ class Packing(NamedTuple):
         """φ = Σ π r² / V, including rattlers; NaN in an open box."""
         return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan
 
+    def through_contacts(self, numbers: Integers, forces: Floats) -> tuple[Floats, Floats]:
+        """Lines through contacts (k,) along their forces (k, 2): begin and branch (k, 2).
+
+        They are 1.4 times as long as the shorter arm, so that the lines of a body stay apart.
+        """
+        c = self.contacts.picked(numbers)
+        along = forces[:, :1] * c.normal + forces[:, 1:] * c.tangent
+        size = np.hypot(*along.T)
+        half = 0.7 * np.minimum(np.abs(c.arm_i), np.abs(c.arm_j)) / np.where(size > 0, size, 1.0)
+        branch = 2 * half[:, None] * along
+        return self.contact_points[numbers] - 0.5 * branch, branch
+
     def _repr_svg_(self) -> str:
         """The packing as displayed in notebooks."""
         contacts = self.contacts
+        begin, branch = self.cell.wrapped(self.x)[contacts.i], contacts.length[:, None]
+        branch = branch * contacts.normal
+        if self.shapes is not None:
+            begin, branch = self.through_contacts(np.arange(len(contacts.i)), self.forces)
         return notebook.packing_svg(
             notebook.Picture(
                 cell=self.cell,
                 x=self.x,
                 r=self.r,
-                first=contacts.i,
-                branch=contacts.length[:, None] * contacts.normal,
+                begin=begin,
+                branch=branch,
                 forces=self.forces,
                 mu=self.mu,
                 packing_fraction=self.packing_fraction,
+                polygons=() if self.shapes is None else self.shapes.polygons(),
             )
         )
 

@@ -40,14 +40,16 @@ def add_pack(commands: Commands) -> None:
         "pack",
         "make a jammed packing, or load it from the store",
         "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz\n"
-        "  granforce pack --scene groove --mu 0.5",
+        "  granforce pack --scene groove --mu 0.5\n"
+        "  granforce pack --scene arch --out arch.npz",
     )
     command.add_argument(
         "--scene",
         type=str,
         metavar="NAME",
         help="a small scene instead of a compressed packing: groove, box, pyramid, press, "
-        "leaning, six, solid, column, thirteen or many; only --mu applies to it",
+        "leaning, six, solid, column, thirteen or many, or blocks: slope, ladder, books, arch or "
+        "wall; only --mu applies to it",
     )
     add_packing(command)
     add_store(command)
@@ -389,6 +391,28 @@ def add_limit_loads(commands: Commands) -> None:
     add_exact(command)
 
 
+def add_limit_load(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "limit-load",
+        "compute the largest multiple of a load on all bodies that contact forces can balance",
+        "granforce pack --scene wall --out wall.npz\n"
+        "  granforce limit-load wall.npz --load horizontal",
+    )
+    command.add_argument("file", type=Input, metavar="FILE.npz", help="the packing, with weights")
+    command.add_argument(
+        "--load",
+        choices=["horizontal"],
+        required=True,
+        help="horizontal: the weight of every body, turned to +x",
+    )
+    command.add_argument(
+        "--critical",
+        action="store_true",
+        help="also raise the load from the packing's own forces until bodies move",
+    )
+
+
 def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -652,6 +676,7 @@ COMMANDS = (
     add_figures,
     add_intervals,
     add_limit_loads,
+    add_limit_load,
     add_stress,
     add_perturb,
     add_study,

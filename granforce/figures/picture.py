@@ -37,6 +37,7 @@ def plot(
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
+    Bodies of other shapes are drawn with lines through the contact points, along the forces.
     states: a network (k, 2) or networks (…, k, 2), also of several chains, whose mean is drawn,
     force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
     there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
@@ -59,13 +60,14 @@ def plot(
     mean = several.mean(axis=0)
     unit = mean[:, 0].mean() or 1.0
     values, label, look = _coloured(packing, several, mean, colour, unit)
-    elements = [*_disks(packing, backend), *outline(packing, backend)]
+    elements = [*_bodies(packing, backend), *outline(packing, backend)]
     elements += _walls(packing, numbers, backend)
-    elements.append(_lines(packing, numbers, mean[:, 0] / unit, values, label, look, backend))
+    elements.append(_lines(packing, numbers, mean / unit, values, label, look, backend))
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
-    title = f"{(~_held(packing)).sum()} disks, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
+    kind = "disks" if packing.shapes is None else "bodies"
+    title = f"{(~_held(packing)).sum()} {kind}, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
 
 
@@ -90,18 +92,16 @@ def _coloured(
 def _lines(
     packing: Packing,
     numbers: npt.NDArray[Any],
-    force: Floats,
+    forces: Floats,
     values: Floats,
     label: str,
     look: dict[str, Any],
     backend: str,
 ) -> hv.Segments:
-    """Pressing contacts as lines between centres or to a wall, with every image in the cell."""
-    c, cell = packing.contacts.picked(numbers), packing.cell
+    """Pressing contacts (forces > 0) as lines, with every image in the cell."""
+    cell, force = packing.cell, forces[:, 0]
     pressing = np.flatnonzero(force > 0)
-    begin = cell.wrapped(packing.x[c.i[pressing]])
-    reach = np.where(_held(packing)[c.j], c.arm_i, c.length)[pressing]
-    end = begin + reach[:, None] * c.normal[pressing]
+    begin, end = _ends(packing, numbers[pressing], forces[pressing])
     across = cell.across(begin), cell.across(end)
     rows = []
     width = np.minimum(force[pressing], WIDEST) * (2.5 if backend == "bokeh" else 1.5)
@@ -123,25 +123,51 @@ def _lines(
     )
 
 
+def _ends(packing: Packing, numbers: npt.NDArray[Any], forces: Floats) -> tuple[Floats, Floats]:
+    """Both ends (k, 2) of contact lines: centres or walls, or along the forces of bodies."""
+    if packing.shapes is not None:
+        begin, branch = packing.through_contacts(numbers, forces)
+        return begin, begin + branch
+    c = packing.contacts.picked(numbers)
+    begin = packing.cell.wrapped(packing.x[c.i])
+    reach = np.where(_held(packing)[c.j], c.arm_i, c.length)
+    return begin, begin + reach[:, None] * c.normal
+
+
 def _held(packing: Packing) -> npt.NDArray[np.bool_]:
     """(N,) bool: walls and other grains whose balance is left open."""
     return np.asarray(np.isnan(packing.load).any(axis=1))
 
 
-def _disks(packing: Packing, backend: str) -> list[Any]:
+def _bodies(packing: Packing, backend: str) -> list[Any]:
+    """Disks, or bodies of other shapes; of those the fixed ones too, darker."""
     disks = np.flatnonzero(~_held(packing))
     if len(disks) > MOST_DISKS:
         return []
+    if packing.shapes is not None:
+        drawn = [
+            corners if len(corners) else x + r * _CIRCLE
+            for x, r, corners in zip(packing.x, packing.r, packing.shapes.polygons(), strict=True)
+        ]
+        fixed = np.flatnonzero(_held(packing))
+        return [
+            _polygons([drawn[k] for k in which], backend, colour)
+            for which, colour in ((fixed, EDGE), (disks, FILL))
+        ]
     x, r, cell = packing.cell.wrapped(packing.x[disks]), packing.r[disks], packing.cell
     at, shapes = cell.across(x), []
     for moved, seen in cell.images(at - r[:, None], at + r[:, None]):
         shapes += [x[k] + moved + r[k] * _CIRCLE for k in seen]
+    return [_polygons(shapes, backend, FILL)]
+
+
+def _polygons(shapes: list[Floats], backend: str, fill: str) -> Any:
     # In Matplotlib by `color` too: HoloViews takes Bokeh's default for it where Bokeh came first.
     if backend == "bokeh":
-        look = {"fill_color": FILL, "line_color": EDGE}
+        look = {"fill_color": fill, "line_color": EDGE}
     else:
-        look = {"color": FILL, "facecolor": FILL, "edgecolor": EDGE}
-    return [hv.Polygons(shapes).opts(backend=backend, **look)]
+        look = {"color": fill, "facecolor": fill, "edgecolor": EDGE}
+    return hv.Polygons(shapes).opts(backend=backend, **look)
 
 
 def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[Any]:
@@ -151,7 +177,7 @@ def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[An
         return [hv.Segments(given, label="wall").opts(backend=backend, color="#000000")]
     c, held = packing.contacts.picked(numbers), _held(packing)
     touched = np.flatnonzero(held[c.j])
-    if not len(touched):
+    if packing.shapes is not None or not len(touched):
         return []
     at, normal = packing.contact_points[numbers[touched]], c.normal[touched]
     along = np.column_stack([-normal[:, 1], normal[:, 0]]) * packing.r[c.i[touched], None] * 0.7

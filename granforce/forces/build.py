@@ -16,7 +16,7 @@ from granforce.forces import backbone, balance, knowledge
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.hull import hull_of
 from granforce.forces.knowledge import Known
-from granforce.forces.nearest import nearest
+from granforce.forces.nearest import nearest, starting_network
 from granforce.records import InputError, NotJammedError, Packing, friction, takes
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Floats, Integers, Mask
@@ -73,6 +73,30 @@ def ensemble(
     pruned = _pruned(full, conditions)
     _check_idle_and_known(pruned, bounds)
     return pruned
+
+
+def with_idle(S: Ensemble) -> Ensemble:
+    """The same with the contacts that carry nothing, which may carry under other loads.
+
+    Raises InputError if a pressure or a stress is prescribed.
+    """
+    if S.has_pressure_row:
+        raise InputError(
+            "loads on grains need a packing without a prescribed pressure or stress; give it "
+            "weights in an open box"
+        )
+    count = len(S.packing.contacts.i)
+    held, bounds = np.zeros(count, dtype=bool), None
+    held[S.frozen] = True
+    if len(S.index) + len(S.frozen) == count:
+        return S
+    if S.known is not None:
+        bounds = np.tile([-np.inf, np.inf], (count, 2, 1))
+        bounds[S.index] = S.bounds
+    conditions = _Conditions(S.mu, held, None, bounds)
+    full = _assemble(S.packing, conditions, np.flatnonzero(~held))
+    found = starting_network(S)
+    return replace(full, found=S.expand(found)[full.index], force_scale=S.force_scale)
 
 
 def ensemble_at(packing: Packing | Ensemble, **conditions: Any) -> Ensemble:

@@ -101,13 +101,14 @@ class Flows(NamedTuple):
 
 
 class Push(NamedTuple):
-    """A flow to compute: from forces, under a pair of `load` on a contact (its position)."""
+    """A flow to compute: from forces, under a pair of `load` on a contact, or a load on grains."""
 
     forces: Floats  # (N_c, 2) ⟨f_n⟩
-    contact: int
+    contact: int  # its position
     load: float  # ⟨f_n⟩
     max_steps: int
     steady: float  # violation of Coulomb's law in steady motion, relative to the fastest contact
+    direction: Floats | None = None  # (rows,) of the load on grains, instead of the contact
 
 
 class Outcome(NamedTuple):
@@ -170,10 +171,16 @@ def make_flows(step: Step, width: int) -> Flows:
 def start(step: Step, flows: Flows, lane: int, push: Push) -> None:
     """Start a Push in a lane."""
     flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
-    pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
-    border = np.ascontiguousarray(flows.load.border[:, [lane]])
-    _pushed(step.network, push.contact, -float(push.load), pair, border)
-    flows.load.rows[:, [lane]], flows.load.border[:, [lane]] = pair, border
+    if push.direction is None:
+        pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
+        border = np.ascontiguousarray(flows.load.border[:, [lane]])
+        _pushed(step.network, push.contact, -float(push.load), pair, border)
+        flows.load.rows[:, [lane]], flows.load.border[:, [lane]] = pair, border
+    else:
+        rows = np.zeros(len(step.b) + len(step.b_border))
+        rows[step.place] = push.load * push.direction
+        flows.load.rows[:, lane] -= rows[: len(step.b)]
+        flows.load.border[:, lane] -= rows[len(step.b) :]
     flows.forces[:, lane] = np.asarray(push.forces).ravel()
     for vector in (flows.velocity, flows.kept):
         vector.rows[:, lane], vector.border[:, lane] = 0.0, 0.0

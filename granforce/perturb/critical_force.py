@@ -91,7 +91,7 @@ class Response(NamedTuple):
     displacement: Floats  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
     rotation: Floats  # (N,) rotation times radius; NaN for rattlers
     dilation: float  # of the box, ΔL/L per unit of u, 1/length
-    opening: Integers  # (N_c,) normal relative displacement of the ensemble's contacts
+    opening: Floats  # (N_c,) normal relative displacement of the ensemble's contacts
     opened: Mask  # (N_c,) bool, contacts without force
     slid: Mask  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
     kept: Mask  # (N_c,) bool, sticking contacts
@@ -159,14 +159,8 @@ def critical_forces(
     Raises UndecidedError if a limit load cannot be certified, or is given as NaN; InputError if the
     search ends at a given limit load that is below the exact one.
     """
-    S, protocol = ensemble, Protocol(**protocol)
-    precision = positive(
-        protocol.precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION
-    )
-    rise = positive(protocol.rise, "rise")
-    if rise > 1:
-        raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
-    protocol = Protocol(precision, rise, whole(protocol.max_steps, "max_steps", 1))
+    S, protocol = ensemble, checked(Protocol(**protocol))
+    precision = protocol.precision
     positions, workers = S.positions(contacts), worker_count(workers)
     contacts = S.index[positions]
     if limit_loads is not None:
@@ -186,7 +180,7 @@ def critical_forces(
         raise UndecidedError(f"the limit load of contact {number} could not be certified")
     step, start = make_step(S), starting_network(S) / S.force_scale
     works = [
-        _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)
+        _pushed(S, int(contact), position, float(limit) / S.force_scale, start, protocol)
         for contact, position, limit in zip(contacts, positions, limit_loads, strict=True)
     ]
     found = {}
@@ -200,6 +194,17 @@ def critical_forces(
     if given:
         _check_limits(S, list(found.values()), precision, workers)
     return [found[k] for k in range(len(works))]
+
+
+def checked(protocol: Protocol) -> Protocol:
+    """The protocol with plain numbers; InputError for values out of range."""
+    precision = positive(
+        protocol.precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION
+    )
+    rise = positive(protocol.rise, "rise")
+    if rise > 1:
+        raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
+    return Protocol(precision, rise, whole(protocol.max_steps, "max_steps", 1))
 
 
 def _check_limits(
@@ -217,51 +222,61 @@ def _check_limits(
             )
 
 
-def _raised(
-    S: Ensemble,
-    step: Step,
-    contact: int,
-    position: int,
-    limit: float,
-    start: Floats,
-    protocol: Protocol,
+def _pushed(
+    S: Ensemble, contact: int, position: int, limit: float, start: Floats, protocol: Protocol
 ) -> Asking[CriticalForce]:
     """Generator for `works.follow`: the CriticalForce of a contact."""
+    found = yield from raised(Push(start, position, 0.0, 0, 0.0), limit, protocol)
+    loaded = found.forces.copy()
+    loaded[position, 0] += found.low
+    return CriticalForce(
+        contact=contact,
+        mu=S.mu,
+        low=found.low * S.force_scale,
+        high=found.high * S.force_scale,
+        limit_load=limit * S.force_scale,
+        forces=found.forces * S.force_scale,
+        residual=S.residual(loaded * S.force_scale),
+        violation=S.violation(found.forces * S.force_scale),
+        moving=found.moving,
+        converged=bool(found.moving is None or found.moving.converged),
+        counts=found.counts,
+        seconds=found.counts.pop("seconds"),
+    )
+
+
+class Raised(NamedTuple):
+    """Bracket of the largest load at rest, in ⟨f_n⟩."""
+
+    low: float
+    high: float
+    forces: Floats  # (N_c, 2) at rest under `low`
+    moving: Outcome | None  # under `high`; None if that was not tried
+    counts: dict[str, float]  # COUNTS, and seconds
+
+
+def raised(push: Push, limit: float, protocol: Protocol) -> Asking[Raised]:
+    """Generator for `works.follow`: raise the load of a Push from 0, and from its forces."""
     counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
-    forces, low, high = start, 0.0, limit
+    forces, low, high = push.forces, 0.0, limit
     while True:
-        low, high, forces, moving = yield from _bracket(
-            position, low, high, forces, protocol, counts
-        )
+        low, high, forces, moving = yield from _bracket(push, low, high, forces, protocol, counts)
         if moving is None or moving.breach <= STEADY:
             break
         # Follow the apparent motion further: it may come to rest.
-        push = Push(moving.forces, position, high, STEADY_STEPS, STEADY)
-        followed = yield from _relaxed(push, counts)
+        longer = push._replace(
+            forces=moving.forces, load=high, max_steps=STEADY_STEPS, steady=STEADY
+        )
+        followed = yield from _relaxed(longer, counts)
         if not followed.at_rest:
             moving = followed
             break
         low, high, forces = high, limit, followed.forces
-    loaded = forces.copy()
-    loaded[position, 0] += low
-    return CriticalForce(
-        contact=contact,
-        mu=S.mu,
-        low=low * S.force_scale,
-        high=high * S.force_scale,
-        limit_load=limit * S.force_scale,
-        forces=forces * S.force_scale,
-        residual=S.residual(loaded * S.force_scale),
-        violation=S.violation(forces * S.force_scale),
-        moving=moving,
-        converged=bool(moving is None or moving.converged),
-        counts=counts,
-        seconds=counts.pop("seconds"),
-    )
+    return Raised(low, high, forces, moving, counts)
 
 
 def _bracket(
-    position: int,
+    push: Push,
     low: float,
     high: float,
     forces: Floats,
@@ -276,8 +291,10 @@ def _bracket(
     while high - low > precision:
         load = low + (protocol.rise if moving is None else 0.5) * (high - low)
         load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
-        push = Push(forces, position, load, protocol.max_steps, flow.STEADY)
-        outcome = yield from _relaxed(push, counts)
+        tried = push._replace(
+            forces=forces, load=load, max_steps=protocol.max_steps, steady=flow.STEADY
+        )
+        outcome = yield from _relaxed(tried, counts)
         if outcome.at_rest:
             low, forces = load, outcome.forces
         else:
@@ -357,16 +374,25 @@ def _check_its_own(S: Ensemble, critical: CriticalForce, contact: int, position:
     S.refuse_foreign(loaded, critical.residual, "the critical force")
 
 
-def _response(
-    S: Ensemble, step: Step, contact: int, position: int, load: float, moving: Outcome
-) -> Response:
+def motion_of(S: Ensemble, moving: Outcome) -> tuple[Floats, Floats, float]:
+    """Displacement (N, 2) with rms |u| = 1, rotation times radius (N,), and the rms velocity.
+
+    NaN for grains outside the backbone.
+    """
     velocity = grain_velocities(S, moving.velocity)
     unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
-    relative = relative_velocities(step, moving.velocity) / unit
     count = len(S.packing.r)
     displacement, rotation = np.full((count, 2), np.nan), np.full(count, np.nan)
     displacement[S.grains] = velocity[:, :2] / unit
     rotation[S.grains] = velocity[:, 2] / unit
+    return displacement, rotation, float(unit)
+
+
+def _response(
+    S: Ensemble, step: Step, contact: int, position: int, load: float, moving: Outcome
+) -> Response:
+    displacement, rotation, unit = motion_of(S, moving)
+    relative = relative_velocities(step, moving.velocity) / unit
     box = moving.velocity[S.pressure_row] if S.has_pressure_row else 0.0
     normal, tangential = moving.forces.T
     opened = normal <= 0

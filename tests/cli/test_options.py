@@ -15,6 +15,7 @@ from packings import packed
 from granforce.cli import commands, parser, parsing
 from granforce.packing.importers import load_packing, save_packing
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
+from granforce.packing.scenes import scene
 from granforce.study.store import open_store
 
 MU = "-n 8 --mu 0.3"
@@ -37,6 +38,10 @@ LINES = {
     "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
     "intervals": [MU, "--packing p.npz"],
     "limit-loads": [MU, "--packing p.npz"],
+    "limit-load": [
+        "blocks.npz --load horizontal",
+        "blocks.npz --load horizontal --critical",
+    ],
     "stress": [f"{MU} --angles 4", "--packing p.npz --angles 4"],
     "perturb": [
         f"{MU} --random 1",
@@ -104,6 +109,7 @@ def place(tmp_path_factory):
     """A folder with the files that the command lines name, and a store of its own."""
     folder = tmp_path_factory.mktemp("place")
     save_packing(packed(8, 0.3), folder / "p.npz")
+    save_packing(scene("slope"), folder / "blocks.npz")
     (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     (folder / "r.txt").write_text("1\n" * 8)

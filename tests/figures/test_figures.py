@@ -15,6 +15,7 @@ from matplotlib.text import Text
 from packings import packed
 from PIL import Image
 
+import granforce as gf
 from granforce import figures
 from granforce.figures import style
 from granforce.paper import drawings, tables
@@ -352,3 +353,18 @@ def test_files_carry_their_caption(tmp_path):
     page = tmp_path / "figure.html"
     figures.save(figures.indeterminacy(ROWS), page, caption)
     assert "<title>η against μ, 1 &lt; 2</title>" in page.read_text()
+
+
+def test_bodies_are_drawn_as_they_are():
+    ground = [[-3, -1], [3, -1], [3, 0], [-3, 0]]
+    box = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    packing = gf.blocks([box, [0.5, 1.4, 0.4], ground], 0.5, fixed=[2])
+    drawn = gf.plot(packing)
+    fixed, bodies = (element for element in drawn if isinstance(element, hv.Polygons))
+    assert np.allclose(fixed.dimension_values(0), [-3, 3, 3, -3, -3])
+    assert len(bodies.split()) == 2
+    (lines,) = (element for element in drawn if isinstance(element, hv.Segments))
+    middle = lines.array()[:, :4].reshape(-1, 2, 2).mean(axis=1)
+    assert np.allclose(middle, packing.contact_points)
+    picture = packing._repr_svg_()
+    assert picture.count("<polygon") == 2 and picture.count("<circle") == 1

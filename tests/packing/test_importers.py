@@ -53,7 +53,7 @@ def tables(packing, forces=True, **grain_columns):
 def assert_same(a, b, **tolerance):
     same = np.testing.assert_allclose if tolerance else np.testing.assert_array_equal
     for one, two in zip([*a.contacts, *a], [*b.contacts, *b], strict=True):
-        if one is not a.contacts and not isinstance(one, dict):
+        if one is not None and one is not a.contacts and not isinstance(one, dict):
             same(one, two, **tolerance)
 
 

@@ -211,7 +211,7 @@ def reversed_contacts(packing):
 def relabelled(packing, grains, order):
     """Grain k becomes grain grains[k]; contacts come in the given order."""
     place = np.argsort(grains)
-    contacts = type(packing.contacts)(*(field[order] for field in packing.contacts))
+    contacts = packing.contacts.picked(order)
     return packing._replace(
         x=packing.x[place],
         r=packing.r[place],

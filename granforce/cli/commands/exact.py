@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +19,13 @@ from granforce.cli.results import (
     unit,
     write_columns,
 )
+from granforce.forces.build import ensemble
+from granforce.packing import importers
+from granforce.perturb import grain_loads
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
-from granforce.system.terminal import report_after
+from granforce.system.terminal import print_report, report_after
 
 
 def perturb(arguments: argparse.Namespace) -> None:
@@ -125,6 +129,25 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         if arguments.out is not None:
             columns = contact_labels(arguments, parameters, dataset)
             write_columns(arguments.out, columns | forces.named({"limit_load": load}))
+
+
+def limit_load(arguments: argparse.Namespace) -> None:
+    """Compute the limit load of a load on all grains, and its critical load on request."""
+    S = ensemble(importers.load_packing(arguments.file))
+    limit = grain_loads.limit_load(S, arguments.load)
+    lines: dict[str, Any] = {"bodies": len(S.packing.r), "contacts": len(S.packing.contacts.i)}
+    lines |= {"limit_load": limit.factor, "largest_duality_gap": limit.gap}
+    if arguments.critical:
+        critical = grain_loads.critical_load(S, arguments.load)
+        lines |= {
+            "critical_load_low": critical.low,
+            "critical_load_high": critical.high,
+            "residual": critical.residual,
+            "breach": critical.breach,
+            "converged": critical.converged,
+            **critical.counts,
+        }
+    print_report(lines, arguments.json)
 
 
 def stress(arguments: argparse.Namespace) -> None:

@@ -74,7 +74,7 @@ def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
         packing._replace(
             x=packing.x[:count] / unit,
             r=packing.r[:count] / unit,
-            contacts=c._replace(**{name: values[inner] for name, values in c._asdict().items()}),
+            contacts=c.picked(inner),
             forces=forces[inner],
             load=np.zeros((count, 3)),
         ),

@@ -1,0 +1,182 @@
+"""Loads on grains, raised in proportion: the limit load over S, and the critical load of motion.
+
+A load e (N, 3) of forces and torques, times λ, joins the weights: A f + λ e = b. The limit load is
+the largest λ for which some network balances; with friction it overestimates the strength, because
+it takes sliding contacts to dilate (Livesley, Int. J. Numer. Methods Eng. 12, 1853 (1978)). The
+critical load is the largest λ at which bodies stay at rest as contact dynamics raises it from the
+packing's own network, by the protocol of `critical_force`; it is never above the limit load.
+Contacts that carry nothing without the load are included.
+"""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce import notebook
+from granforce.forces.build import with_idle
+from granforce.forces.contact_problem import forces_of, make_system
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.nearest import some_network, starting_network
+from granforce.motion.flow import Outcome, Push
+from granforce.motion.inertia import make_step
+from granforce.motion.works import follow, relax
+from granforce.numerics.certified_values import most_under
+from granforce.perturb.critical_force import (
+    STEADY,
+    STEADY_STEPS,
+    Protocol,
+    Raised,
+    checked,
+    motion_of,
+    raised,
+)
+from granforce.records import InputError, Packing, UndecidedError, choice, float_array, takes
+from granforce.system import cancelling
+from granforce.tolerances import INTERVAL_GAP
+from granforce.types import Cancel, Floats
+
+
+@notebook.brief
+class LimitLoad(NamedTuple):
+    """Largest multiple of a load that networks can balance, certified from both sides."""
+
+    factor: float  # λ, attained by `forces`; inf without a limit
+    gap: float  # in λ: the limit is proved to be at most factor + gap
+    load: Floats  # (N, 3) the load, force and torque
+    forces: Floats  # (contacts, 2) a network at the limit, on all contacts of the packing, force
+
+
+@notebook.brief
+class CriticalLoad(NamedTuple):
+    """Largest multiple of a load at which bodies rest, and the motion above it."""
+
+    low: float  # largest λ that ended at rest
+    high: float  # smallest λ that did not, or the limit load if none was tried
+    limit_load: float  # λ
+    load: Floats  # (N, 3) the load, force and torque
+    forces: Floats  # (contacts, 2) equilibrium under `low`, on all contacts of the packing, force
+    residual: float  # its unbalance with the load, in ⟨f_n⟩
+    violation: float  # in ⟨f_n⟩
+    displacement: Floats  # (N, 2) the first motion, rms |u| = 1; NaN for fixed bodies
+    rotation: Floats  # (N,) rotation times radius; NaN likewise
+    breach: float  # of Coulomb's law by that motion, relative to the fastest contact
+    converged: bool  # high − low ≤ precision, and the motion is steady
+    counts: dict[str, float]  # as in CriticalForce
+
+
+@takes(Ensemble)
+@cancelling.cancellable
+def limit_load(
+    ensemble: Ensemble, load: npt.ArrayLike | str = "horizontal", *, cancel: Cancel | None = None
+) -> LimitLoad:
+    """The largest λ ≥ 0 for which S is not empty with λ times a load on the grains.
+
+    load (N, 3): force and torque on each grain of the packing, or "horizontal": the weights turned
+    to +x. Loads on grains whose balance is left open have no effect. One linear program, by HiGHS;
+    the network and the multipliers that certify the limit are checked here.
+
+    Raises InputError if a pressure is prescribed, if the load acts on no grain, and if forces in S
+    are unbounded; UndecidedError if the limit could not be certified.
+    """
+    return _limit(with_idle(ensemble), load)
+
+
+def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LimitLoad:
+    load = _loads(S.packing, load)
+    direction, unit = _direction(S, load)
+    unit /= S.force_scale
+    value, bound, y = most_under(make_system(S).under(direction))
+    if value == -np.inf:
+        return LimitLoad(np.inf, 0.0, load, np.full((len(S.packing.contacts.i), 2), np.nan))
+    if np.isfinite(value):
+        forces = forces_of(S, y)
+    elif np.isfinite(bound):  # the optimum was not balanced to rounding: project it
+        value = bound + 0.5 * INTERVAL_GAP
+        under = replace(S, b=S.b + value * S.force_scale * direction, found=None)
+        forces = some_network(under, starting_network(S))
+        value = value if under.admits(forces) else np.inf
+    if not abs(value - bound) <= INTERVAL_GAP:
+        raise UndecidedError("the limit of this load could not be certified")
+    # Differences of two rounded numbers; λ is 0 if nothing but the weights can be balanced.
+    return LimitLoad(max(0.0, -value) / unit, abs(value - bound) / unit, load, S.expand(forces))
+
+
+@takes(Ensemble)
+@cancelling.cancellable
+def critical_load(
+    ensemble: Ensemble,
+    load: npt.ArrayLike | str = "horizontal",
+    *,
+    cancel: Cancel | None = None,
+    **protocol: Any,
+) -> CriticalLoad:
+    """The largest λ at which bodies stay at rest as λ times a load is raised, and the motion.
+
+    load: as for `limit_load`. The start is the packing's own network: another one may give another
+    critical load. protocol: fields of Protocol; `precision` is that of λ times the largest force of
+    the load, in ⟨f_n⟩. cancel() returning True raises Cancelled.
+
+    Raises the errors of `limit_load`, and InputError if no load moves the bodies.
+    """
+    S, asked = with_idle(ensemble), checked(Protocol(**protocol))
+    limit = _limit(S, load)
+    if not np.isfinite(limit.factor):
+        raise InputError("this load has no limit: no multiple of it moves the bodies")
+    direction, unit = _direction(S, limit.load)
+    unit /= S.force_scale
+    step, start = make_step(S), starting_network(S) / S.force_scale
+    push = Push(start, 0, 0.0, STEADY_STEPS, STEADY, direction)
+    ends: list[Raised] = []
+    work = raised(push, limit.factor * unit, asked)
+    follow(step, [work], lambda _, found: ends.append(found))
+    found, moving = ends[0], ends[0].moving
+    if moving is None:
+        beyond = found.high + asked.precision
+        moving = relax(step, push._replace(forces=found.forces, load=beyond))
+    forces = found.forces * S.force_scale
+    balanced = replace(S, b=S.b - found.low * S.force_scale * direction)
+    displacement, rotation = _motion(S, moving)
+    return CriticalLoad(
+        low=found.low / unit,
+        high=found.high / unit,
+        limit_load=limit.factor,
+        load=limit.load,
+        forces=S.expand(forces),
+        residual=balanced.residual(forces),
+        violation=S.violation(forces),
+        displacement=displacement,
+        rotation=rotation,
+        breach=moving.breach,
+        converged=bool(found.high - found.low <= asked.precision and moving.converged),
+        counts={name: n for name, n in found.counts.items() if name != "seconds"},
+    )
+
+
+def _motion(S: Ensemble, moving: Outcome) -> tuple[Floats, Floats]:
+    if moving.at_rest:
+        count = len(S.packing.r)
+        return np.full((count, 2), np.nan), np.full(count, np.nan)
+    return motion_of(S, moving)[:2]
+
+
+def _loads(packing: Packing, load: npt.ArrayLike | str) -> Floats:
+    if not isinstance(load, str):
+        return float_array(load, (len(packing.r), 3), "the load")
+    choice(load, ("horizontal", "a load (N, 3)"), "load")
+    turned = np.zeros_like(packing.load)
+    turned[:, 0] = -np.nan_to_num(packing.load[:, 1])
+    return turned
+
+
+def _direction(S: Ensemble, load: Floats) -> tuple[Floats, float]:
+    """The load on the rows of A, its largest entry 1, and that entry in force."""
+    rows = load[S.grains, : S.per_grain].copy()
+    rows[:, 2:] /= S.packing.r[S.grains, None]
+    unit = float(np.abs(rows).max(initial=0.0))
+    if unit == 0:
+        raise InputError("the load acts on no grain that has to balance")
+    if S.per_grain == 2 and load[S.grains, 2].any():
+        raise InputError("disks without friction carry no torque: leave it out of the load")
+    return rows.ravel() / unit, unit
