@@ -449,6 +449,8 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
             name,
         )
         assert min(box) >= 0 and box[2] <= 1920 and box[3] <= 1080
+    results = "e => e.getRootNode().host.scrollWidth <= e.getRootNode().host.clientWidth"
+    assert page.locator("section.results").evaluate(results)
     # the state on screen moves in all of them
     until(page, "scene.hand.player.replay.frame === 0 && !scene.hand.player.grows")
     page.wait_for_function(f"() => Number.isFinite({MODEL}('here').get_column('x')[0])")
