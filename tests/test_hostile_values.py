@@ -234,3 +234,9 @@ def test_whole_numbers_of_compaction_settings_compile_nothing_anew(S):
     """An int where a float is usual took a minute to compile for."""
     assert gf.pack(8, 0.3, 1, box_mass=100).info["box_mass"] == 100.0
     assert isinstance(gf.pack(8, 0.3, 1, box_mass=100).info["box_mass"], float)
+
+
+@pytest.mark.parametrize("noise", [0.1, "a", (-1.0,), (np.nan,), [[0.1]], None])
+def test_noise_that_is_no_list_of_deviations_is_refused(S, noise):
+    with pytest.raises(InputError, match="noise"):
+        gf.rest(S, noise=noise)

@@ -70,6 +70,12 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         # Before the imports, which take seconds.
         if isinstance(path, Input) and not os.path.lexists(os.path.expanduser(path)):
             return refused(f"{path}: cannot be read (No such file or directory); check the path")
+    threads = os.environ.get("NUMBA_NUM_THREADS", "").strip()
+    if threads.lstrip("-").isdecimal() and threads.lstrip("0")[:1] in ("", "-"):
+        # numba's import would fail.
+        return refused(
+            f"NUMBA_NUM_THREADS must be at least 1, got {threads[:20]}; change or unset it"
+        )
     from granforce.records import Cancelled, InputError
     from granforce.system.terminal import one_line
 

@@ -69,12 +69,27 @@ def refused(reason: str) -> int:
     return 2
 
 
+class _Once(argparse._StoreAction):
+    """Stores the value of an option, which may be given once: another value would replace it."""
+
+    def __call__(
+        self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
+    ) -> None:
+        if option_string is not None and self.dest in parser.seen:
+            parser.error(f"{option_string} is given twice; give it once")
+        parser.seen.add(self.dest)
+        super().__call__(parser, namespace, values, option_string)
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that reports errors in one line and rejects options without effect."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.unused: list[Unused] = []
+        self.seen: set[str] = set()  # attributes given so far in a command line
+        for name in (None, "store"):
+            self.register("action", name, _Once)
 
     def error(self, message: str) -> NoReturn:
         self.exit(refused(f"{message}; see {self.prog} --help"))
@@ -100,6 +115,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
+        self.seen.clear()
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:  # reported here: argparse would pass those of a subcommand to its parent
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -117,6 +133,7 @@ class Parser(argparse.ArgumentParser):
     def _given(self, args: Sequence[str] | None) -> dict[str, str]:
         """The options given in a command line, whatever their values."""
         defaults = [(action, action.default) for action in self._actions]
+        self.seen.clear()
         try:
             for action, _ in defaults:
                 action.default = argparse.SUPPRESS

@@ -545,7 +545,7 @@ def add_import(commands: Commands) -> None:
         *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
         "particles.dump contacts.dump",
         "dump custom of the particles: id, x y (or xu yu, xs ys, xsu ysu), radius or diameter; "
-        "dumps may be compressed (.gz, .zst)",
+        "dumps may be compressed (.gz, .bz2, .xz, .zst)",
         "dump local of the contacts: two ids, distance, normal force x y, tangential force x y, in "
         "this order or named atom1 atom2 distance fx fy px py",
     )

@@ -15,7 +15,7 @@ from granforce.system.files import expanded
 # The contents of files, by their names.
 _POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
 _TEXT = (".txt", ".csv", ".dat")
-_PACKED = (".gz", ".zst")
+_PACKED = (".gz", ".bz2", ".xz", ".zst")
 
 
 class Frame(NamedTuple):

@@ -22,7 +22,7 @@ from granforce.motion.flow import Outcome, Push
 from granforce.motion.inertia import make_step
 from granforce.motion.works import follow, relax
 from granforce.numerics.lanes import ONE
-from granforce.records import InputError, Packing, random_seed, whole
+from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask
 
@@ -65,6 +65,9 @@ def rest(
     """
     S = ensemble_at(packing, **conditions)
     draws = whole(draws, "draws", least=1)
+    noise = tuple(float(level) for level in float_array(noise, (-1,), "noise"))
+    if min(noise, default=0.0) < 0:
+        raise InputError("noise must be standard deviations ≥ 0")
     if not S.original.any():
         raise InputError("the packing has no forces to check for rest")
     step, own = make_step(S), S.original / S.force_scale

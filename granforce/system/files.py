@@ -162,6 +162,13 @@ def expanded(path: str | Path) -> Path:
         raise InputError(f"{path}: there is no such user, or none with a home folder") from None
     if "\0" in str(found):
         raise InputError(f"{str(found)!r} cannot be a path: it holds a null character")
+    if not found.is_absolute():
+        try:
+            os.getcwd()
+        except FileNotFoundError:
+            raise InputError(
+                f"{path}: the working folder was removed; change to another one"
+            ) from None
     return found
 
 

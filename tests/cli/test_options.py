@@ -351,3 +351,37 @@ def test_frames_replace_no_store(here, capsys):
     assert parser.main(words.split()) == 2
     assert "is a store of results" in capsys.readouterr().err
     assert sorted((here / "done").rglob("*")) == kept
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "scan --mu 0.3 --mu 0.5 --seeds 1",
+        "walk --packing p.npz --states 3 --states 4",
+        "pack -n 8 --mu 0.3 -n 8",
+        "import lammps p.dump c.dump --mu 0.3 --frame 1 --frame=2",
+        "cache list --cache a --cache b",
+    ],
+)
+def test_an_option_given_twice_is_refused(line, capsys):
+    with pytest.raises(SystemExit) as stop:
+        parser.main(line.split())
+    told = capsys.readouterr()
+    assert stop.value.code == 2 and told.out == "" and told.err.count("\n") == 1
+    assert "is given twice; give it once" in told.err
+
+
+@pytest.mark.parametrize("threads", ["0", "-1", "00"])
+def test_a_number_of_threads_that_numba_refuses_is_one_line(threads, here, monkeypatch, capsys):
+    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    assert parser.main(["cache", "list"]) == 2
+    assert "NUMBA_NUM_THREADS must be at least 1" in capsys.readouterr().err
+
+
+def test_a_working_folder_that_was_removed_is_one_line(here, monkeypatch, capsys):
+    (here / "gone").mkdir()
+    monkeypatch.chdir(here / "gone")
+    (here / "gone").rmdir()
+    words = ["intervals", "--packing", str(here / "p.npz"), "--out", "x.csv"]
+    assert parser.main(words) == 2
+    assert "x.csv: the working folder was removed" in capsys.readouterr().err

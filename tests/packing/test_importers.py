@@ -629,6 +629,36 @@ def test_relabelled_grains_make_the_same_packing():
         assert known[key] == pytest.approx(plain[key], rel=1e-9, abs=1e-8), key
 
 
+PRESSED_PAIR = "id,x,y,r,fx\na,0,0,1,3\nb,2,0,1,-3\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PRESSED_PAIR.replace("\n", ",\n"),
+        PRESSED_PAIR.replace("3\n", "3,,\n"),
+        "# made by a program\n#\n\n" + PRESSED_PAIR,
+        "% two grains, in m\n" + PRESSED_PAIR.replace(",", ";"),
+        PRESSED_PAIR.replace("\n", "\r"),
+    ],
+    ids=["separators at the ends", "in rows only", "comments", "of another kind", "returns"],
+)
+def test_what_programs_add_to_tables_is_left_out(text):
+    assert read_table(io.StringIO(text), mu=0.5).forces == pytest.approx(np.array([[3.0, 0.0]]))
+
+
+@pytest.mark.parametrize("mark", ["# ", "#", "% "])
+def test_a_comment_above_numbers_is_the_header(mark):
+    text = f"{mark}written 2026\n{mark}id x y r fx\n1 0 0 1 3\n2 2 0 1 -3\n"
+    assert read_table(io.StringIO(text), mu=0.5).forces == pytest.approx(np.array([[3.0, 0.0]]))
+
+
+def test_one_row_that_is_longer_is_still_named():
+    for wrong in (PRESSED_PAIR.replace("-3\n", "-3,7\n"), PRESSED_PAIR.replace("a,", "# a\na,")):
+        with pytest.raises(InputError, match=r"line \d: \d fields for 5 columns"):
+            read_table(io.StringIO(wrong), mu=0.5)
+
+
 def test_separators_names_and_bytes():
     text = "\ufeffID;R;X;Y;note\na;1;0;0;\nb;1;2;0;wall\n"
     loads = "id,x,y,r,fx\na,0,0,1,3\nb,2,0,1,-3\n"

@@ -4,9 +4,11 @@ The packing is a square lattice of three by three touching disks of radius ½ in
 side 3: with f_n = P on all 18 contacts its pressure is P.
 """
 
+import bz2
 import gzip
 import io
 import itertools
+import lzma
 import sys
 
 import numpy as np
@@ -199,9 +201,17 @@ def test_titles_of_units_and_times_are_passed_over():
 # Compressed
 
 
-def test_gzip_is_unpacked():
-    found = read_lammps(*given(*(gzip.compress(text.encode()) for text in DUMPS)), MU)
-    assert found.pressure == pytest.approx(3.0)
+@pytest.mark.parametrize("packer", [gzip, bz2, lzma])
+def test_compressed_dumps_are_unpacked(packer):
+    packed = [packer.compress(text.encode()) for text in DUMPS]
+    assert read_lammps(*given(*packed), MU).pressure == pytest.approx(3.0)
+    with pytest.raises(InputError, match=r"cannot be unpacked .* is it cut off\?"):
+        read_lammps(*given(packed[0][:-9], packed[1]), MU)
+
+
+def test_a_zip_archive_is_named():
+    with pytest.raises(InputError, match="a ZIP or NPZ archive, not a text file"):
+        read_lammps(*given(b"PK\x03\x04" + b"0" * 50, DUMPS[1].encode()), MU)
 
 
 def test_zstandard_is_unpacked_where_python_can(monkeypatch):

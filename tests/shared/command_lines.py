@@ -262,12 +262,21 @@ def lines():
     found += [[*cell, f"--scheduler={word}"] for word in SCHEDULERS]
     for command, (right, options) in COMMANDS.items():
         for option, wrong in options.items():
+            others = _without(right, option)
             found += [
-                [command, *right, *([f"{option}={word}"] if option != "-n" else [option, word])]
+                [command, *others, *([f"{option}={word}"] if option != "-n" else [option, word])]
                 for word in wrong
             ]
         found += [[command, *right, "--colour"], [command, *right, "extra", "words"]]
     return [*found, [], ["fly"], ["--", "pack"], ["pack", "walk"], ["\0"]]
+
+
+def _without(words, option):
+    """The words without an option and its value: given twice it would be refused for that."""
+    if option not in words:
+        return words
+    at = words.index(option)
+    return words[:at] + words[at + 2 :]
 
 
 def prepare(folder, packing):

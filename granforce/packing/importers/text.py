@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import bz2
 import csv
 import gzip
 import io
+import lzma
 import math
 import os
+import re
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,8 +28,10 @@ LARGEST = 1e100
 # Compressed text may unpack to _RATIO times its size, and small files to _SMALL bytes: dumps reach
 # 3 to 20 times their size, and files with a far larger ratio are not dumps.
 _RATIO, _SMALL = 100, 2**24
-# First bytes of compressed files.
-_GZIP, _ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
+_COMMENT = "#%"  # begins a comment above the header
+# First bytes of compressed files, and what unpacks them.
+_PACKED: dict[bytes, Any] = {b"\x1f\x8b": gzip, b"BZh": bz2, b"\xfd7zXZ\0": lzma}
+_ZSTD, _ZIP = b"\x28\xb5\x2f\xfd", b"PK\x03\x04"
 
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
@@ -183,7 +188,7 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
         if column.lower() in here:
             return here[column.lower()]
         # A column whose name is assigned to another column is renamed.
-        taken = columns.get(column, "").lower() in map(str.lower, header)
+        taken = column in columns and columns[column].lower() in map(str.lower, header)
         return f"other {column}" if taken else column
 
     return [
@@ -212,7 +217,8 @@ def check_grains(count: int, most: int | None, name: str) -> None:
 def read_text(source: Source) -> tuple[str, str]:
     """Name and text (UTF-8) of a path or of an open text or binary file; InputError otherwise.
 
-    Files compressed by gzip are unpacked, as are those by Zstandard if Python has a module for it.
+    Files compressed by gzip, bzip2 or xz are unpacked, and by Zstandard if Python has a module for
+    it.
     """
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
@@ -233,10 +239,11 @@ def read_text(source: Source) -> tuple[str, str]:
 def read_csv(source: Source) -> Table:
     """A Table from text with a header line, separated by commas, semicolons, tabs or blanks.
 
-    Column names are converted to lower case; blank lines are skipped. Raises InputError.
+    Column names are converted to lower case; blank lines, comments above the header, and empty
+    fields at the end of all lines are skipped. Raises InputError.
     """
     name, text = read_text(source)
-    lines = text.splitlines()
+    lines = _from_the_header(text.splitlines())
     head = next(line for line in lines if line.strip())
     delimiter = next((mark for mark in ",;\t" if mark in head), " " if " " in head.strip() else ",")
     lines = [line.strip() for line in lines] if delimiter == " " else lines
@@ -251,22 +258,57 @@ def read_csv(source: Source) -> Table:
         raise InputError(f"{name}, line {reader.line_num}: {error}; repair the line") from None
     if len(rows) < 2:
         raise InputError(f"{name}: a header line and at least one row are needed")
-    return make_table(name, [column.lower() for column in rows[0]], rows[1:], numbers[1:])
+    header, *rows = _trimmed(rows)
+    return make_table(name, [column.lower() for column in header], rows, numbers[1:])
+
+
+def _from_the_header(lines: list[str]) -> list[str]:
+    """The lines, with comments (# or %) above the header left blank.
+
+    If numbers follow them, the last comment is the header, as numpy.savetxt writes it.
+    """
+    filled = [k for k, line in enumerate(lines) if line.strip()]
+    first = next((k for k in filled if lines[k].lstrip()[0] not in _COMMENT), None)
+    comments = [k for k in filled if first is None or k < first]
+    if first is None or not comments:
+        return lines
+    found = [""] * first + lines[first:]
+    if all(map(_is_number, re.split(r"[,;\s]+", lines[first].strip(" ,;\t")))):
+        found[comments[-1]] = lines[comments[-1]].lstrip(_COMMENT + " \t")
+    return found
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _trimmed(rows: list[list[str]]) -> list[list[str]]:
+    """The rows of a table without the empty fields that separators at the end of lines leave."""
+    header = rows[0]
+    while header and not header[-1]:
+        header = header[:-1]
+    more = [fields for row in rows[1:] for fields in row[len(header) :]]
+    return rows if any(more) else [header, *(row[: len(header)] for row in rows[1:])]
 
 
 def _unpacked(name: str, content: bytes) -> bytes:
     """The content, decompressed; InputError if it is damaged or unpacks to far too much."""
-    if content.startswith(_GZIP):
-        module: Any = gzip
-    elif content.startswith(_ZSTD):
+    module = next((one for first, one in _PACKED.items() if content.startswith(first)), None)
+    if content.startswith(_ZSTD):
         module = _zstd(name)
-    else:
+    if content.startswith(_ZIP):
+        raise InputError(f"{name}: a ZIP or NPZ archive, not a text file; give the text itself")
+    if module is None:
         return content
     most = max(_SMALL, _RATIO * len(content))
     try:
         with module.open(io.BytesIO(content), "rb") as file:
             unpacked = file.read(most + 1)
-    except (EOFError, OSError, zlib.error, getattr(module, "ZstdError", OSError)) as error:
+    except (EOFError, OSError, zlib.error, getattr(module, "ZstdError", lzma.LZMAError)) as error:
         raise InputError(
             f"{name}: compressed, and cannot be unpacked ({error}); is it cut off?"
         ) from None
