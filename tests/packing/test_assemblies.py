@@ -160,7 +160,7 @@ def check_against_linprog(seed):
     A, b, cones = own_program(packing)
     free = [(0, None), (None, None)] * len(packing.contacts.i)
 
-    def least(cost):
+    def least(cost):  # of what A, cones and free are now
         return linprog(cost, cones, np.zeros(len(cones)), A, b, free, method="highs")
 
     try:
@@ -177,16 +177,26 @@ def check_against_linprog(seed):
             found = least(sign * cost)
             scale = S.force_scale
             assert sign * found.fun == pytest.approx(value[0, part], abs=1e-6 * scale)
+    turned = np.zeros_like(packing.load)
+    turned[:, 0] = -np.nan_to_num(packing.load[:, 1])
+    A = np.column_stack([A, -own_program(packing, turned)[1]])
+    cones, free = np.pad(cones, [(0, 0), (0, 1)]), [*free, (0, None)]
+    found = least(-np.eye(A.shape[1])[-1])
+    limit = gf.limit_load(S)
+    assert limit.factor == (np.inf if found.status == 3 else pytest.approx(-found.fun, abs=1e-7))
+    if found.status == 0 and seed % 4 == 0:
+        critical = gf.critical_load(S)
+        assert critical.low <= limit.factor and critical.residual <= 1e-10
     return True
 
 
-def test_bounds_of_random_assemblies_agree_with_linprog():
+def test_bounds_and_limit_loads_of_random_assemblies_agree_with_linprog():
     stood = [check_against_linprog(seed) for seed in range(60)]
     assert 20 < sum(stood) < 58
 
 
 @pytest.mark.stress
-def test_bounds_of_many_random_assemblies_agree_with_linprog():
+def test_those_of_many_random_assemblies_agree_with_linprog():
     stood = [check_against_linprog(seed) for seed in range(60, 400)]
     assert 110 < sum(stood) < 320
 
