@@ -41,6 +41,7 @@ from app.widgets.plot_style import lines
 from granforce import measures
 from granforce.measures import statistics
 from granforce.packing.neighbours import find_pairs
+from granforce.packing.scenes import scene
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -275,6 +276,11 @@ def test_sizes_are_limited():
     np.savez_compressed(large, x=np.zeros((10**6, 2)))
     with pytest.raises(InputError, match="MB unpacked"):
         uploads.read({"npz": ("zeros.npz", large.getvalue())}, limits=limits)
+
+
+def test_bodies_that_the_page_cannot_draw_are_refused():
+    with pytest.raises(InputError, match="pictures on the page are for disks only"):
+        uploads.read({"npz": ("arch.npz", npz(scene("arch")))})
 
 
 def test_an_upload_is_kept_reported_and_shown(state):
