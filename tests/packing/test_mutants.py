@@ -57,7 +57,8 @@ def known(source):
 def whole(packing):
     """What is taken must be a packing throughout."""
     c, r = packing.contacts, packing.r
-    arrays = (packing.x, r, packing.forces, packing.load, *c)
+    assert c.levers is None  # of disks
+    arrays = (packing.x, r, packing.forces, packing.load, *c[:-1])
     assert all(np.all(np.isfinite(array)) for array in arrays)
     assert np.all(r > 0) and np.all(packing.box > 2 * r.max()) and packing.mu >= 0
     assert np.all((c.i != c.j) & (np.minimum(c.i, c.j) >= 0) & (np.maximum(c.i, c.j) < len(r)))
@@ -68,7 +69,8 @@ def whole(packing):
 def whole_frame(found):
     """The same of a packing and its measured forces."""
     packing, c = found.packing, found.packing.contacts
-    assert all(np.all(np.isfinite(array)) for array in (packing.x, packing.r, packing.forces, *c))
+    arrays = (packing.x, packing.r, packing.forces, *c[:-1])
+    assert all(np.all(np.isfinite(array)) for array in arrays)
     assert np.all(packing.r > 0) and len(found.ids) == len(packing.r)
     assert np.all((c.i != c.j) & (np.minimum(c.i, c.j) >= 0))
     assert np.all(np.maximum(c.i, c.j) < len(packing.r))
