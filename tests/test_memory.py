@@ -140,6 +140,9 @@ CALLS = {
     "critical_force": lambda S, _: gf.critical_force(S, S.index[0]),
     "critical_forces": lambda S, _: gf.critical_forces(S, S.index[:2]),
     "response": lambda S, _: gf.response(S, S.index[0]),
+    "blocks": lambda S, _: gf.blocks([[[0, 0], [4, 0], [4, 1], [0, 1]], (2, 2, 1)], 0.5, fixed=[0]),
+    "limit_load": lambda S, _: gf.limit_load(gf.ensemble(gf.scene("books"))),
+    "critical_load": lambda S, _: gf.critical_load(gf.ensemble(gf.scene("books"))),
     "loaded_networks": lambda S, _: gf.loaded_networks(S, S.index[0], [0.0, 0.01]),
     "load_packing": lambda S, _: read(gf.load_packing, [saved(S)]),
     "save_packing": lambda S, _: saved(S),
@@ -169,7 +172,7 @@ CALLS = {
     "from_disks": lambda S, _: gf.from_disks([[1, 1]], [1], 0.5, walls="floor", gravity=1),
 }
 # They check and name what they are given, and keep nothing.
-_RECORDS = {"make_contacts", "make_packing"}
+_RECORDS = {"make_contacts", "make_contacts_at", "make_packing"}
 
 
 def test_every_public_function_is_called():

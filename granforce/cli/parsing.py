@@ -69,7 +69,7 @@ def refused(reason: str) -> int:
     return 2
 
 
-class _Once(argparse._StoreAction):
+class _Once(argparse.Action):
     """Stores the value of an option, which may be given once: another value would replace it."""
 
     def __call__(
@@ -78,7 +78,7 @@ class _Once(argparse._StoreAction):
         if option_string is not None and self.dest in parser.seen:
             parser.error(f"{option_string} is given twice; give it once")
         parser.seen.add(self.dest)
-        super().__call__(parser, namespace, values, option_string)
+        setattr(namespace, self.dest, values)
 
 
 class Parser(argparse.ArgumentParser):

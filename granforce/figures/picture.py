@@ -66,8 +66,10 @@ def plot(
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
-    kind = "disks" if packing.shapes is None else "bodies"
-    title = f"{(~_held(packing)).sum()} {kind}, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
+    count = int((~_held(packing)).sum())
+    one, several_of = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
+    kind = one if count == 1 else several_of
+    title = f"{count} {kind}, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
 
 

@@ -26,6 +26,7 @@ Points = Sequence[Any] | Floats
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)
+BAR = 0.03  # width of a colour bar, and its distance from the frame, in widths of the figure
 
 # Symbols as written here: as mathtext for pictures, in Unicode for web pages.
 SYMBOLS = {
@@ -33,6 +34,7 @@ SYMBOLS = {
     "F_crit": (r"F_\mathrm{crit}", "Fᶜʳⁱᵗ"),
     "f_n,orig": (r"f_{n,\mathrm{orig}}", "fₙ,orig"),
     "f_n": ("f_n", "fₙ"),
+    "f_t": ("f_t", "fₜ"),
     "r_max": (r"r_\mathrm{max}", "rₘₐₓ"),
     "r^−α": (r"r^{-\alpha}", "r⁻ᵅ"),
     "|u|": ("|u|", "|u|"),
@@ -154,7 +156,7 @@ def frame(
         options = {"frame_width": width, "frame_height": height, "toolbar": "above"} | options
     else:
         options = {"aspect": "auto", "fontscale": 0.9} | options
-        options["hooks"] = [_legend_of(elements)]
+        options["hooks"] = [_legend_of(elements), _bar_beside]
     if legend is not None:
         options["legend_position"] = legend
     words = {"title": title, "xlabel": x, "ylabel": y}
@@ -228,6 +230,23 @@ def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
             text.set_text(typeset(text.get_text(), "matplotlib"))
 
     return finish
+
+
+def _bar_beside(plot: Any, _: Any) -> None:
+    """A hook that keeps a colour bar next to its frame, as high as that is drawn.
+
+    HoloViews places it before the scales of the frame are made equal.
+    """
+    axis = plot.handles["axis"]
+
+    def place(*_: Any) -> Any:
+        axis.apply_aspect()
+        drawn = axis.get_position()
+        return drawn.from_bounds(drawn.x1 + BAR, drawn.y0, BAR, drawn.height)
+
+    for part in plot.subplots.values():
+        if "cax" in part.handles:
+            part.handles["cax"].set_axes_locator(place)
 
 
 def equal_scales(box: Sequence[float] | Floats, backend: str) -> dict[str, Any]:

@@ -5,6 +5,8 @@ their balance is not required; contacts between two of them are left out, as no 
 them. Each other body carries its weight downwards.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -8,6 +8,8 @@ packing's own network, by the protocol of `critical_force`; it is never above th
 Contacts that carry nothing without the load are included.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any, NamedTuple
 

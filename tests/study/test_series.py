@@ -119,19 +119,22 @@ def test_folders_without_frames_are_told(tmp_path):
 def test_by_the_command_line(away, capsys):
     (away / "lab").mkdir()
     folder_of(away / "lab", (1, 2))
-    words = "infer lab --frames all --mu 0.3 --reach 0.1 --states 16 --out series.zarr --json"
-    assert main(words.split()) == 0
+
+    def words(frames="all", out="series.zarr"):
+        return f"infer lab --frames {frames} --mu 0.3 --reach 0.1 --states 16 --out {out}".split()
+
+    assert main([*words(), "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["frame"] for row in rows] == [1, 2] and rows[0]["grains"] == 40
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         written = xr.open_zarr(away / "series.zarr")
     assert written.sizes["frame"] == 2 and "inferred" in written
-    assert main([*words.split()[:-1], "--frames", "2"]) == 0
+    assert main(words("2")) == 0
     assert xr.open_zarr(away / "series.zarr").sizes["frame"] == 1
     capsys.readouterr()
-    for wrong in ("--frames 7", "--frames x", "--out lab"):
-        assert main([*words.split(), *wrong.split()]) == 2, wrong
+    for wrong in (words("7"), words("x"), words(out="lab")):
+        assert main(wrong) == 2, wrong
         assert capsys.readouterr().err.count("\n") == 1
     assert main(["infer", "--mu", "0.3"]) == 2
     assert len(list(open_store(away / "cache").find("frame"))) == 2
