@@ -21,7 +21,7 @@ from serving import (
     until,
     zoomed,
 )
-from small_store import DISKS, KEPT
+from small_store import DISKS, KEPT, STATES
 
 import granforce as gf
 
@@ -246,7 +246,8 @@ def test_what_is_no_packing_is_refused_in_one_line(visit, tmp_path):
 
 
 def test_everything_can_be_taken_along(visit, tmp_path):
-    page = visit("?tab=export&frame=3")
+    # A walk of its own, all of whose states are stored.
+    page = visit(f"?n={DISKS}&seed=1&mu=0.1&states={STATES}&walkseed=3&tab=export&frame=3")
 
     def take(words):
         button = page.get_by_role("button", name=words, exact=True)

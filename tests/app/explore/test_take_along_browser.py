@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from PIL import Image
 from serving import PATIENCE, column, painted, picture, scene, searched
-from small_store import KEPT, ROOT, STATES
+from small_store import DISKS, KEPT, ROOT, STATES
 
 # What was taken along, to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "along"
@@ -91,7 +91,10 @@ def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
     assert (pixels[:900] < 200).any() and (pixels[905:] < 100).any()  # packing, and words below it
 
 
-def test_all_states_are_exported_not_only_those_kept(page, tmp_path):
+def test_all_states_are_exported_not_only_those_kept(visit, tmp_path):
+    # Then all are stored: other tests look at those that are kept at μ = 0.1.
+    selection = f"?n={DISKS}&seed=1&mu=1&source=walk&states={STATES}&relax=nearest"
+    page = visit(f"{selection}&tab=export&frame=3", 1280, 1000)
     path = taken(page, "States (NetCDF)", tmp_path)
     with xr.open_dataset(io.BytesIO(path.read_bytes()), engine="scipy") as whole:
         states = whole["states"].values / whole["force_scale"].item()
