@@ -34,7 +34,7 @@ from granforce.perturb.critical_force import (
     motion_of,
     raised,
 )
-from granforce.records import InputError, Packing, UndecidedError, choice, float_array, takes
+from granforce.records import InputError, Packing, UndecidedError, brief, float_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats
@@ -166,7 +166,8 @@ def _motion(S: Ensemble, moving: Outcome) -> tuple[Floats, Floats]:
 def _loads(packing: Packing, load: npt.ArrayLike | str) -> Floats:
     if not isinstance(load, str):
         return float_array(load, (len(packing.r), 3), "the load")
-    choice(load, ("horizontal", "a load (N, 3)"), "load")
+    if load != "horizontal":
+        raise InputError(f'load must be "horizontal" or an array (N, 3), got {brief(load)}')
     turned = np.zeros_like(packing.load)
     turned[:, 0] = -np.nan_to_num(packing.load[:, 1])
     return turned

@@ -111,7 +111,7 @@ def test_a_point_load_on_an_arch_agrees_with_linprog():
 @pytest.mark.parametrize(
     "load, words",
     [
-        ("vertical", "load must be horizontal"),
+        ("vertical", 'load must be "horizontal"'),
         (np.zeros((2, 3)), "acts on no grain"),
         (np.ones((3, 3)), "the load must have shape"),
         ([[np.nan, 0, 0], [0, 0, 0]], "NaN"),
