@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from granforce.figures import style
 from granforce.figures.networks import outline
+from granforce.forces.balance import left_open_in
 from granforce.records import InputError, Packing, brief, float_array, takes
 from granforce.types import Floats
 
@@ -66,7 +67,7 @@ def plot(
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
-    count = int((~_held(packing)).sum())
+    count = int((~left_open_in(packing)).sum())
     one, several_of = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     kind = one if count == 1 else several_of
     title = f"{count} {kind}, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
@@ -132,18 +133,13 @@ def _ends(packing: Packing, numbers: npt.NDArray[Any], forces: Floats) -> tuple[
         return begin, begin + branch
     c = packing.contacts.picked(numbers)
     begin = packing.cell.wrapped(packing.x[c.i])
-    reach = np.where(_held(packing)[c.j], c.arm_i, c.length)
+    reach = np.where(left_open_in(packing)[c.j], c.arm_i, c.length)
     return begin, begin + reach[:, None] * c.normal
-
-
-def _held(packing: Packing) -> npt.NDArray[np.bool_]:
-    """(N,) bool: walls and other grains whose balance is left open."""
-    return np.asarray(np.isnan(packing.load).any(axis=1))
 
 
 def _bodies(packing: Packing, backend: str) -> list[Any]:
     """Disks, or bodies of other shapes; of those the fixed ones too, darker."""
-    disks = np.flatnonzero(~_held(packing))
+    disks = np.flatnonzero(~left_open_in(packing))
     if len(disks) > MOST_DISKS:
         return []
     if packing.shapes is not None:
@@ -151,7 +147,7 @@ def _bodies(packing: Packing, backend: str) -> list[Any]:
             corners if len(corners) else x + r * _CIRCLE
             for x, r, corners in zip(packing.x, packing.r, packing.shapes.polygons(), strict=True)
         ]
-        fixed = np.flatnonzero(_held(packing))
+        fixed = np.flatnonzero(left_open_in(packing))
         return [
             _polygons([drawn[k] for k in which], backend, colour)
             for which, colour in ((fixed, EDGE), (disks, FILL))
@@ -177,19 +173,19 @@ def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[An
     given = packing.info.get("walls")
     if isinstance(given, list):  # other importers count them
         return [hv.Segments(given, label="wall").opts(backend=backend, color="#000000")]
-    c, held = packing.contacts.picked(numbers), _held(packing)
+    c, held = packing.contacts.picked(numbers), left_open_in(packing)
     touched = np.flatnonzero(held[c.j])
     if packing.shapes is not None or not len(touched):
         return []
-    at, normal = packing.contact_points[numbers[touched]], c.normal[touched]
-    along = np.column_stack([-normal[:, 1], normal[:, 0]]) * packing.r[c.i[touched], None] * 0.7
+    at = packing.contact_points[numbers[touched]]
+    along = c.tangent[touched] * packing.r[c.i[touched], None] * 0.7
     walls = hv.Segments(np.column_stack([at - along, at + along]), label="wall")
     return [walls.opts(backend=backend, color="#000000")]
 
 
 def _window(packing: Packing) -> tuple[Floats, Floats]:
     """Lower left and upper right corners of the picture: the cell, or the disks if it is open."""
-    disks = ~_held(packing)
+    disks = ~left_open_in(packing)
     x, r = packing.x[disks], packing.r[disks, None]
     margin = 0.1 * packing.r[disks].mean()
     corner, opposite = packing.cell.extent

@@ -44,11 +44,10 @@ def save_vtk(
     reach = np.where(c.arm_j == 0, c.arm_i, c.length)
     start = packing.x[c.i]
     both = np.stack([start, start + reach[:, None] * c.normal], axis=1).reshape(-1, 2)
-    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
     lines = {
         "f_n": forces[:, 0],
         "f_t": forces[:, 1],
-        "force": _spatial(forces[:, :1] * c.normal + forces[:, 1:] * tangent),
+        "force": _spatial(forces[:, :1] * c.normal + forces[:, 1:] * c.tangent),
         "gap": c.gap,
         "i": c.i,
         "j": c.j,
@@ -79,8 +78,7 @@ def save_lammps(
     refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts
     ids = np.arange(1, len(packing.r) + 1)
-    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
-    on_i = np.column_stack([-forces[:, :1] * c.normal, -forces[:, 1:] * tangent])
+    on_i = np.column_stack([-forces[:, :1] * c.normal, -forces[:, 1:] * c.tangent])
     box = _bounds(packing)
     atoms = np.column_stack([ids, np.ones_like(ids), packing.x, packing.r])
     pairs = np.column_stack([c.i + 1, c.j + 1, c.length, on_i])
