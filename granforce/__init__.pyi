@@ -87,9 +87,9 @@ from granforce.perturb.critical_force import critical_force as critical_force
 from granforce.perturb.critical_force import critical_forces as critical_forces
 from granforce.perturb.critical_force import response as response
 from granforce.perturb.grain_loads import CriticalLoad as CriticalLoad
-from granforce.perturb.grain_loads import LimitLoad as LimitLoad
+from granforce.perturb.grain_loads import LoadFactor as LoadFactor
 from granforce.perturb.grain_loads import critical_load as critical_load
-from granforce.perturb.grain_loads import limit_load as limit_load
+from granforce.perturb.grain_loads import load_factor as load_factor
 from granforce.perturb.loaded import Loaded as Loaded
 from granforce.perturb.loaded import loaded_networks as loaded_networks
 from granforce.records import Cancelled as Cancelled

@@ -111,7 +111,7 @@ TERMS = {
     ),
     "eta3": Term(
         "indeterminacy by intervals",
-        "The average length of a contact's force interval, relative to the mean force. "
+        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints. "
         "Intervals are several times as long as forces scatter, so plots show 0.15 η3 for "
         "comparison with η1 and η2.",
         "η3",
@@ -352,3 +352,17 @@ TERMS = {
 def title(key: str) -> str:
     """A term with its symbol: "friction coefficient μ"."""
     return f"{TERMS[key].word} {TERMS[key].symbol}".strip()
+
+
+# Relaxations of a walk as typed, with the names of functions, and in keys of results.
+RELAXATIONS = {
+    "nearest": "accelerated",
+    "nearest_piqp": "nearest",
+    "gauss_seidel": "gauss_seidel",
+    "gauss_seidel_only": "gauss_seidel_only",
+}
+
+
+def typed_relaxation(stored: str) -> str:
+    """The name under which a relaxation is typed; `stored`: its name in keys of results."""
+    return next(typed for typed, name in RELAXATIONS.items() if name == stored)

@@ -141,7 +141,7 @@ CALLS = {
     "critical_forces": lambda S, _: gf.critical_forces(S, S.index[:2]),
     "response": lambda S, _: gf.response(S, S.index[0]),
     "blocks": lambda S, _: gf.blocks([[[0, 0], [4, 0], [4, 1], [0, 1]], (2, 2, 1)], 0.5, fixed=[0]),
-    "limit_load": lambda S, _: gf.limit_load(gf.ensemble(gf.scene("books"))),
+    "load_factor": lambda S, _: gf.load_factor(gf.ensemble(gf.scene("books"))),
     "critical_load": lambda S, _: gf.critical_load(gf.ensemble(gf.scene("books"))),
     "loaded_networks": lambda S, _: gf.loaded_networks(S, S.index[0], [0.0, 0.01]),
     "load_packing": lambda S, _: read(gf.load_packing, [saved(S)]),

@@ -18,6 +18,8 @@ from packings import packed
 import granforce as gf
 from granforce.cli import report_lines
 from granforce.cli.parser import main
+from granforce.cli.words import make_parser
+from granforce.glossary import TERMS
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
 
@@ -252,13 +254,23 @@ def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys
 
 
 def test_relaxations_are_typed_as_functions_are_called():
-    from granforce.cli.options import RELAXATIONS as typed
+    from granforce.glossary import RELAXATIONS as typed
     from granforce.study.kinds.states import RELAXATIONS as computed
 
     assert set(typed.values()) == set(computed)
     for name, word in typed.items():
         function = computed[word]["relax"]
         assert getattr(gf, name.removesuffix("_only")) is function
+
+
+def test_stored_walks_are_listed_with_the_relaxation_as_typed(cache, capsys):
+    assert main(["walk", "-n", "12", "--mu", "0.3", "--states", "2"]) == 0
+    capsys.readouterr()
+    assert main(["cache", "list", "--kind", "walk", "--json"]) == 0
+    (entry,) = json.loads(capsys.readouterr().out)
+    assert json.loads(entry["params"])["relax"] == "nearest"
+    (stored,) = gf.open_store(cache / "cache").find("walk")
+    assert stored.params["relax"] == "accelerated"  # keys stay
 
 
 def test_results_are_labelled_in_xarray_and_pandas():
@@ -476,3 +488,40 @@ def test_figure_1_is_drawn_from_the_store_of_a_scan(tmp_path, capsys):
     capsys.readouterr()
     assert main(["figures", store, "--out", f"{out}.png"]) == 2
     assert "differ in n;" in capsys.readouterr().err and not Path(f"{out}.png").exists()
+
+
+@pytest.mark.parametrize(
+    "line, said",
+    [
+        ("scan --mu 0.1 0.2", "--mu: separate values by commas, as in --mu 0.1,0.2;"),
+        ("pack --mu 0.1 0.2", "--mu takes one value, not 0.1 and 0.2;"),
+        ("interval --mu 0.1", "command 'interval' is unknown; did you mean intervals?;"),
+        ("walk --mu 0.1 --stats 5", "there is no option --stats; did you mean --states?;"),
+        ("walk --mu 0.1 --relax=neares", "--relax 'neares' is unknown; did you mean nearest?;"),
+        ("walk --mu 0.1 --relax magic", "--relax 'magic' is unknown; choose from nearest, "),
+        ("pack --mu 0.1 --colour", "unrecognized arguments: --colour;"),
+        ("pack extra", "unrecognized arguments: extra;"),
+    ],
+)
+def test_slips_of_the_keyboard_are_answered_with_what_was_meant(line, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(line.split())
+    told = capsys.readouterr()
+    assert stop.value.code == 2 and told.out == ""
+    assert told.err.startswith(f"granforce: {said}") and told.err.count("\n") == 1
+
+
+def test_no_command_is_the_plural_of_another():
+    commands = make_parser()._subparsers._group_actions[0].choices
+    assert "limit-loads" in commands
+    assert not {f"{name}s" for name in commands} & commands.keys()
+
+
+def test_every_text_defines_eta3_alike():
+    """As PRE 79, 052302: the mean length of intervals over the mean of their midpoints."""
+    words = "divided by the mean of their midpoints"
+    readme = " ".join((Path(__file__).parents[1] / "README.md").read_text().split())
+    assert words in readme and words in TERMS["eta3"].sentence
+    assert words in " ".join(gf.measures.eta3.__doc__.split())
+    low, high = np.array([[1.0, -1.0], [2.0, 0.0]]), np.array([[3.0, 1.0], [2.0, 4.0]])
+    assert gf.measures.eta3(low, high) == pytest.approx(((2 + 2 + 0 + 4) / 4) / ((2 + 2 + 2) / 4))

@@ -59,8 +59,8 @@ def rest(replay: Replay) -> str:
     return (
         f"<p><b>Why not just one?</b> {why}</p><p><b>How undetermined?</b> {term('eta1')}: how "
         f"much a contact's force varies between networks. {term('eta2')}: how far apart two "
-        f"networks are. {term('eta3')}: how long a contact's interval of possible forces is. All "
-        "are measured against the mean force: 0 means determined, 0.1 means uncertain by about a "
+        f"networks are. {term('eta3')}: how long the intervals of possible forces are. All are "
+        "relative to typical forces: 0 means determined, 0.1 means uncertain by about a "
         "tenth.</p><p><b>How friction matters.</b> Each μ has its own packing. More friction "
         "lets each contact carry a wider range of forces, but a packing made with more friction "
         "comes to rest with fewer contacts, so fewer forces are free. With little friction many "

@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
-from granforce.cli.options import RELAXATIONS
+from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.records import InputError, choice, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
@@ -203,8 +203,7 @@ def command(selection: Selection) -> str:
     """The command that computes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
-        typed = next(typed for typed, word in RELAXATIONS.items() if word == selection.relax)
-        words += ["--walk-seed", selection.seed, "--relax", typed]
+        words += ["--walk-seed", selection.seed, "--relax", typed_relaxation(selection.relax)]
     elif selection.seed:
         words += ["--sample-seed", selection.seed]
     return shlex.join(str(word) for word in words)
@@ -236,7 +235,7 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
         given["packed"] = f"{packing['mu']:.9g}"
     given |= {"source": selection.kind, "states": selection.states}
     if selection.kind == "walk":
-        given["relax"] = selection.relax
+        given["relax"] = typed_relaxation(selection.relax)
     if selection.seed:
         given["walkseed"] = selection.seed
     return urlencode(given | view)
@@ -260,7 +259,9 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
 
 def _read_selection(given: dict[str, str]) -> Selection:
     kind = choice(given.pop("source", "walk"), KINDS, "source")
-    relax = choice(given.pop("relax", "accelerated"), SOLVERS, "relax")
+    relax = given.pop("relax", "nearest")
+    if relax != "accelerated":  # as links of earlier versions call it
+        relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
     mu = friction(given.pop("mu"))
     packed = friction(given.pop("packed", mu))
     rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
 from granforce.cli.report_lines import explained
+from granforce.glossary import RELAXATIONS
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 # Commands whose names are reserved in Python or used by a package: their functions end in "_".
@@ -228,15 +229,6 @@ def add_known(group: argparse._ArgumentGroup) -> None:
         help="known forces, in the packing's unit: columns contact, and f_n, f_t (exactly) or "
         "f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
     )
-
-
-# Relaxations as typed, with the names of functions and in keys of results.
-RELAXATIONS = {
-    "nearest": "accelerated",
-    "nearest_piqp": "nearest",
-    "gauss_seidel": "gauss_seidel",
-    "gauss_seidel_only": "gauss_seidel_only",
-}
 
 
 def add_walk_options(command: Parser) -> None:

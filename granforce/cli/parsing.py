@@ -6,6 +6,7 @@ Standard library only, like everything that `--help` needs.
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import re
 import stat
@@ -69,6 +70,16 @@ def refused(reason: str) -> int:
     return 2
 
 
+def _closest(word: str, names: Iterable[str]) -> str:
+    """A question for the name that resembles a mistyped word; empty if none does."""
+    near = difflib.get_close_matches(word, [str(name) for name in names], n=1, cutoff=0.7)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _unrecognized(words: Sequence[str]) -> str:
+    return f"unrecognized arguments: {' '.join(words)}"
+
+
 class _Once(argparse.Action):
     """Stores the value of an option, which may be given once: another value would replace it."""
 
@@ -118,7 +129,7 @@ class Parser(argparse.ArgumentParser):
         self.seen.clear()
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:  # reported here: argparse would pass those of a subcommand to its parent
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            self.error(self._unknown(unknown, sys.argv[1:] if args is None else args))
         ways = [way for way in self.unused if way.holds(found)]
         if ways:
             given = self._given(args)
@@ -129,6 +140,31 @@ class Parser(argparse.ArgumentParser):
                         f"{' and '.join(useless)} {have} no effect {way.words}; leave {them} out"
                     )
         return found, unknown
+
+    def _unknown(self, unknown: Sequence[str], args: Sequence[str]) -> str:
+        """Why words are not understood: mistyped options, or a second value of an option."""
+        first, words = unknown[0], list(args)
+        if first.startswith("-"):
+            name = first.partition("=")[0]
+            meant = _closest(name, self._option_string_actions)
+            return f"there is no option {name}{meant}" if meant else _unrecognized(unknown)
+        at = words.index(first) if first in words else 0
+        action = self._option_string_actions.get(words[at - 2]) if at >= 2 else None
+        if action is None or action.nargs is not None:
+            return _unrecognized(unknown)
+        option, value = words[at - 2 : at]
+        if action.type is str and "comma" in str(action.help):
+            return f"{option}: separate values by commas, as in {option} {value},{first}"
+        return f"{option} takes one value, not {value} and {first}"
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Reject a value that is not among the choices of an option, or no command."""
+        if action.choices is None or value in action.choices:
+            return
+        name = "/".join(action.option_strings) or str(action.metavar or action.dest).lower()
+        meant = _closest(str(value), action.choices)
+        there = meant or f"; choose from {', '.join(map(str, action.choices))}"
+        raise argparse.ArgumentError(None, f"{name} {str(value)[:40]!r} is unknown{there}")
 
     def _given(self, args: Sequence[str] | None) -> dict[str, str]:
         """The options given in a command line, whatever their values."""

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.cli.options import RELAXATIONS
+from granforce.glossary import RELAXATIONS
 from granforce.packing import importers
 from granforce.records import InputError, Packing, worker_count
 from granforce.study import cells as study

@@ -391,13 +391,13 @@ def add_limit_loads(commands: Commands) -> None:
     add_exact(command)
 
 
-def add_limit_load(commands: Commands) -> None:
+def add_load_factor(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "limit-load",
+        "load-factor",
         "compute the largest multiple of a load on all bodies that contact forces can balance",
         "granforce pack --scene wall --out wall.npz\n"
-        "  granforce limit-load wall.npz --load horizontal",
+        "  granforce load-factor wall.npz --load horizontal",
     )
     command.add_argument("file", type=Input, metavar="FILE.npz", help="the packing, with weights")
     command.add_argument(
@@ -676,7 +676,7 @@ COMMANDS = (
     add_figures,
     add_intervals,
     add_limit_loads,
-    add_limit_load,
+    add_load_factor,
     add_stress,
     add_perturb,
     add_study,

@@ -92,8 +92,9 @@ def _bounds(low: Any, high: Any) -> tuple[Floats, Floats]:
 
 
 def eta3(low: Floats, high: Floats | None = None) -> float:
-    """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
+    """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩, both means over all 2N_c components.
 
+    The mean length of the intervals of f_n and f_t, divided by the mean of their midpoints.
     low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact, both required.
     Raises InputError if their shapes differ, and where low exceeds high.
     """

@@ -1,10 +1,10 @@
-"""Loads on grains, raised in proportion: the limit load over S, and the critical load of motion.
+"""Loads on grains, raised in proportion: the load factor over S, and the critical load of motion.
 
-A load e (N, 3) of forces and torques, times λ, joins the weights: A f + λ e = b. The limit load is
+A load e (N, 3) of forces and torques, times λ, joins the weights: A f + λ e = b. The load factor is
 the largest λ for which some network balances; with friction it overestimates the strength, because
 it takes sliding contacts to dilate (Livesley, Int. J. Numer. Methods Eng. 12, 1853 (1978)). The
 critical load is the largest λ at which bodies stay at rest as contact dynamics raises it from the
-packing's own network, by the protocol of `critical_force`; it is never above the limit load.
+packing's own network, by the protocol of `critical_force`; it is never above the load factor.
 Contacts that carry nothing without the load are included.
 """
 
@@ -41,7 +41,7 @@ from granforce.types import Cancel, Floats
 
 
 @notebook.brief
-class LimitLoad(NamedTuple):
+class LoadFactor(NamedTuple):
     """Largest multiple of a load that networks can balance, certified from both sides."""
 
     factor: float  # λ, attained by `forces`; inf without a limit
@@ -55,8 +55,8 @@ class CriticalLoad(NamedTuple):
     """Largest multiple of a load at which bodies rest, and the motion above it."""
 
     low: float  # largest λ that ended at rest
-    high: float  # smallest λ that did not, or the limit load if none was tried
-    limit_load: float  # λ
+    high: float  # smallest λ that did not, or the load factor if none was tried
+    load_factor: float  # λ
     load: Floats  # (N, 3) the load, force and torque
     forces: Floats  # (contacts, 2) equilibrium under `low`, on all contacts of the packing, force
     residual: float  # its unbalance with the load, in ⟨f_n⟩
@@ -70,9 +70,9 @@ class CriticalLoad(NamedTuple):
 
 @takes(Ensemble)
 @cancelling.cancellable
-def limit_load(
+def load_factor(
     ensemble: Ensemble, load: npt.ArrayLike | str = "horizontal", *, cancel: Cancel | None = None
-) -> LimitLoad:
+) -> LoadFactor:
     """The largest λ ≥ 0 for which S is not empty with λ times a load on the grains.
 
     load (N, 3): force and torque on each grain of the packing, or "horizontal": the weights turned
@@ -85,13 +85,13 @@ def limit_load(
     return _limit(with_idle(ensemble), load)
 
 
-def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LimitLoad:
+def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LoadFactor:
     load = _loads(S.packing, load)
     direction, unit = _direction(S, load)
     unit /= S.force_scale
     value, bound, y = most_under(make_system(S).under(direction))
     if value == -np.inf:
-        return LimitLoad(np.inf, 0.0, load, np.full((len(S.packing.contacts.i), 2), np.nan))
+        return LoadFactor(np.inf, 0.0, load, np.full((len(S.packing.contacts.i), 2), np.nan))
     if np.isfinite(value):
         forces = forces_of(S, y)
     elif np.isfinite(bound):  # the optimum was not balanced to rounding: project it
@@ -102,7 +102,7 @@ def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LimitLoad:
     if not abs(value - bound) <= INTERVAL_GAP:
         raise UndecidedError("the limit of this load could not be certified")
     # Differences of two rounded numbers; λ is 0 if nothing but the weights can be balanced.
-    return LimitLoad(max(0.0, -value) / unit, abs(value - bound) / unit, load, S.expand(forces))
+    return LoadFactor(max(0.0, -value) / unit, abs(value - bound) / unit, load, S.expand(forces))
 
 
 @takes(Ensemble)
@@ -116,11 +116,11 @@ def critical_load(
 ) -> CriticalLoad:
     """The largest λ at which bodies stay at rest as λ times a load is raised, and the motion.
 
-    load: as for `limit_load`. The start is the packing's own network: another one may give another
+    load: as for `load_factor`. The start is the packing's own network: another one may give another
     critical load. protocol: fields of Protocol; `precision` is that of λ times the largest force of
     the load, in ⟨f_n⟩. cancel() returning True raises Cancelled.
 
-    Raises the errors of `limit_load`, and InputError if no load moves the bodies.
+    Raises the errors of `load_factor`, and InputError if no load moves the bodies.
     """
     S, asked = with_idle(ensemble), checked(Protocol(**protocol))
     limit = _limit(S, load)
@@ -143,7 +143,7 @@ def critical_load(
     return CriticalLoad(
         low=found.low / unit,
         high=found.high / unit,
-        limit_load=limit.factor,
+        load_factor=limit.factor,
         load=limit.load,
         forces=S.expand(forces),
         residual=balanced.residual(forces),

@@ -327,7 +327,9 @@ def test_a_link_names_contacts_and_networks_by_their_own_numbers():
 
 
 def test_older_links_name_contacts_and_networks_by_their_places(visited):
-    state = visited("mu=0.1&n=30&states=30&relax=nearest&contact=9&frame=5&pulls=4:0.5&pair=3-7")
+    state = visited(
+        "mu=0.1&n=30&states=30&relax=nearest_piqp&contact=9&frame=5&pulls=4:0.5&pair=3-7"
+    )
     looks = state.looks
     assert (looks.contact, looks.frame, looks.pair) == (9, 5, (3, 7))
     assert state.hand.pulls == [(4, 0.5)]
@@ -351,12 +353,14 @@ def test_a_link_reopens_a_view_that_rests_with_its_panels(state, visited):
     state.looks.param.update(paused=True, opened=["made", "check"], frame=4, sort="extent")
     again = visited(state.link())
     assert again.view == state.view and again.looks.paused
-    assert visited("mu=0.1&n=30&states=30&relax=nearest&frame=4").looks.paused  # as it was meant
-    assert not visited("mu=0.1&n=30&states=30&relax=nearest").looks.paused
+    assert visited(
+        "mu=0.1&n=30&states=30&relax=nearest_piqp&frame=4"
+    ).looks.paused  # as it was meant
+    assert not visited("mu=0.1&n=30&states=30&relax=nearest_piqp").looks.paused
 
 
 def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
-    query = "mu=0.1&n=30&states=30&relax=nearest"
+    query = "mu=0.1&n=30&states=30&relax=nearest_piqp"
     numbers = visited(query).replay.number
     state = visited(f"{query}&network={numbers[5] + 1}")
     assert state.looks.frame == 5 and numbers[6] > numbers[5] + 2
@@ -368,7 +372,7 @@ def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
      "pull=100000:1&hold=100000:1&network=31", "pull=1n-2t:3&hold=x&select=x"],
 )  # fmt: skip
 def test_views_that_make_no_sense_are_left_out(names, visited):
-    state = visited(f"mu=1&n=30&states=30&relax=nearest&colour=plaid&{names}")
+    state = visited(f"mu=1&n=30&states=30&relax=nearest_piqp&colour=plaid&{names}")
     assert state.cell.mu == 1 and state.work.message == ""
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
@@ -443,7 +447,7 @@ def test_stored_states_are_found_whatever_was_kept_of_them(state):
 
 def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, visited):
     """Whether the catalogue was read before or is read only now; a number that is named is kept."""
-    link = f"?mu=1&n={DISKS}&relax=nearest"
+    link = f"?mu=1&n={DISKS}&relax=nearest_piqp"
     for _ in range(2):
         state = visited(link)
         assert state.cell.mu == 1 and len(state.replay.number) == KEPT + 1 and not state.missing
@@ -570,7 +574,7 @@ def test_cancel_goes_back_to_what_a_visitor_saw_before_a_link_to_other_states(st
     state.show(cell_at(state.library, 1))
     wait_for(state, lambda: state.cell.mu == 1)
     shown = state.replay
-    state.open("?mu=0.47&n=30&states=30&relax=nearest")
+    state.open("?mu=0.47&n=30&states=30&relax=nearest_piqp")
     while state.work.reader.running:
         state.work.poll()
     assert state.work.computation.running and state.missing and state.replay is shown
@@ -873,7 +877,7 @@ def shared(monkeypatch):
 
 
 def test_a_link_starts_nothing_dear_beside_another(library, shared, visited):
-    state = visited("mu=0.1&n=30&states=30&relax=nearest")
+    state = visited("mu=0.1&n=30&states=30&relax=nearest_piqp")
     state.cell = state.cell._replace(selection=state.cell.selection._replace(states=19_999))
     state.looks.split = True
     state.looks.beside = 0.2
@@ -1151,7 +1155,7 @@ def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, visited):
         shutil.copytree(shipped, stores[where])
         library = Library(**stores)
         garble(getattr(library, where), cell_at(library, 1).name, "*")
-        state = visited(f"mu=1&n={DISKS}&states={STATES}&relax=nearest", library)
+        state = visited(f"mu=1&n={DISKS}&states={STATES}&relax=nearest_piqp", library)
         assert state.cell.mu == 1 and state.cell.store is library.cache, where
         assert [cell.mu for cell in state.catalogue] == [0, 0.1, 1]
 

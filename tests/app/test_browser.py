@@ -277,7 +277,7 @@ DRAWN_AND_POSSIBLE = f"""(() => {{
 
 @pytest.mark.parametrize("colour", ["extent", "change", "sign"])
 def test_chains_are_coloured_by_what_is_chosen(visit, colour):
-    page = visit(f"?mu=0.1&n=30&states=30&relax=nearest&colour={colour}&frame=6&reference=3")
+    page = visit(f"?mu=0.1&n=30&states=30&relax=nearest_piqp&colour={colour}&frame=6&reference=3")
     normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
     shown, low, high = map(np.array, scene(page, DRAWN_AND_POSSIBLE))
     if colour == "sign":

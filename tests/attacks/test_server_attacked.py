@@ -32,7 +32,7 @@ from granforce.study.store import open_store
 # Minutes, unless it is ended.
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"
 LIMITS = "n=60,states=20000,upload=1"
-HELD = "?mu=0.1&n=30&seed=1&states=30&relax=nearest"  # as the small store has it
+HELD = "?mu=0.1&n=30&seed=1&states=30&relax=nearest_piqp"  # as the small store has it
 PATIENCE = 300  # s, on a busy machine
 # Session after session the server may keep this much, in bytes; it was found to keep 4 kB.
 KEPT = 100_000
@@ -145,7 +145,7 @@ def visits(work):
 def computes(served, seed):
     """Another visitor asks for states, and they are computed and kept."""
     url, server, folder = served
-    parameters = f"mu=0.2&n=30&states=5&seed={seed}&relax=nearest"
+    parameters = f"mu=0.2&n=30&states=5&seed={seed}&relax=nearest_piqp"
 
     async def visit():
         client = await Client.opened(url, f"?{parameters}")

@@ -38,7 +38,7 @@ LINES = {
     "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
     "intervals": [MU, "--packing p.npz"],
     "limit-loads": [MU, "--packing p.npz"],
-    "limit-load": [
+    "load-factor": [
         "blocks.npz --load horizontal",
         "blocks.npz --load horizontal --critical",
     ],

@@ -182,7 +182,7 @@ def check_against_linprog(seed):
     A = np.column_stack([A, -own_program(packing, turned)[1]])
     cones, free = np.pad(cones, [(0, 0), (0, 1)]), [*free, (0, None)]
     found = least(-np.eye(A.shape[1])[-1])
-    limit = gf.limit_load(S)
+    limit = gf.load_factor(S)
     assert limit.factor == (np.inf if found.status == 3 else pytest.approx(-found.fun, abs=1e-7))
     if found.status == 0 and seed % 4 == 0:
         critical = gf.critical_load(S)

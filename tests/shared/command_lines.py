@@ -116,7 +116,7 @@ COMMANDS = {
     ),
     "intervals": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
     "limit-loads": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
-    "limit-load": (["p.npz", "--load", "horizontal"], {"--load": ["", "vertical"]}),
+    "load-factor": (["p.npz", "--load", "horizontal"], {"--load": ["", "vertical"]}),
     "stress": (
         ["-n", "8", "--mu", "0.3"],
         ANY_PACKING

@@ -1,6 +1,6 @@
 """The commands, by subject: each takes its arguments and may return an exit code."""
 
-from granforce.cli.commands.exact import intervals, limit_load, limit_loads, perturb, stress
+from granforce.cli.commands.exact import intervals, limit_loads, load_factor, perturb, stress
 from granforce.cli.commands.inference import infer, informative
 from granforce.cli.commands.packings import export, import_, pack
 from granforce.cli.commands.service import app, bench, cache, completion, docs, study_
@@ -18,8 +18,8 @@ __all__ = [
     "infer",
     "informative",
     "intervals",
-    "limit_load",
     "limit_loads",
+    "load_factor",
     "measure",
     "pack",
     "perturb",

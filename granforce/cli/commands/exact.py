@@ -131,17 +131,17 @@ def limit_loads(arguments: argparse.Namespace) -> None:
             write_columns(arguments.out, columns | forces.named({"limit_load": load}))
 
 
-def limit_load(arguments: argparse.Namespace) -> None:
-    """Compute the limit load of a load on all grains, and its critical load on request."""
+def load_factor(arguments: argparse.Namespace) -> None:
+    """Compute the load factor of a load on all bodies, and its critical one on request."""
     S = ensemble(importers.load_packing(arguments.file))
-    limit = grain_loads.limit_load(S, arguments.load)
+    limit = grain_loads.load_factor(S, arguments.load)
     lines: dict[str, Any] = {"bodies": len(S.packing.r), "contacts": len(S.packing.contacts.i)}
-    lines |= {"limit_load": limit.factor, "largest_duality_gap": limit.gap}
+    lines |= {"load_factor": limit.factor, "largest_duality_gap": limit.gap}
     if arguments.critical:
         critical = grain_loads.critical_load(S, arguments.load)
         lines |= {
-            "critical_load_low": critical.low,
-            "critical_load_high": critical.high,
+            "critical_factor_low": critical.low,
+            "critical_factor_high": critical.high,
             "residual": critical.residual,
             "breach": critical.breach,
             "converged": critical.converged,

@@ -19,8 +19,10 @@ from typing import Any
 import platformdirs
 
 from granforce.cli.parsing import ROLES, Input, Output
+from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.records import InputError, whole
 from granforce.study import kinds
+from granforce.study.keys import Parameters
 from granforce.study.store import Store, open_store, refuse_newer
 from granforce.system.files import make_folder
 from granforce.system.plain import json_text
@@ -171,11 +173,18 @@ def cache(arguments: argparse.Namespace) -> int:
         return 0 if all(verdict["ok"] for verdict in verdicts) else 1
     else:
         entries = [
-            {**entry._asdict(), "params": json.dumps(entry.params)}
+            {**entry._asdict(), "params": json.dumps(_typed(entry.params))}
             for entry in store.find(arguments.kind)
         ]
         print_list(entries, ("name", "bytes", "created", "params"), arguments.json)
     return 0
+
+
+def _typed(parameters: Parameters) -> Parameters:
+    """Parameters with the name of their relaxation as typed."""
+    if parameters.get("relax") not in RELAXATIONS.values():
+        return parameters
+    return parameters | {"relax": typed_relaxation(parameters["relax"])}
 
 
 def _check_kind(store: Store, kind: str) -> None:

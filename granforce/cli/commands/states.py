@@ -5,7 +5,6 @@ import json
 import sys
 from collections.abc import Sequence
 
-from granforce.cli.options import RELAXATIONS
 from granforce.cli.results import (
     conditions,
     contact_labels,
@@ -19,6 +18,7 @@ from granforce.cli.results import (
     write_csv,
     write_states,
 )
+from granforce.glossary import RELAXATIONS
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds

@@ -130,7 +130,7 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""
-    page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest{query}", width, 1000)
+    page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest_piqp{query}", width, 1000)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 30")
     there = f"{MODEL}('path')?.get_column('x')?.filter(Number.isFinite).length"
     page.wait_for_function(f"() => {there} > 20")
@@ -239,7 +239,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
 
 
 def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
-    page = visit("?mu=0.1&n=200&states=8&relax=nearest&split=1")
+    page = visit("?mu=0.1&n=200&states=8&relax=nearest_piqp&split=1")
     until(
         page,
         "scene.geometry.states === 8 && !scene.hand.player.grows && scene.hand.player.split.on",

@@ -116,7 +116,7 @@ def playing(stage):
 
 def crowd(stage):
     """The same of 10,000 disks."""
-    query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=accelerated"
+    query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=nearest"
     page, _ = stage.open(query)
     player = "Bokeh.documents[0].get_model_by_name('player')?.player"
     contacts = f"() => {player}?.replay?.walk.contacts > 10000"

@@ -43,7 +43,7 @@ MOST_PICTURES = 110
 LONGEST_MS = 150  # that one picture stays, but for the last one
 LINGER_MS = 1500
 QUALITIES = (60, 45, 30, 20)  # the first whose file is small enough
-COMPILED = "?n=30&seed=7&mu=0.3&states=20&relax=accelerated&source=walk"
+COMPILED = "?n=30&seed=7&mu=0.3&states=20&relax=nearest&source=walk"
 ASKED = "0.15"  # the friction whose packing is made, which no store has
 
 

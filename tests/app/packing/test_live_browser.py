@@ -117,7 +117,7 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
 
 
 def test_computed_states_are_shown_to_the_last(visit):
-    page = visit("?mu=0.41&n=30&states=300&relax=nearest")
+    page = visit("?mu=0.41&n=30&states=300&relax=nearest_piqp")
     until(page, "scene.geometry.mu === 0.41 && !scene.hand.player.grows")
     page.get_by_text("μ = 0.41, 30 disks").wait_for(state="attached")  # in a fold
     page.keyboard.press("End")  # the last state, where all intervals have been seen
@@ -142,7 +142,7 @@ def test_discarded_the_old_packing_is_back_with_its_friction(visit):
 
 
 def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
-    page = visit("?mu=0.48&n=30&states=20000&relax=nearest")
+    page = visit("?mu=0.48&n=30&states=20000&relax=nearest_piqp")
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
     page.get_by_role("button", name="Stop and keep").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
@@ -170,7 +170,7 @@ WebSocket.prototype.send = function (frame) {
 
 def test_two_pages_see_the_same_walk(visit):
     """The second although its player is there, and hears of the walk, before the page is."""
-    query = "?mu=0.42&n=30&states=20000&relax=nearest"
+    query = "?mu=0.42&n=30&states=20000&relax=nearest_piqp"
     one = visit(query)
     until(one, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
     two = visit(query, prepare=lambda page: page.add_init_script(LATE))

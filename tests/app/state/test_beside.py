@@ -63,7 +63,7 @@ def test_a_link_holds_both(state, visited):
 
 
 def test_a_link_has_the_other_computed_where_no_store_has_it(visited):
-    again = visited(f"?mu=0.1&n={DISKS}&states=5&relax=nearest&split=1&beside=0.3")
+    again = visited(f"?mu=0.1&n={DISKS}&states=5&relax=nearest_piqp&split=1&beside=0.3")
     assert (again.cell.mu, again.besides.twin.cell.mu) == (0.1, 0.3)
     assert again.besides.twin.cell.selection == asked(0.3, states=5)
 
@@ -71,7 +71,7 @@ def test_a_link_has_the_other_computed_where_no_store_has_it(visited):
 @pytest.mark.parametrize("mu", ["1e9", "-1", "nan", "many"])
 def test_frictions_of_a_link_that_cannot_be_are_passed_over(library, mu):
     again = AppState(
-        library, query=f"?mu=0.1&n={DISKS}&states=30&relax=nearest&split=1&beside={mu}"
+        library, query=f"?mu=0.1&n={DISKS}&states=30&relax=nearest_piqp&split=1&beside={mu}"
     )
     wait_for(again)
     assert again.cell is not None and again.looks.beside is None and again.besides.twin is None
