@@ -525,3 +525,29 @@ def test_every_text_defines_eta3_alike():
     assert words in " ".join(gf.measures.eta3.__doc__.split())
     low, high = np.array([[1.0, -1.0], [2.0, 0.0]]), np.array([[3.0, 1.0], [2.0, 4.0]])
     assert gf.measures.eta3(low, high) == pytest.approx(((2 + 2 + 0 + 4) / 4) / ((2 + 2 + 2) / 4))
+
+
+def test_disks_without_support_are_answered_with_walls_and_gravity(cache, capsys):
+    Path("pile.csv").write_text("x,y,r\n1,1,1\n3,1,1\n2,2.7320508,1\n")
+    for words, said in (([], "--walls floor --gravity 1"), (["--gravity", "1"], "--walls floor")):
+        assert main(["import", "table", "pile.csv", "--mu", "0.6", *words]) == 2
+        error = capsys.readouterr().err
+        assert said in error and error.count("\n") == 1
+    with pytest.raises(gf.NotJammedError, match="walls="):
+        gf.from_disks([[1, 1], [3, 1]], [1, 1], mu=0.6, gravity=1)
+
+
+def test_overlaps_and_pairs_in_doubt_are_noted_and_listed(cache, capsys):
+    """Three soft disks on a floor; the third is 5·10⁻⁵ from the second."""
+    Path("soft.csv").write_text("x,y,r\n1,1,1\n2.98,1,1\n4.98005,1,1\n")
+    words = ["import", "table", "soft.csv", "--mu", "0.6", "--walls", "floor", "--gravity", "1"]
+    assert main([*words, "--json"]) == 0
+    told = capsys.readouterr()
+    assert "disks overlap by up to 0.02 of the largest radius (mean 0.02)" in told.err
+    assert "1 pair is in doubt: gaps below 0.0001 of" in told.err
+    ((i, j, gap),) = json.loads(told.out)["nearly_touching"]
+    assert (i, j) == (1, 2) and gap == pytest.approx(5e-5, rel=1e-6)
+    assert main([*words, "--tolerance", "1e-4"]) == 0  # now they touch
+    assert "in doubt" not in capsys.readouterr().err
+    rigid = gf.from_disks([[1, 1], [3, 1]], [1, 1], mu=0.6, walls="floor", gravity=1)
+    assert rigid.info["nearly_touching"] == [] and "notes" not in rigid.info

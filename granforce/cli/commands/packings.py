@@ -98,6 +98,8 @@ def import_(arguments: argparse.Namespace) -> int | None:
     if "disks" in packing.info:  # behind each contact with a wall is a grain of its own
         disks = packing.info["disks"]
         lines |= {"grains": disks, "contacts_with_walls": len(packing.r) - disks}
+    if arguments.json and "nearly_touching" in packing.info:
+        lines |= {"nearly_touching": packing.info["nearly_touching"]}
     _report(lines, packing, arguments)
     return None
 

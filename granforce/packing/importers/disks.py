@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.geometry import check_disks, largest_gap, touching
+from granforce.packing.importers.geometry import check_disks, doubtful, largest_gap, touching
 from granforce.packing.importers.network import find
 from granforce.packing.scenes import places_behind
 from granforce.records import (
@@ -46,7 +46,8 @@ def from_disks(
     by default the set is open and needs walls and gravity. walls: "floor", "box" (a floor and two
     sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held: behind each
     place that a disk touches is one more grain, whose balance is not required. gravity: g times the
-    mass density, downwards: a disk weighs g π r².
+    mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
+    nearly_touching [i, j, gap]: no contacts, but less than 100 tolerances apart.
 
     Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
     network exists.
@@ -68,6 +69,7 @@ def from_disks(
         info={"source": "disks"},
         tilt=cell.tilt,
     )
+    packing = doubtful(packing, tolerance)
     return find(enclosed(packing, walls, gravity, tolerance), forces="found")
 
 

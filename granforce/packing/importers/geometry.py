@@ -7,11 +7,23 @@ from scipy.spatial import cKDTree
 
 from granforce.cell import Cell
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import Contacts, InputError, make_contacts, make_packing, positive, repeated
+from granforce.records import (
+    Contacts,
+    InputError,
+    Packing,
+    make_contacts,
+    make_packing,
+    positive,
+    repeated,
+)
+from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP
 from granforce.types import Floats, Integers, Mask
 
 # Contacts may overlap, or have a gap, up to this fraction of the smaller radius.
 OVERLAP_ALLOWED = 0.2
+
+# Pairs whose gap is below this many tolerances, and which are no contacts, are in doubt.
+NEARLY = 100.0
 
 # Largest difference, in largest radii, between a given distance or branch and the positions: dumps
 # with six digits pass; a wrong box or a wrong grain does not.
@@ -50,6 +62,43 @@ def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, F
     """Grains i, j (P,) of all overlapping pairs, and their gaps (P,) < 0; centres may coincide."""
     i, j, shift = find_pairs(x, r, cell, 0.0)
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
+
+
+def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
+    """The packing with notes in info on large overlaps, and on pairs near the tolerance.
+
+    info["nearly_touching"] lists [i, j, gap] of pairs that are no contacts though their gap is
+    below NEARLY tolerances (in largest radii); the gap is in the unit of x.
+    """
+    x, r, c = packing.x, packing.r, packing.contacts
+    largest, notes = r.max(), []
+    overlap = -c.gap.min(initial=0.0) / largest
+    if overlap > RIGID_OVERLAP:
+        mean = -c.gap[c.gap < 0].mean() / largest
+        notes.append(
+            f"disks overlap by up to {overlap:.2g} of the largest radius (mean {mean:.2g}): they "
+            "count as soft, each contact at the middle of its overlap"
+        )
+    near = min(NEARLY * tolerance, 1.0)
+    i, j, shift = find_pairs(x, r, packing.cell, near * largest)
+    joined = np.minimum(c.i, c.j) * len(r) + np.maximum(c.i, c.j)
+    apart = ~np.isin(i * len(r) + j, joined)
+    i, j, shift = i[apart], j[apart], shift[apart]
+    gap = np.hypot(*(x[j] - x[i] + shift @ packing.cell.vectors).T) - r[i] - r[j]
+    if len(i):
+        pairs = "1 pair is" if len(i) == 1 else f"{len(i)} pairs are"
+        notes.append(
+            f"{pairs} in doubt: gaps below {near:.2g} of the largest radius, but no contacts; "
+            "nearly_touching in the report by --json (in packing.info) lists them"
+        )
+    info = {
+        "nearly_touching": [
+            list(row) for row in zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
+        ]
+    }
+    if notes:
+        info |= {"notes": [*packing.info.get("notes", []), *notes]}
+    return packing._replace(info=packing.info | info)
 
 
 def listed(

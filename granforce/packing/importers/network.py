@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
@@ -40,10 +41,11 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     inner = np.isfinite(load.sum(axis=1))
     gain = gain_by_reversing((c.i, c.j, c.normal), packing.forces, np.nan_to_num(load), inner)
     if gain > WORTH_REVERSING:
+        notes = packing.info.get("notes", [])
         note = f"the unbalance of grains falls by {gain:.0%} if tangential forces change sign; " + (
             "leave out reverse" if reverse else "--reverse (reverse=True) changes it"
         )
-        info["notes"] = [*info.get("notes", []), note]
+        info["notes"] = [*notes, *info.get("notes", []), note]
     if np.isfinite(packing.volume):
         virial = float(normal @ packing.contacts.length)
         if virial <= 0:
@@ -199,8 +201,9 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     """
     if not packing.load.any():
         raise InputError(
-            "an open set needs loads (columns fx, fy, torque of the grains) or forces "
-            "(columns fn, ft of the contacts); a periodic one its box"
+            "an open set needs walls and gravity (--walls floor --gravity 1, or walls=, gravity=), "
+            "loads (columns fx, fy, torque of the grains) or forces (columns fn, ft of the "
+            "contacts); a periodic one its box"
         )
     contacts, r = packing.contacts, packing.r
     contacts = contacts._replace(
@@ -229,9 +232,14 @@ def _settled(packing: Packing) -> Packing:
     if unbalanced.max() > LOAD_MISFIT:
         named = ", ".join(str(whole.grains[k]) for k in np.argsort(-unbalanced, kind="stable")[:5])
         total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
+        walls = (
+            ""
+            if left_open_in(packing).any()
+            else ("; if walls hold the grains, give them (--walls floor, or walls=)")
+        )
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads or contacts: "
-            f"most is left over at grains {named} (counted from 0)"
+            f"most is left over at grains {named} (counted from 0){walls}"
         )
     load = packing.load.copy()
     unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])

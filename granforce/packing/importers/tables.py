@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
-from granforce.packing.importers.geometry import check_disks, listed, touching
+from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
 from granforce.packing.importers.network import adopt, find
 from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
 from granforce.records import (
@@ -58,7 +58,8 @@ def read_table(
     open set: the loads). reverse: change the sign of ft. Without forces, the network nearest to
     equal normal forces at the given pressure (or loads) is computed; pressure is not used with fn,
     ft. walls ("floor", "box" or segments) and gravity, for tables without forces: see `from_disks`.
-    most_grains: largest number of grains.
+    most_grains: largest number of grains. packing.info has notes on overlaps and on pairs in doubt,
+    which nearly_touching lists [i, j, gap]: no contacts, but less than 100 tolerances apart.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
@@ -89,6 +90,7 @@ def read_table(
         {"source": "table"},
         cell.tilt,
     )
+    packing = doubtful(packing, LISTED_TOUCHING if pairs else tolerance)
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
