@@ -6,7 +6,8 @@ import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
-from granforce.figures.networks import outline
+from granforce.figures.networks import bodies, outline
+from granforce.forces.balance import left_open_in
 from granforce.records import Packing
 from granforce.types import Floats
 
@@ -17,21 +18,23 @@ LONGEST_ARROW = 2.0
 def displacement(
     packing: Packing, field: Floats, contact: int | None = None, *, backend: str = "bokeh"
 ) -> hv.Overlay:
-    """Displacements of the grains as arrows on the packing.
+    """Displacements of grains, or of bodies of any shape, as arrows on the packing.
 
     field (N, 2): displacements in any unit, NaN for grains without an arrow; the longest arrow is
-    LONGEST_ARROW mean diameters long. contact: position of the perturbed contact, which is marked.
+    LONGEST_ARROW mean diameters of free grains long. contact: position of the perturbed contact,
+    which is marked.
     """
     style.ready(backend)
     field = np.asarray(field, float)
     known = np.isfinite(field).all(axis=1)
     size = np.linalg.norm(field[known], axis=1)
     longest = size.max(initial=0.0)
-    arrow = LONGEST_ARROW * 2 * packing.r.mean() / (longest or 1.0)
-    x = packing.cell.wrapped(packing.x)
+    free = ~left_open_in(packing)
+    arrow = LONGEST_ARROW * 2 * packing.r[free].mean() / (longest or 1.0)
+    x, outlines = packing.cell.wrapped(packing.x), bodies(packing)
     drawn = [
-        _disks(x[~known], packing.r[~known], "#eeeeee", backend),
-        _disks(x[known], packing.r[known], "#cccccc", backend),
+        _closed([outlines[k] for k in np.flatnonzero(~known)], "#eeeeee", backend),
+        _closed([outlines[k] for k in np.flatnonzero(known)], "#cccccc", backend),
         _arrows(x[known], arrow * field[known], backend),
         *outline(packing, backend),
     ]
@@ -39,7 +42,11 @@ def displacement(
         at = packing.contact_points[[contact]]
         drawn.append(style.dots(at, "perturbed contact", style.COLOURS[1], backend, size=8))
     whole = np.isfinite(packing.box).all()
-    low, high = packing.cell.extent if whole else (x.min(axis=0), x.max(axis=0))
+    if whole:
+        low, high = packing.cell.extent
+    else:
+        seen = [*(outlines[k] for k in np.flatnonzero(free)), x[known] + arrow * field[known]]
+        low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     shape = {"data_aspect": 1} if backend == "bokeh" else {"aspect": "equal"}
     words = {f"{axis}label": style.typeset(axis, backend) for axis in "xy"}
@@ -53,10 +60,7 @@ def displacement(
     )
 
 
-def _disks(x: Floats, r: Floats, colour: str, backend: str) -> hv.Path:
-    angle = np.linspace(0, 2 * np.pi, 25)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    outlines = [centre + radius * circle for centre, radius in zip(x, r, strict=True)]
+def _closed(outlines: list[Floats], colour: str, backend: str) -> hv.Path:
     name = "line_color" if backend == "bokeh" else "color"
     return hv.Path(outlines).opts(backend=backend, **{name: colour})
 

@@ -14,6 +14,7 @@ from granforce.types import Floats, Integers
 
 SHOWN_CONTACTS = 40
 LARGEST = 3.0  # f_n / f_n,orig at which frames are cut off
+CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 65)) for f in (np.cos, np.sin)], axis=1)
 RATIOS = np.linspace(0, LARGEST, 121)  # edges of the bins in which states are counted
 
 
@@ -180,6 +181,17 @@ def overlaid(
             )
         )
     return style.page(frames, backend, columns=2)
+
+
+def bodies(packing: Packing) -> list[Floats]:
+    """The outline (k, 2) of each body, closed: its corners, or a circle inside the cell."""
+    circles = packing.cell.wrapped(packing.x)[:, None] + packing.r[:, None, None] * CIRCLE
+    if packing.shapes is None:
+        return list(circles)
+    return [
+        np.concatenate([corners, corners[:1]]) if len(corners) else circle
+        for corners, circle in zip(packing.shapes.polygons(), circles, strict=True)
+    ]
 
 
 def outline(packing: Packing, backend: str) -> list[hv.Curve]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.figures import style
-from granforce.figures.networks import outline
+from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
 from granforce.records import InputError, Packing, brief, float_array, takes
 from granforce.types import Floats
@@ -24,7 +24,6 @@ _WORDS = {
     "force": "f_n / ⟨f_n⟩",
     "spread": "spread of f_n / ⟨f_n⟩",
 }
-_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 65)) for f in (np.cos, np.sin)], axis=1)
 
 
 @takes(Packing)
@@ -143,10 +142,7 @@ def _bodies(packing: Packing, backend: str) -> list[Any]:
     if len(disks) > MOST_DISKS:
         return []
     if packing.shapes is not None:
-        drawn = [
-            corners if len(corners) else x + r * _CIRCLE
-            for x, r, corners in zip(packing.x, packing.r, packing.shapes.polygons(), strict=True)
-        ]
+        drawn = bodies(packing)
         fixed = np.flatnonzero(left_open_in(packing))
         return [
             _polygons([drawn[k] for k in which], backend, colour)
@@ -155,7 +151,7 @@ def _bodies(packing: Packing, backend: str) -> list[Any]:
     x, r, cell = packing.cell.wrapped(packing.x[disks]), packing.r[disks], packing.cell
     at, shapes = cell.across(x), []
     for moved, seen in cell.images(at - r[:, None], at + r[:, None]):
-        shapes += [x[k] + moved + r[k] * _CIRCLE for k in seen]
+        shapes += [x[k] + moved + r[k] * CIRCLE for k in seen]
     return [_polygons(shapes, backend, FILL)]
 
 

@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 from packings import packed, skewed
 
+import granforce as gf
 from granforce.figures import style
 from granforce.figures.displacement import LONGEST_ARROW, displacement
 from granforce.figures.networks import overlaid, places
+
+GROUND = [[-50, -1], [50, -1], [50, 0], [-50, 0]]
 
 
 @pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
@@ -30,6 +33,20 @@ def test_arrows_are_proportional_to_displacements_and_rattlers_have_none(backend
     suffix = "html" if backend == "bokeh" else "png"
     style.save(figure, tmp_path / f"figure.{suffix}")
     assert (tmp_path / f"figure.{suffix}").stat().st_size > 0
+
+
+def test_bodies_move_as_the_bodies_they_are():
+    packing = gf.blocks([[[0, 0], [1, 0], [1, 1], [0, 1]], [0.5, 1.5, 0.5], GROUND], 0.5, fixed=[2])
+    field = np.array([[1.0, 0], [2.0, 0], [np.nan, np.nan]])
+    paths = displacement(packing, field).traverse(lambda element: element, [hv.Path])
+    fixed, moving, arrows = ([np.array(p) for p in path.split(datatype="array")] for path in paths)
+    for line, corners in ((fixed[0], GROUND), (moving[0], [[0, 0], [1, 0], [1, 1], [0, 1]])):
+        assert {tuple(point) for point in line} == {tuple(point) for point in corners}
+        assert tuple(line[0]) == tuple(line[-1])
+    assert np.hypot(*(moving[1] - [0.5, 1.5]).T) == pytest.approx(0.5)
+    # Longest in diameters of what may move, however large the ground is.
+    size = packing.r[:2].mean()
+    assert np.ptp(arrows[1][:, 0]) == pytest.approx(LONGEST_ARROW * 2 * size)
 
 
 def test_tilted_cells_are_outlined_and_grains_lie_inside():
