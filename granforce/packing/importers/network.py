@@ -201,9 +201,9 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     """
     if not packing.load.any():
         raise InputError(
-            "an open set needs walls and gravity (--walls floor --gravity 1, or walls=, gravity=), "
-            "loads (columns fx, fy, torque of the grains) or forces (columns fn, ft of the "
-            "contacts); a periodic one its box"
+            "an open set needs loads (columns fx, fy, torque of the grains) or forces (columns fn, "
+            "ft of the contacts), or walls and gravity (--walls floor --gravity 1, or walls=, "
+            "gravity=); a periodic one its box"
         )
     contacts, r = packing.contacts, packing.r
     contacts = contacts._replace(
