@@ -21,7 +21,7 @@ def page() -> Any:
     leave_links_alone()
     query = (pn.state.location.search if pn.state.location else "") or ""
     request = scene_links.request_of(query)
-    if learns(query) or request.scene != scene_links.MANY:
+    if learns(query) or request.scene not in scene_links.LARGE:
         return learn_page(document, query)
     return explore_page(document, request.query)
 

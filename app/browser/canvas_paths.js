@@ -11,7 +11,13 @@ export function line(g, a, b) {
 /** Begin a path through points, closed. */
 export function polygon(g, points) {
   g.beginPath()
-  for (const point of points) g.lineTo(...point)
+  addPolygon(g, points)
+}
+
+/** Add a closed path through points. */
+export function addPolygon(g, points) {
+  if (g.polygon) return g.polygon(points) // a Sheet
+  points.forEach((point, k) => (k ? g.lineTo(...point) : g.moveTo(...point)))
   g.closePath()
 }
 

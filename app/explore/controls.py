@@ -57,7 +57,7 @@ class Controls:
     def __init__(self, state: AppState) -> None:
         self.state, self.work = state, state.work
         self._following = False
-        self.mu = FrictionSlider(self._typed, margin=0)
+        self.scene, self.mu = SceneList(margin=0), FrictionSlider(self._typed, margin=0)
         draw = self.mu.param.update
         self.work.task(reading).start(lambda job: study_data.hill(), lambda hill: draw(hill=hill))
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
@@ -76,7 +76,7 @@ class Controls:
         self._connect()
         self._follow()
         self.line = pn.FlexBox(
-            SceneList(margin=0),
+            self.scene,
             self.mu,
             self.opens,
             self.go,
@@ -172,7 +172,9 @@ class Controls:
             return
         selection, packing = state.selection, state.selection.packing
         self._following = True
-        self.mu.param.update(stored=[cell.mu for cell in state.cells()], mu=selection.mu)
+        self.scene.follow(packing)
+        fixed, stored = selection.imported, [cell.mu for cell in state.cells()]
+        self.mu.param.update(fixed=fixed, stored=stored, mu=selection.mu)
         if not selection.imported:
             self.n.value, self.seed.value = packing["n"], packing["seed"]
         known = state.cell is not None and state.cell.selection.packing == packing

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.replays import Replay
+from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..widgets.header import Header
 from ..widgets.hints import term
@@ -36,7 +36,7 @@ def rest(replay: Replay) -> str:
     summary = replay.summary
     loose = summary.get("rattlers", 0)
     forces, grains = 2 * summary["contacts"], summary["n"] - loose
-    free, mu = summary["dimension"], summary["mu"]
+    free, mu, closed = summary["dimension"], summary["mu"], bool(np.isfinite(replay.box).all())
     carry = f"{grains} of the {summary['n']} disks carry (pale ones are loose)."
     carry = carry if loose else f"All {grains} disks carry."
     if mu == 0:
@@ -47,9 +47,10 @@ def rest(replay: Replay) -> str:
         )
     else:
         needed = forces - free
+        pressed = f" and the pressure{_dependent(3 * grains + 1 - needed)}" if closed else ""
         why = (
-            f"{carry} Newton's laws require balance: two forces and a torque at each of them, and "
-            f"the pressure{_dependent(3 * grains + 1 - needed)}: {needed} independent equations. "
+            f"{carry} Newton's laws require balance: two forces and a torque at each that can "
+            f"move{pressed and ','}{pressed}: {needed} independent equations. "
             f"But {summary['contacts']} contacts carry {forces} unknown force components, a "
             f"{term('fn')} and a {term('ft')} each: <b>h = {free}</b> numbers are left free "
             f"({term('h')}). That the forces are not determined by balance is called force "
@@ -89,7 +90,7 @@ def _dependent(count: int) -> str:
 
 def more(replay: Replay) -> str:
     """The longer part, collapsed, as HTML for a page without scripts of its own."""
-    return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
+    return worded(replay, f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>")
 
 
 def follow(state: AppState, header: Header) -> None:
@@ -97,7 +98,7 @@ def follow(state: AppState, header: Header) -> None:
 
     def tell(*events: Any) -> None:
         if state.replay is not None:
-            header.help = summary_html(state.replay) + rest(state.replay)
+            header.help = worded(state.replay, summary_html(state.replay) + rest(state.replay))
 
     state.param.watch(tell, "replay")
     tell()

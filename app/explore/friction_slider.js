@@ -13,7 +13,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
-    <label for="mu" data-term="mu"><b>Friction μ</b><small>each μ has its own packing</small></label>
+    <label for="mu" data-term="mu"><b>Friction μ</b><small></small></label>
     <div class="track">
       <div class="hill"></div>
       <div class="rail"><div class="ticks"></div>
@@ -42,6 +42,7 @@ export function render({ model, view }) {
   }
 
   function draw() {
+    root.querySelector("small").textContent = model.fixed ? "the same packing at every μ" : "each μ has its own packing"
     range.min = model.least
     range.max = model.most
     part("ticks").innerHTML = model.stored
@@ -95,7 +96,7 @@ export function render({ model, view }) {
     model.send_msg({ typed: typed.value })
   })
 
-  for (const name of ["least", "most", "stored"]) model.on(name, draw)
+  for (const name of ["least", "most", "stored", "fixed"]) model.on(name, draw)
   model.on("mu", follow)
   model.on("msg:custom", follow) // the typed value was accepted or refused
   model.on("hill", drawHill)

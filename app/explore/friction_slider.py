@@ -17,6 +17,7 @@ class FrictionSlider(Scripted):
 
     mu = param.Number(default=0.1)
     hill = param.List(default=[], doc="[(μ, η2)] to be drawn along it")
+    fixed = param.Boolean(doc="whether the packing does not depend on μ")
     stored = param.List(default=[], doc="values of μ that need no computing")
     least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
     most = param.Number(default=MOST_PLACE, constant=True)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from granforce.measures.sampling import FEWEST, MIXED
 
-from ..results.replays import Replay
+from ..results.replays import Replay, worded
 from ..results.selection import KINDS, SOLVERS, Selection
 from ..state.app_state import AppState
 from ..widgets.hints import term
@@ -71,15 +71,16 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
         return []
     summary = state.replay.summary
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
-    h = summary["dimension"]
+    h, phi = summary["dimension"], summary["packing_fraction"]
+    each = worded(state.replay, "contacts per disk")
     found = (
         ""
         if volume is None
         else with_error(volume["log_volume"].item(), volume["log_volume_error"].item())
     )
     return [
-        Quantity("z", "z", "contacts per disk", exact=f"{summary['coordination']:.3f}"),
-        Quantity("phi", "φ", "packing fraction", exact=f"{summary['packing_fraction']:.4f}"),
+        Quantity("z", "z", each, exact=f"{summary['coordination']:.3f}"),
+        Quantity("phi", "φ", "packing fraction", exact="–" if math.isnan(phi) else f"{phi:.4f}"),
         Quantity(
             "h", "h", "free dimensions", exact=f"{h} = {unknowns} − {unknowns - h}",
             note="forces minus independent equations",

@@ -6,7 +6,9 @@ export function render({ model }) {
   root.className = "scenelist"
   root.innerHTML = `Scene <select aria-label="Scene">${model.titles.map(([name, title]) =>
     `<option value="${name}" ${name === model.shown ? "selected" : ""}>${title}</option>`).join("")}</select>`
-  root.querySelector("select").addEventListener("change", (event) => {
+  const list = root.querySelector("select")
+  model.on("shown", () => { list.value = model.shown })
+  list.addEventListener("change", (event) => {
     const here = new URLSearchParams(window.location.search), there = new URLSearchParams({ scene: event.target.value })
     if (here.get("dark")) there.set("dark", here.get("dark"))
     if (here.has("mu") && Number(here.get("mu")) !== model.usual) there.set("mu", here.get("mu"))

@@ -4,7 +4,8 @@ from typing import Any
 
 import param
 
-from granforce.packing.scenes import SCENES
+from granforce.packing.scenes import EVERY
+from granforce.study.keys import Parameters
 
 from ..browser.bundle import Scripted
 from ..state import scene_links
@@ -15,7 +16,13 @@ class SceneList(Scripted):
 
     titles = param.List(doc="[name, title] of every scene")
     shown = param.String(default=scene_links.MANY)
-    usual = param.Number(doc="μ of the page as it opens, which is not taken along")
+    usual = param.Number(doc="μ of the scene on screen, which is not taken along")
 
     def __init__(self, **params: Any) -> None:
-        super().__init__(titles=scene_links.titles(), usual=SCENES[scene_links.MANY].mu, **params)
+        super().__init__(titles=scene_links.titles(), **params)
+        self.follow({})
+
+    def follow(self, packing: Parameters) -> None:
+        """Show the scene of a packing with these parameters."""
+        shown = packing.get("scene", scene_links.MANY)
+        self.param.update(shown=shown, usual=EVERY[shown].mu)

@@ -48,5 +48,5 @@ def known_words(state: AppState) -> Iterator[str]:
 def stem(selection: Selection) -> str:
     """A file name without suffix."""
     if selection.imported:
-        return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"
+        return f"granforce_{selection.name}_mu{selection.mu:g}"
     return f"granforce_n{selection.packing['n']}_mu{selection.mu:g}_s{selection.packing['seed']}"

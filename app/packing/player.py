@@ -98,6 +98,8 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         # rows of the style's disk colours: whole, rattler, image, image of a rattler
         "kind": (2 * disks.image + (disks.contacts == 0)).astype(np.int8),
         "radius": radius,
+        "unit": replay.unit,
+        "outlines": replay.outlines,
         **{
             name: values.astype(np.int32) if name in whole else values
             for name, values in links._asdict().items()

@@ -10,7 +10,7 @@ from granforce.types import Floats
 from ..results import progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.planes import Plane
-from ..results.replays import Replay
+from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.known import Knowledge
 from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
@@ -266,7 +266,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
     if pulled and looks.tab == "perturb" and not state.hand.pulls:
         meaning = "change by the push"
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
-    return LEGEND.format(
+    return worded(replay, LEGEND).format(
         width=_chosen(state, "thickness", WIDTHS),
         shown=shown,
         high=6 + 6 * shown / widest,

@@ -174,7 +174,10 @@ def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
     if "imported" in packing:
         return
     with in_turn(job, "packing", packing):
-        _compact(job, library, packing)
+        if "scene" in packing:
+            study.get(library.own, kinds.PACKING, packing)
+        else:
+            _compact(job, library, packing)
 
 
 def _compact(job: Job, library: Library, packing: Parameters) -> None:

@@ -36,7 +36,7 @@ def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
 def _kin(selection: Selection) -> tuple[Any, ...]:
     """Properties that all cells of one statistic share."""
     made = selection.packing
-    packing = {name: made.get(name) for name in ("imported", "n")}
+    packing = {name: made.get(name) for name in ("imported", "scene", "n")}
     packing |= {} if selection.imported else unusual(made)
     own_mu = None if selection.same_mu else selection.packing["mu"]
     relax = selection.relax if selection.kind == "walk" else ""

@@ -7,11 +7,11 @@ import numpy as np
 from granforce.records import Packing
 from granforce.types import Floats, Integers, Mask
 
-# Width of the strip around the periodic cell in which images are drawn, in largest radii.
+# Width of the strip around the cell in which images are drawn, in units of `unit`.
 MARGIN = 1.0
 # Largest distance from the centre of the contact suggested for dragging, in half view widths.
 NEAR = 0.45
-# Width of a force chain with the mean normal force, in largest radii, and the default change in
+# Width of a force chain with the mean normal force, in units of `unit`, and the default change in
 # ⟨f_n⟩ for full colour.
 CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
 FULL_DEVIATION = 4.0  # deviation from the measurement, in σ, for full colour
@@ -31,22 +31,42 @@ class Disks(NamedTuple):
 class Links(NamedTuple):
     """Contacts of the backbone and their periodic images as segments, k rows."""
 
-    x0: Floats  # (k,) centre of grain i, length
+    # (k,) centre of grain i, length; of bodies, begin of a line through the contact along n
+    x0: Floats
     y0: Floats
-    x1: Floats  # (k,) that centre + ℓ n
+    x1: Floats  # (k,) that centre + ℓ n, or end of the line
     y1: Floats
     contact: Integers  # (k,) position among the backbone's contacts
     i: Integers  # (k,) numbers of the two grains
     j: Integers
 
 
+def unit(packing: Packing) -> float:
+    """The largest radius, length; of bodies, half the median ℓ: fixed ones may be large."""
+    if packing.shapes is None or not len(packing.contacts.i):
+        return float(packing.r.max())
+    return float(np.median(packing.contacts.length) / 2)
+
+
+def outlines(packing: Packing) -> list[list[float]]:
+    """Corners of each body relative to its centre, flat; empty for a disk. [] if all are disks."""
+    if packing.shapes is None:
+        return []
+    bodies = zip(packing.shapes.polygons(), packing.x, strict=True)
+    return [(corners - centre).ravel().tolist() for corners, centre in bodies]
+
+
 def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     """(x_low, x_high, y_low, y_high) of a square around the cell (or the grains, if open)."""
-    margin = MARGIN * packing.r.max()
+    margin = MARGIN * unit(packing)
     periodic = np.isfinite(packing.box)
     corner, opposite = packing.cell.extent
-    low = np.where(periodic, corner, (x - packing.r[:, None]).min(axis=0))
-    high = np.where(periodic, opposite, (x + packing.r[:, None]).max(axis=0))
+    r, shapes = packing.r[:, None], packing.shapes
+    ends = np.concatenate([x - r, x + r])
+    if shapes is not None:
+        ends = np.concatenate([ends[np.tile(shapes.sides == 0, 2)], shapes.corners])
+    low = np.where(periodic, corner, ends.min(axis=0))
+    high = np.where(periodic, opposite, ends.max(axis=0))
     middle, half = (low + high) / 2, (high - low).max() / 2 + margin
     corners = np.stack([middle - half, middle + half], axis=1)
     x_low, x_high, y_low, y_high = corners.ravel().tolist()
@@ -70,7 +90,7 @@ def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
     parts = []
     cell, r = packing.cell, packing.r[:, None]
     at = cell.across(x)
-    for moved, grain in cell.images(at - r, at + r, MARGIN * packing.r.max()):
+    for moved, grain in cell.images(at - r, at + r, MARGIN * unit(packing)):
         image = np.full(len(grain), bool(np.any(moved)))
         place = x[grain] + moved
         parts.append((*place.T, packing.r[grain], grain, number[grain], image))
@@ -80,14 +100,16 @@ def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
 def links(packing: Packing, x: Floats, backbone: Integers) -> Links:
     """Segments of the backbone's contacts, given as positions in the packing."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    reach = packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
+    begin, reach = x[i], packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
+    if packing.shapes is not None:
+        begin, reach = packing.through_contacts(backbone, np.tile([1.0, 0.0], (len(backbone), 1)))
     parts = []
     # A contact of a disk inside the cell may extend outside, and its image then enters the cell.
-    cell, begin = packing.cell, x[i]
+    cell = packing.cell
     end = begin + reach
     ends = cell.across(begin), cell.across(end)
     low, high = np.minimum(*ends), np.maximum(*ends)
-    for moved, contact in cell.images(low, high, MARGIN * packing.r.max()):
+    for moved, contact in cell.images(low, high, MARGIN * unit(packing)):
         placed = (*(begin[contact] + moved).T, *(begin[contact] + moved + reach[contact]).T)
         parts.append((*placed, contact, i[contact], j[contact]))
     return Links(*(np.concatenate(field) for field in zip(*parts, strict=True)))

@@ -23,6 +23,8 @@ class Replay(NamedTuple):
     box: Floats  # (2,) sides; inf in open directions
     tilt: float  # of the cell
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
+    unit: float  # geometry.unit, the scale of chains and marks, length
+    outlines: list[list[float]]  # geometry.outlines
     inviting: int  # row of links suggested for dragging, or -1
     typical: int  # the contact whose f_n scatters most like the average, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
@@ -44,6 +46,11 @@ class Replay(NamedTuple):
     def invited(self) -> int | None:
         """The contact of the row `inviting`, or None."""
         return None if self.inviting < 0 else int(self.links.contact[self.inviting])
+
+
+def worded(replay: Replay, text: str) -> str:
+    """A text about disks, for what the replay shows: disks, or bodies."""
+    return text.replace("disk", "body").replace("bodys", "bodies") if replay.outlines else text
 
 
 def make_replay(
@@ -142,6 +149,8 @@ def _replay(
         box=packing.box,
         tilt=packing.tilt,
         window=window,
+        unit=geometry.unit(packing),
+        outlines=geometry.outlines(packing),
         inviting=geometry.inviting(links, frames[0, :, 0], window),
         typical=_typical(frames[:, :, 0]),
         backbone=backbone,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
 from granforce.glossary import RELAXATIONS, typed_relaxation
+from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, choice, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
@@ -49,8 +50,13 @@ class Selection(NamedTuple):
 
     @property
     def imported(self) -> bool:
-        """Whether the packing was imported, so that it cannot be made again with other options."""
-        return "imported" in self.packing
+        """Whether the packing was imported, or is a scene: it has no options of a compaction."""
+        return "n" not in self.packing
+
+    @property
+    def name(self) -> str:
+        """A short name of such a packing."""
+        return str(self.packing.get("scene") or self.packing["imported"][:8])
 
     @property
     def same_mu(self) -> bool:
@@ -175,7 +181,8 @@ def series(
     """
     packing = selection.packing
     if selection.imported:
-        words = [f"{called or 'imported'} {packing['imported'][:8]}"]
+        scene = BLOCKS.get(packing.get("scene", ""))
+        words = [scene.title if scene else f"{called or 'imported'} {selection.name}"]
     else:
         words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
         words += [f"{name} {value}" for name, value in unusual(packing).items()]
@@ -213,7 +220,7 @@ def of_packing(selection: Selection) -> list[Any]:
     """Words of a command that select a packing and μ."""
     packing = selection.packing
     if selection.imported:
-        words = ["--packing", "PACKING.npz"]
+        words = ["--packing", f"{packing.get('scene', 'PACKING')}.npz"]
     else:
         words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
         for name, value in unusual(packing).items():
@@ -227,7 +234,8 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
     """The query of an address that reopens this selection with the view {name: plain value}."""
     packing = selection.packing
     if selection.imported:
-        given = {"packing": packing["imported"]}
+        given = {"packing": packing.get("imported"), "scene": packing.get("scene")}
+        given = {name: value for name, value in given.items() if value}
     else:
         given = {"n": packing["n"], "seed": packing["seed"], **unusual(packing)}
     given["mu"] = f"{selection.mu:.9g}"
@@ -244,7 +252,7 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
 def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
     """(Selection or None, {name: text} of everything else) from a link's query.
 
-    InputError for an invalid selection; a link without "mu" selects nothing.
+    InputError for an invalid selection; a link without "mu" selects nothing, unless it has a scene.
     """
     pairs = parse_qsl(query.lstrip("?"))
     given = dict(pairs)
@@ -252,6 +260,8 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
         for name, count in Counter(name for name, _ in pairs).items():
             if count > 1:
                 raise InputError(f"it contains {short(name)} {count} times")
+        if given.get("scene") in BLOCKS:
+            given.setdefault("mu", str(BLOCKS[given["scene"]].mu))
         return (_read_selection(given) if "mu" in given else None), given
     except (ValueError, TypeError) as error:
         raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
@@ -268,6 +278,9 @@ def _read_selection(given: dict[str, str]) -> Selection:
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
         return Selection(packing, mu, kind, relax, **rest)
+    if "scene" in given:
+        scene = choice(given.pop("scene"), BLOCKS, "scene")
+        return Selection({"scene": scene, "mu": packed}, mu, kind, relax, **rest)
     made = select(
         _whole(given, "n", 400),
         mu,

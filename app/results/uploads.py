@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from granforce.packing import importers
-from granforce.records import InputError, Packing, refuse_shapes
+from granforce.records import InputError, Packing
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 
@@ -170,7 +170,6 @@ def read(
             most_grains=limits.n,
         )
     limits.check(mu=packing.mu)
-    refuse_shapes(packing, "pictures on the page are")
     return packing
 
 

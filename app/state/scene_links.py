@@ -7,13 +7,14 @@ from granforce.packing import scenes
 from granforce.records import InputError, friction
 
 FIRST, MANY, OWN = "groove", "many", "own"
+LARGE = (MANY, "arch", "wall")  # shown by Explore
 LONGEST = 4000  # characters of a built scene in a link
 
 
 class Request(NamedTuple):
     """The request in a link."""
 
-    scene: str  # MANY for the page of large packings
+    scene: str  # one of LARGE for the page of large packings
     mu: float | None
     dark: bool
     built: str  # a visitor's scene, as text
@@ -29,13 +30,13 @@ def request_of(query: str) -> Request:
     pairs = parse_qsl(query.lstrip("?"))
     given = dict(pairs)
     name = given.get("scene", MANY)
-    if name not in (*scenes.SCENES, OWN):
+    if name not in (*scenes.EVERY, OWN):
         name = FIRST
     try:
         mu = friction(given["mu"])
     except (KeyError, InputError):
         mu = None
-    if "scene" in given:
+    if "scene" in given and name not in scenes.BLOCKS:
         others = [pair for pair in pairs if pair[0] != "scene"]
         query = f"?{urlencode(others)}" if others else ""
     dark = given.get("dark") == "1"
@@ -44,4 +45,6 @@ def request_of(query: str) -> Request:
 
 def titles() -> list[list[str]]:
     """[name, title] of every scene, for the list on the page."""
-    return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
+    small = [name for name in scenes.EVERY if name not in LARGE]
+    found = [[name, scenes.EVERY[name].title] for name in (*small, *LARGE)]
+    return [*found, [OWN, "Build your own"]]

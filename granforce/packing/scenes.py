@@ -75,10 +75,9 @@ def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
 
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The same Packing even if nothing balances; its forces are 0, or those at another μ."""
-    every = SCENES | BLOCKS
-    if not isinstance(name, str) or name not in every:
-        raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(every)}")
-    kind = every[name]
+    if not isinstance(name, str) or name not in EVERY:
+        raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(EVERY)}")
+    kind = EVERY[name]
     mu = kind.mu if mu is None else friction(mu)
     try:
         sketch = kind.make(mu, **options)
@@ -338,6 +337,8 @@ BLOCKS = {
     "slope": _Scene("A block on a slope", 0.5, masonry.slope),
     "ladder": _Scene("A ladder against a wall", 0.4, masonry.ladder),
     "books": _Scene("Books over the edge of a table", 0.5, masonry.books),
+    "stones": _Scene("An arch of three stones", 0.6, partial(masonry.arch, voussoirs=3)),
     "arch": _Scene("An arch of voussoirs", 0.6, masonry.arch),
     "wall": _Scene("A dry-stone wall", 0.65, masonry.wall),
 }
+EVERY = SCENES | BLOCKS

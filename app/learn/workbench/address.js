@@ -1,12 +1,13 @@
 // The address of the workbench: a scene is a step in the history, friction is not.
 
 export class Address {
-  /** opened(query): called after going back or forward to another scene. */
-  constructor(opened) {
+  /** opened(query): called after going back or forward to another scene; large: names of scenes that Explore
+   * shows. */
+  constructor(opened, large) {
     this.returning = false // until the scene in the history is loaded
     this.listener = () => {
       const { search } = window.location
-      if ([null, "many"].includes(new URLSearchParams(search).get("scene"))) return window.location.reload()
+      if ([null, ...large].includes(new URLSearchParams(search).get("scene"))) return window.location.reload()
       this.returning = true
       opened(search)
     }

@@ -35,7 +35,7 @@ class Workbench {
     this.axes = new Axes(this.part("plane"), (shadow) => this.cast(shadow))
     this.push = new PushHand()
     this.walk = new RandomWalk(this.part("play"), (path) => { this.hand.path = path; this.changed() })
-    this.address = new Address((query) => ask(model, view, { query }))
+    this.address = new Address((query) => ask(model, view, { query }), model.large)
     this.controls()
     this.follow()
     this.dress()
@@ -367,7 +367,7 @@ class Workbench {
   /** Another scene, from the list. */
   open({ value: scene, selectedOptions: [option] }) {
     const { model, view, chosenMu, hand: { mu } } = this
-    if (scene === "many") {
+    if (model.large.includes(scene)) {
       clearTimeout(this.resting)
       return this.address.leave(scene, chosenMu ? mu : null, model.dark)
     }

@@ -20,6 +20,7 @@ class Workbench(Scripted):
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
     titles = param.List(doc="[name, title] of every scene")
+    large = param.List(default=[*scene_links.LARGE], doc="names of those that Explore shows")
     note = param.String(doc="error in the link")
     dark = param.Boolean()
 
@@ -32,9 +33,9 @@ class Workbench(Scripted):
         self._show(request.scene, request.mu, request.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
-        if name == scene_links.MANY:  # has its own page
+        if name in scene_links.LARGE:  # has its own page
             return
-        self._made = name not in made.SCENES or not made.SCENES[name].packed
+        self._made = name not in made.EVERY or not made.EVERY[name].packed
         if not self._made:
             self._task.start(lambda job: small_scenes.drawn(name, mu), self._put)
             return
@@ -70,7 +71,7 @@ class Workbench(Scripted):
                     "plane": plane,
                 }:
                     self._find(what, scene, built, mu, load, plane)
-                case {"scene": name} if name in (*made.SCENES, scene_links.OWN):
+                case {"scene": name} if name in (*made.EVERY, scene_links.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
                     request = scene_links.request_of(query)

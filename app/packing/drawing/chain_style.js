@@ -13,6 +13,8 @@ export class Look {
     this.only = null // 1 for each contact that passes a filter, or null
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
+    if (walk.outlines?.length) this.style.lean = new Float32Array(walk.contacts) // fₜ/fₙ: the direction of a chain
+    this.one = walk.outlines?.length ? "body" : "disk"
     this.measure()
   }
 
@@ -36,11 +38,12 @@ export class Look {
     // Reading the model is slow.
     this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
     this.asked.load = full ?? this.mostLoad
-    const unit = this.scales.width * (stretch ?? 1)
+    const unit = this.walk.unit * this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
+    for (let c = 0; c < style.lean?.length; c++) style.lean[c] = mixed.normal[c] > CARRYING ? mixed.tangential[c] / mixed.normal[c] : 0
     const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
       (colour !== "deviation" || this.measured)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
@@ -89,7 +92,7 @@ export class Look {
     const n = mixed.normal[c], t = mixed.tangential[c]
     const told = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
-      ["contact", `${walk.backbone[c]} (disks ${walk.i[k]} – ${walk.j[k]})`],
+      ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
@@ -102,11 +105,9 @@ export class Look {
 
   grain(k, { mixed }) {
     const { walk } = this, grain = walk.grain[k]
-    const rows = [
-      ["disk", `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
-      ["radius", walk.r[k].toFixed(3)],
-      ["contacts", walk.touching[k]],
-    ]
+    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`], ["contacts", walk.touching[k]]]
+    if (this.one === "body") return rows
+    rows.splice(1, 0, ["radius", walk.r[k].toFixed(3)])
     const { pressure, shear, angle } = this.stressOn(grain, mixed)
     if (!(pressure > 0)) return rows
     const degrees = Math.round((angle * 180) / Math.PI)
@@ -116,9 +117,10 @@ export class Look {
     ]
   }
 
-  /** The forces on a grain: {outward normal nx, ny, force fx, fy} of each contact. */
+  /** The forces on a grain: {arm ax, ay from its centre, force fx, fy} of each contact. */
   forcesOn(grain, { normal, tangential }) {
     const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, found = [], seen = new Set()
+    const r = walk.radius[grain], own = this.one === "body" ? walk.grain.indexOf(grain) : -1
     for (let k = 0; k < contact.length; k++) {
       if ((i[k] !== grain && j[k] !== grain) || seen.has(contact[k])) continue
       seen.add(contact[k])
@@ -126,22 +128,25 @@ export class Look {
       const nx = (x1[k] - x0[k]) / far, ny = (y1[k] - y0[k]) / far, n = normal[c], t = tangential[c]
       // The normal points from i to j, and the force acts on j; t = (−n_y, n_x).
       found.push({
-        nx: out * nx, ny: out * ny, fx: -out * (n * nx - t * ny), fy: -out * (n * ny + t * nx),
+        ax: own < 0 ? out * r * nx : (x0[k] + x1[k]) / 2 - walk.x[own],
+        ay: own < 0 ? out * r * ny : (y0[k] + y1[k]) / 2 - walk.y[own],
+        fx: -out * (n * nx - t * ny),
+        fy: -out * (n * ny + t * nx),
       })
     }
     return found
   }
 
-  /** Stress on a grain, σ = (1/πr²) Σ r n F, compression positive: its mean principal stress, half the
+  /** Stress on a disk, σ = (1/πr²) Σ r n F, compression positive: its mean principal stress, half the
    * difference of the two, and the direction of the larger, −90° … 90°. */
   stressOn(grain, mixed) {
     let xx = 0, yy = 0, xy = 0
-    for (const { nx, ny, fx, fy } of this.forcesOn(grain, mixed)) {
-      xx -= nx * fx
-      yy -= ny * fy
-      xy -= (nx * fy + ny * fx) / 2
+    for (const { ax, ay, fx, fy } of this.forcesOn(grain, mixed)) {
+      xx -= ax * fx
+      yy -= ay * fy
+      xy -= (ax * fy + ay * fx) / 2
     }
-    const unit = 1 / (Math.PI * this.walk.radius[grain]), shear = unit * Math.hypot((xx - yy) / 2, xy)
+    const unit = 1 / (Math.PI * this.walk.radius[grain] ** 2), shear = unit * Math.hypot((xx - yy) / 2, xy)
     return { pressure: (unit * (xx + yy)) / 2, shear, angle: Math.atan2(2 * xy, xx - yy) / 2 }
   }
 

@@ -1,24 +1,25 @@
 // Marks over the chains of a Scene, which provides all positions: the selected contact, axes of
 // force space, and forces on a disk.
 
-import { arrow, circle, line } from "../../browser/canvas_paths.js"
+import { arrow, line } from "../../browser/canvas_paths.js"
 
-const ARROW = 1.3 // length for the largest force on a disk, in largest radii
-const AXIS = [0.3, 7] // width of a contact whose force is an axis of force space, in largest radii, and at most in px
+// Lengths are in units of the packing: its largest radius, see geometry.unit.
+const ARROW = 1.3 // length for the largest force on a disk
+const AXIS = [0.3, 7] // width of a contact whose force is an axis of force space, and at most in px
 
 /** The forces on a disk, each an arrow that ends at its contact point. */
 export function markForces(marks, scene, disk) {
-  const { scale, palette, geometry } = scene, { x, y, r, grain, radius } = geometry
+  const { scale, palette, geometry } = scene, { x, y, grain, unit } = geometry
   const forces = scene.describe.forces(grain[disk])
   const most = Math.max(...forces.map(({ fx, fy }) => Math.hypot(fx, fy)))
-  const long = ARROW * Math.max(...radius), head = Math.max(0.16, 6 / scale)
-  marks.lineWidth = Math.max(0.07, 2 / scale)
+  const long = ARROW * unit, head = Math.max(0.16 * unit, 6 / scale)
+  marks.lineWidth = Math.max(0.07 * unit, 2 / scale)
   marks.strokeStyle = palette.strong
   marks.lineCap = "round"
   marks.beginPath()
-  for (const { nx, ny, fx, fy } of forces) {
+  for (const { ax, ay, fx, fy } of forces) {
     if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
-    const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+    const ex = x[disk] + ax, ey = y[disk] + ay
     arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
   }
   marks.stroke()
@@ -26,16 +27,16 @@ export function markForces(marks, scene, disk) {
 
 /** A contact in the colour of its axis of force space. */
 export function highlight(marks, scene, chosen, colour) {
-  const { scale, palette } = scene
+  const { scale, palette, geometry: { unit } } = scene
   marks.lineCap = "round"
   for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
-    marks.lineWidth = Math.max(Math.min(AXIS[0], AXIS[1] / scale), 5 / scale) + more
+    marks.lineWidth = Math.max(Math.min(AXIS[0] * unit, AXIS[1] / scale), 5 / scale) + more
     marks.strokeStyle = paint
     for (const { a, b } of scene.segments((contact) => contact === chosen)) line(marks, a, b)
   }
 }
 
-/** The selected contact, and its two disks. */
+/** The selected contact, and its two disks or bodies. */
 export function markSelected(marks, scene, selected) {
   const { scale, palette, geometry } = scene
   marks.strokeStyle = palette.selected
@@ -43,10 +44,12 @@ export function markSelected(marks, scene, selected) {
   for (const { k, a, b } of scene.segments((contact) => contact === selected)) {
     marks.lineWidth = 2 / scale
     for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
-      circle(marks, at, geometry.radius[grain])
+      const body = scene.outline(grain) ? geometry.grain.indexOf(grain) : -1
+      marks.beginPath()
+      scene.addBody(marks, ...(body < 0 ? at : [geometry.x[body], geometry.y[body]]), grain)
       marks.stroke()
     }
-    marks.lineWidth = Math.max(0.12, 3 / scale)
+    marks.lineWidth = Math.max(0.12 * geometry.unit, 3 / scale)
     line(marks, a, b)
   }
 }

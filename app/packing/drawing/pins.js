@@ -54,7 +54,8 @@ export class Pins {
       context.globalAlpha = k === first ? 1 : COPY
       context.beginPath()
       for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
-        const long = way * (scale * geometry.radius[grain] + arrow_px)
+        const edge = scene.outline(grain) ? geometry.unit / 2 : geometry.radius[grain]
+        const long = way * (scale * edge + arrow_px)
         arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
       }
       for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
@@ -71,9 +72,9 @@ export class Pins {
     const { contacts = [], exact = [] } = this.pins, { known, halo } = scene.palette
     for (const [n, held] of [...contacts].entries()) {
       for (const { middle } of scene.segments((contact) => contact === held)) {
-        circle(sheet, middle, SPOT)
+        circle(sheet, middle, SPOT * scene.geometry.unit)
         sheet.strokeStyle = known
-        sheet.lineWidth = SPOT / 2
+        sheet.lineWidth = (SPOT * scene.geometry.unit) / 2
         sheet.stroke()
         sheet.fillStyle = exact[n] ? known : halo
         sheet.fill()

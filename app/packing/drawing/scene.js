@@ -1,6 +1,7 @@
 // The packing on canvases: disks, chains and marks on separate layers, so that a frame repaints
 // only chains. One unit of length is the same number of pixels in x and y.
 
+import { addPolygon, polygon } from "../../browser/canvas_paths.js"
 import { made } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
 import { highlight, markForces, markSelected } from "./marks.js"
@@ -123,7 +124,7 @@ export class Scene {
     this.drawChains(this.style)
     Object.assign(this, { disks, chains, marks, view, size })
     this.changed()
-    return sheet.svg(geometry.window, { ...caption, unit: Math.max(...geometry.radius) })
+    return sheet.svg(geometry.window, { ...caption, unit: geometry.unit })
   }
 
   drawDisks() {
@@ -138,8 +139,7 @@ export class Scene {
         const reach = near + r[k]
         const px = x[k] + this.shift(grain[k], 0), py = y[k] + this.shift(grain[k], 1)
         if (Math.abs(px - view.x) > reach || Math.abs(py - view.y) > reach) continue
-        disks.moveTo(px + r[k], py)
-        disks.arc(px, py, r[k], 0, 2 * Math.PI)
+        this.addBody(disks, px, py, grain[k])
       }
       disks.fillStyle = fill
       disks.fill()
@@ -153,18 +153,26 @@ export class Scene {
   drawBox(context) {
     const { box: [width, height], tilt } = this.geometry
     if (width < 0 || height < 0) return // open
-    context.beginPath()
-    const corners = [[0, 0], [width, 0], [width + tilt, height], [tilt, height]]
-    if (context instanceof Sheet) context.polygon(corners)
-    else {
-      for (const corner of corners) context.lineTo(...corner)
-      context.closePath()
-    }
+    polygon(context, [[0, 0], [width, 0], [width + tilt, height], [tilt, height]])
     context.setLineDash([4 / this.scale, 4 / this.scale])
     context.lineWidth = 1 / this.scale
     context.strokeStyle = this.palette.edge
     context.stroke()
     context.setLineDash([])
+  }
+
+  /** Add a disk or polygon with its centre at a point to a path. */
+  addBody(context, px, py, grain) {
+    const outline = this.outline(grain), r = this.geometry.radius[grain]
+    if (outline) return addPolygon(context, outline.map(([x, y]) => [px + x, py + y]))
+    context.moveTo(px + r, py)
+    context.arc(px, py, r, 0, 2 * Math.PI)
+  }
+
+  /** Corners of a body relative to its centre; null for a disk. */
+  outline(grain) {
+    const flat = this.geometry.outlines?.[grain]
+    return flat?.length ? Array.from({ length: flat.length / 2 }, (_, k) => flat.slice(2 * k, 2 * k + 2)) : null
   }
 
   /** The displacement of a grain at this moment of an animated displacement field. */
@@ -206,11 +214,14 @@ export class Scene {
     else strokeByClass(chains, lines, scale)
   }
 
+  /** Both ends of a chain; on bodies it turns about its middle, the contact, into the direction of the force. */
   ends(k) {
-    const { x0, y0, x1, y1, i, j } = this.geometry
+    const { x0, y0, x1, y1, i, j, contact } = this.geometry, lean = this.style?.lean?.[contact[k]] || 0
+    const turn = 1 / Math.hypot(1, lean), u = (x1[k] - x0[k]) / 2, v = (y1[k] - y0[k]) / 2
+    const dx = lean ? u - turn * (u - lean * v) : 0, dy = lean ? v - turn * (v + lean * u) : 0
     return [
-      x0[k] + this.shift(i[k], 0), y0[k] + this.shift(i[k], 1),
-      x1[k] + this.shift(j[k], 0), y1[k] + this.shift(j[k], 1),
+      x0[k] + dx + this.shift(i[k], 0), y0[k] + dy + this.shift(i[k], 1),
+      x1[k] - dx + this.shift(j[k], 0), y1[k] - dy + this.shift(j[k], 1),
     ]
   }
 
@@ -245,22 +256,23 @@ export class Scene {
 
   /** The segment at a point of the layout, or −1; reach: px from a chain that still count as the chain. */
   linkAt(px, py, reach = GRAB) {
-    const [x, y] = this.toPlace(px, py), { x0, y0, x1, y1, contact } = this.geometry
+    const [x, y] = this.toPlace(px, py), { contact } = this.geometry
     let best = -1, least = Infinity
     for (let k = 0; k < contact.length; k++) {
-      const dx = x1[k] - x0[k], dy = y1[k] - y0[k]
-      const along = ((x - x0[k]) * dx + (y - y0[k]) * dy) / (dx * dx + dy * dy)
+      const [x0, y0, x1, y1] = this.ends(k), dx = x1 - x0, dy = y1 - y0
+      const along = ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy)
       if (along < 0.05 || along > 0.95) continue // many chains meet at a centre
-      const away = Math.hypot(x - x0[k] - along * dx, y - y0[k] - along * dy)
+      const away = Math.hypot(x - x0 - along * dx, y - y0 - along * dy)
       if (away - this.width[k] / 2 < least) { least = away - this.width[k] / 2; best = k }
     }
     return least * this.scale <= reach ? best : -1
   }
 
   diskAt(px, py) {
-    const [a, b] = this.toPlace(px, py), { x, y, r } = this.geometry
+    const [a, b] = this.toPlace(px, py), { x, y, r, grain } = this.geometry
     for (let k = 0; k < x.length; k++) {
-      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2) return k
+      const corners = this.outline(grain[k])
+      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2 && (!corners || within(corners, a - x[k], b - y[k]))) return k
     }
     return -1
   }
@@ -331,4 +343,12 @@ export class Scene {
     this.tip.style.inset = `${low ? "auto" : `${py + 14}px`} ${right ? `${this.size - px + 14}px` : "auto"} ` +
       `${low ? `${this.size - py + 14}px` : "auto"} ${right ? "auto" : `${px + 14}px`}`
   }
+}
+
+/** Whether a point is inside a convex polygon with anticlockwise corners. */
+function within(corners, px, py) {
+  return corners.every(([x, y], k) => {
+    const [u, v] = corners[(k + 1) % corners.length]
+    return (u - x) * (py - y) >= (v - y) * (px - x)
+  })
 }

@@ -18,6 +18,7 @@ from granforce.packing.compaction import (
     number_of_disks,
     pack,
 )
+from granforce.packing.scenes import scene
 from granforce.records import InputError, Packing, friction, moderate, positive, random_seed, whole
 from granforce.study import slices
 from granforce.study.cells import PACKING_VERSION, Kind, get, save
@@ -97,6 +98,8 @@ def _packing(
 ) -> xr.Dataset:
     if "imported" in parameters:
         raise InputError("the imported packing is not in this store: import it again")
+    if "scene" in parameters:
+        return packing_dataset(scene(parameters["scene"], parameters["mu"]))
     callbacks: dict[str, Any] = {"progress": progress, "watch": watch}
     arguments = {name: value for name, value in parameters.items() if name != "version"}
     return packing_dataset(pack(**arguments, max_steps=max_steps, **callbacks))

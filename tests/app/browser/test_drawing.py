@@ -42,6 +42,28 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
     assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
 
 
+def test_bodies_are_found_by_their_outline_and_lines_turn_with_the_force(run):
+    walk = {"x": [0, 5], "y": [0, 0], "r": [2.2, 1], "radius": [2.2, 1], "grain": [0, 1]}
+    walk |= {"outlines": [[-2, -1, 2, -1, 2, 1, -2, 1], []], "window": [-10, 10, -10, 10]}
+    walk |= {"x0": [0], "y0": [0], "x1": [2], "y1": [0], "i": [0], "j": [1], "contact": [0]}
+    walk |= {"box": [-1, -1], "unit": 1}
+    found, ends = run(
+        "packing/drawing/scene",
+        """({ Scene }, { walk }) => {
+            const scene = new Scene(() => {})
+            scene.show(walk)
+            scene.size = 600
+            scene.reset(false)
+            scene.style = { lean: [1] }
+            const places = [[1.9, 0.9], [0, 1.5], [5, 0.9]]
+            return [places.map(([x, y]) => scene.diskAt(...scene.toPixel(x, y))), scene.ends(0)]
+        }""",
+        walk=walk,
+    )
+    assert found == [0, -1, 1]
+    assert ends == pytest.approx([1 - 0.5**0.5, -(0.5**0.5), 1 + 0.5**0.5, 0.5**0.5])
+
+
 @pytest.mark.parametrize("keys", [{}, {"ctrlKey": True}, {"metaKey": True}])
 def test_the_wheel_zooms_with_a_key_or_after_a_click_only(run, keys):
     zoomed = run(
@@ -94,7 +116,7 @@ WALK = {
     "contacts": 2, "mu": 0.5, "states": 3, "number": [0, 1, 2, 3],
     "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
     "distance": np.linalg.norm(np.hstack([NORMAL, TANGENTIAL]) - CENTRE, axis=1),
-    "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8],
+    "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8], "unit": 1,
 }  # fmt: skip
 
 
@@ -145,7 +167,7 @@ PRESSED = {
     "contacts": 2, "mu": 0.5, "contact": [0, 1], "i": [0, 1], "j": [1, 2], "grain": [0, 1, 2],
     "x0": [-1.5, 0.0], "y0": [0.0, 0.0], "x1": [0.0, 1.5], "y1": [0.0, 0.0],
     "x": [-1.5, 0.0, 1.5], "y": [0.0, 0.0, 0.0], "r": [1.0, 0.5, 1.0], "radius": [1.0, 0.5, 1.0],
-    "kind": [0, 0, 0], "box": [-1, -1], "tilt": 0, "window": [-3, 3, -3, 3],
+    "kind": [0, 0, 0], "box": [-1, -1], "tilt": 0, "window": [-3, 3, -3, 3], "unit": 1.0,
     "normal": [2.0, 2.0], "tangential": [0.0, 0.0], "low": [1.0, 2.0], "high": [4.0, 2.5],
 }  # fmt: skip
 MODEL = {

@@ -31,10 +31,15 @@ from app.explore.tabs.friction.claims import VERDICTS
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
+from app.packing.player import frames
 from app.packing.view import PackingView
 from app.results import distributions, planes, study_data, uploads
+from app.results.library import Library
+from app.results.replays import first_replay
 from app.results.saved_file import csv
+from app.results.selection import link, read_link
 from app.state import perturbations
+from app.state.scene_links import request_of
 from app.widgets import label_places
 from app.widgets.file_drop import Dropper
 from app.widgets.plot_style import lines
@@ -278,9 +283,27 @@ def test_sizes_are_limited():
         uploads.read({"npz": ("zeros.npz", large.getvalue())}, limits=limits)
 
 
-def test_bodies_that_the_page_cannot_draw_are_refused():
-    with pytest.raises(InputError, match="pictures on the page are for disks only"):
-        uploads.read({"npz": ("arch.npz", npz(scene("arch")))})
+def test_bodies_of_a_file_are_drawn_as_they_are():
+    """Their outlines about their centres, all within the view, and lines through their contacts."""
+    wall = scene("wall")
+    replay = first_replay(gf.ensemble(uploads.read({"npz": ("wall.npz", npz(wall))})), 1)
+    drawn = frames(replay)
+    outlines = [np.reshape(flat, (-1, 2)) for flat in drawn["outlines"]]
+    corners = np.concatenate([a + b for a, b in zip(outlines, wall.x, strict=True)])
+    assert np.allclose(corners, wall.shapes.corners)
+    (left, right, bottom, top), unit = drawn["window"], drawn["unit"]
+    assert np.all((corners > [left, bottom]) & (corners < [right, top]))
+    assert right - left < 1.2 * np.ptp(corners[:, 0]) and unit < 0.1 * wall.r[-1]
+    ends = np.array([[drawn["x0"], drawn["y0"]], [drawn["x1"], drawn["y1"]]])
+    assert np.allclose(ends.mean(axis=0).T, wall.contact_points[replay.backbone])
+
+
+def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):
+    found, _ = read_link("?scene=arch")
+    assert found.mu == 0.6 and read_link(link(found, {}))[0] == found
+    assert request_of("?scene=arch&mu=0.5").query == "?scene=arch&mu=0.5"
+    made, _ = kinds.get_packing(Library(tmp_path, tmp_path / "cache").own, found.packing)
+    assert np.array_equal(made.x, scene("arch").x)
 
 
 def test_an_upload_is_kept_reported_and_shown(state):

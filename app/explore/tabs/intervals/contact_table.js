@@ -7,7 +7,7 @@ const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3) : "–")
 // Of each column: heading, value for contact c, its format.
 const COLUMNS = [
   ["contact", (on, c) => on.walk.backbone[c], String],
-  ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
+  ["between", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
   ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
   ["fₜ", (on, c) => on.mixed.tangential[c], NUMBER],
   ["smallest fₙ", (on, c) => on.low[c], NUMBER],
@@ -21,7 +21,7 @@ export function render({ model, view }) {
   const root = document.createElement("details"), page = view.model.document
   root.innerHTML = `<summary>All contacts as a table</summary>
     <div class="filters">
-      <label>number of contact or disk <input class="find" inputmode="numeric"></label>
+      <label>number of contact or grain <input class="find" inputmode="numeric"></label>
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
     </div>
     <p class="told" role="status"></p>

@@ -6,7 +6,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from ....packing.view import exact_intervals
-from ....results.replays import Replay
+from ....results.replays import Replay, worded
 from ....state.app_state import AppState
 from ....state.view_settings import DRAWN, SCALES, SORTS
 from ....widgets.hints import term
@@ -115,7 +115,7 @@ class View(TabView):
 def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: int = 0) -> str:
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
-        return HEADING + FIXED
+        return worded(replay, HEADING + FIXED)
     held = len(state.knowledge.known)
     parts = []
     if exact:
@@ -128,7 +128,7 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     parts.append(mark(DARK, f"dark: {random}"))
     parts.append(mark(now(state.looks.dark), "dot: now", "50%"))
     parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
-    text = HEADING + "".join(f"{part}. " for part in parts)
+    text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "
     return text + "Drag a dot, or a line in the packing."

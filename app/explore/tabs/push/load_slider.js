@@ -1,5 +1,5 @@
 // Slider for the push on a contact. As it moves, arrows in the packing grow and the network follows
-// (push_animation.js); it stops where disks start to move, at the critical force.
+// (push_animation.js); it stops where the packing starts to move, at the critical force.
 
 import { ask } from "../../../browser/send.js"
 
@@ -45,7 +45,7 @@ export function render({ model, view }) {
   }
 
   function show() {
-    const there = load >= end(), said = there ? ": disks start to move" : ""
+    const there = load >= end(), said = there ? ": the packing starts to move" : ""
     range.value = load
     told.textContent = load.toFixed(2)
     part("b").textContent = said

@@ -10,7 +10,7 @@ from bokeh.plotting import figure as Figure
 
 from ....background.jobs import Job
 from ....results.library import Cell, Library
-from ....results.replays import Replay
+from ....results.replays import Replay, worded
 from ....state import perturbations
 from ....state.app_state import AppState
 from ....state.perturbations import Loads, Pushed
@@ -118,7 +118,10 @@ class View(TabView):
         return replay.invited if chosen is None and replay is not None else chosen
 
     def _show(self, shown: Shown) -> None:
-        self.lead.object, self.details.object = shown.lead, shown.details
+        replay = self.state.replay
+        self.lead.object, self.details.object = (
+            text if replay is None else worded(replay, text) for text in (shown.lead, shown.details)
+        )
         self.numbers.object = shown.numbers
         self.plots.objects = [plotted(fig) for fig in shown.plots]
 
