@@ -21,6 +21,19 @@ export function addPolygon(g, points) {
   g.closePath()
 }
 
+/** Whether a point is inside a convex polygon with anticlockwise corners. */
+export function inside(corners, [px, py]) {
+  return corners.every(([x, y], k) => {
+    const [u, v] = corners[(k + 1) % corners.length]
+    return (u - x) * (py - y) >= (v - y) * (px - x)
+  })
+}
+
+/** Corners (x, y) from a flat list; null for none. */
+export function unflat(flat) {
+  return flat?.length ? Array.from({ length: flat.length / 2 }, (_, k) => flat.slice(2 * k, 2 * k + 2)) : null
+}
+
 /** Begin a path around a point. */
 export function circle(g, [x, y], r) {
   g.beginPath()

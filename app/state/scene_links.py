@@ -8,6 +8,7 @@ from granforce.records import InputError, friction
 
 FIRST, MANY, OWN = "groove", "many", "own"
 LARGE = (MANY, "arch", "wall")  # shown by Explore
+SMALL = (*(name for name in scenes.SCENES if name != MANY), "ladder", "stones")
 LONGEST = 4000  # characters of a built scene in a link
 
 
@@ -30,13 +31,13 @@ def request_of(query: str) -> Request:
     pairs = parse_qsl(query.lstrip("?"))
     given = dict(pairs)
     name = given.get("scene", MANY)
-    if name not in (*scenes.EVERY, OWN):
+    if name not in (*SMALL, *LARGE, OWN):
         name = FIRST
     try:
         mu = friction(given["mu"])
     except (KeyError, InputError):
         mu = None
-    if "scene" in given and name not in scenes.BLOCKS:
+    if "scene" in given and name not in LARGE[1:]:
         others = [pair for pair in pairs if pair[0] != "scene"]
         query = f"?{urlencode(others)}" if others else ""
     dark = given.get("dark") == "1"
@@ -45,6 +46,5 @@ def request_of(query: str) -> Request:
 
 def titles() -> list[list[str]]:
     """[name, title] of every scene, for the list on the page."""
-    small = [name for name in scenes.EVERY if name not in LARGE]
-    found = [[name, scenes.EVERY[name].title] for name in (*small, *LARGE)]
+    found = [[name, scenes.EVERY[name].title] for name in (*SMALL, *LARGE)]
     return [*found, [OWN, "Build your own"]]

@@ -72,7 +72,7 @@ export function drawAxis(space, index, at, d = 0) {
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) beside(x, number(v), colour) })
   const { r, load } = body.scene, one = r.length === 1 && Math.abs(Math.hypot(load[0], load[1]) - 1) < 1e-9
-  const unit = one ? " (weight of the disk = 1)" : ""
+  const unit = one ? ` (weight of the ${body.scene.one} = 1)` : ""
   const name = forceName(body.scene, index) + unit, words = slope > 0 ? `${name} →` : `← ${name}`
   nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
 }

@@ -4,7 +4,7 @@
 import { distance, dot } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { ASIDE, drawNames, drawValues } from "./force_labels.js"
-import { circle, line } from "../../browser/canvas_paths.js"
+import { circle, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is room
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
@@ -82,9 +82,10 @@ export class Arrows {
     Object.assign(this, { endsOf: scene, found, places: [] })
     for (let c = 0; c < scene.i.length; c++) {
       const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
-      for (const [disk, sign, arm] of [[scene.i[c], -1, scene.arm_i[c]], [scene.j[c], 1, scene.arm_j[c]]]) {
+      const [b_i, b_j] = scene.levers.slice(2 * c, 2 * c + 2)
+      for (const [disk, sign, arm, b] of [[scene.i[c], -1, scene.arm_i[c], b_i], [scene.j[c], 1, scene.arm_j[c], b_j]]) {
         if (disk >= disks) continue
-        const at = [scene.x[2 * disk] - sign * arm * nx, scene.x[2 * disk + 1] - sign * arm * ny]
+        const at = [scene.x[2 * disk] - sign * arm * nx - b * ny, scene.x[2 * disk + 1] - sign * arm * ny + b * nx]
         found.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
       }
       const [one, other] = found.slice(-2)
@@ -158,7 +159,9 @@ export class Arrows {
     const { context: g, body, look } = this, { x, r } = body.scene, copies = this.copies()
     const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
     for (const [k, { disk, at }] of [...own, ...copies].entries()) {
-      circle(g, at, r[disk] * this.unit)
+      const outline = this.outline(disk)
+      if (outline) polygon(g, outline.map((corner) => this.px(...corner)))
+      else circle(g, at, r[disk] * this.unit)
       g.globalAlpha = k < own.length ? 1 : 0.3
       g.fillStyle = look.disk === disk ? look.lit : look.fill
       g.fill()
@@ -171,6 +174,9 @@ export class Arrows {
     for (const { disk, at } of copies) g.fillText(String(disk + 1), ...at)
     g.globalAlpha = 1
   }
+
+  /** Corners of a body; null for a disk. */
+  outline(disk) { return unflat(this.body.scene.outlines[disk]) }
 
   /** Visible copies of the disks of a periodic scene. */
   copies() {
@@ -212,7 +218,7 @@ export class Arrows {
   /** Position k of a disk's number: 0 its centre, otherwise around it. */
   numberAt(d, k) {
     const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
-    const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
+    const R = k && !this.outline(d) ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
     return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
   }
 
@@ -344,7 +350,7 @@ export class Arrows {
     g.font = "11px sans-serif"
     g.textAlign = "center"
     g.textBaseline = "alphabetic"
-    g.fillText(body.scene.r.length > 1 ? `forces on disk ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
+    g.fillText(body.scene.r.length > 1 ? `forces on ${body.scene.one} ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
     const x0 = left + 17 - unit * Math.min(...xs) + ((side - 34) - unit * (Math.max(...xs) - Math.min(...xs))) / 2
     const y0 = top + 17 + unit * Math.max(...ys) + ((side - 34) - unit * (Math.max(...ys) - Math.min(...ys))) / 2
     const own = this.unit * this.forceUnit
@@ -369,8 +375,8 @@ export class Arrows {
       if (best) return best
     }
     for (let d = 0; d < r.length; d++) {
-      const [cx, cy] = this.px(x[2 * d], x[2 * d + 1])
-      if (Math.hypot(px - cx, py - cy) < r[d] * this.unit) return { disk: d, loose: true }
+      const [cx, cy] = this.px(x[2 * d], x[2 * d + 1]), outline = this.outline(d)
+      if (outline ? inside(outline, this.back(px, py)) : Math.hypot(px - cx, py - cy) < r[d] * this.unit) return { disk: d, loose: true }
     }
     return null
   }

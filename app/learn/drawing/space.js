@@ -303,7 +303,7 @@ export class Space {
       // it.
       const upright = Math.abs(uy) < 0.64 || (Math.abs(ux) > 0.5 && 0.6 * g.measureText(text).width > long)
       const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
-      const inLines = (beside) => text.replace(/ (at|between) /, "\n$1 ").replace(beside ? /^(disk \d+) / : /^$/, "$1\n")
+      const inLines = (beside) => text.replace(/ (at|between) /, "\n$1 ").replace(beside ? /^([a-z]+ \d+) / : /^$/, "$1\n")
       const words = short ? text : inLines(upright)
       const on = side.cap ? ON : 0
       if ((long > 14 || lit) && !this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {

@@ -14,16 +14,16 @@ const AT_BOTH = {
 }
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
-export function forceName({ names }, index) {
+export function forceName({ names, one }, index) {
   const place = names[index >> 1]
-  return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith("disk") ? "on " : ""}${place}`
+  return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith(one) ? "on " : ""}${place}`
 }
 
 /** The event at a side of S, in words: which contacts are about to slide or to open there. */
 export function stopping({ scene }, side) {
   const kinds = new Map()
   for (const [contact, what] of side.stops) {
-    const [, disk, place] = scene.names[contact].match(/^(disk \d+ )?(.*)$/)
+    const [, disk, place] = scene.names[contact].match(/^([a-z]+ \d+ )?(.*)$/)
     const verb = `${disk ?? ""}${what === OPENS ? "would lose contact" : `about to slide${way(scene, contact, what)}`}`
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }

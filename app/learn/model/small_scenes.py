@@ -19,6 +19,7 @@ MOST_DISKS, MOST_WALLS = 30, 12
 BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builder
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
 DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
+ONE = {"ladder": "ladder", "stones": "stone"}  # a body of these scenes
 SNAP = 1e-6  # fraction of the largest radius: gaps left by hand are closed up to here
 
 
@@ -40,13 +41,18 @@ def packing_of(name: str, mu: float | None = None, built: str = "") -> Packing:
 
 def geometry(packing: Packing) -> dict[str, Any]:
     """Disks, walls, contacts and the balance of a packing without its cones."""
-    contacts, count = packing.contacts, packing.info.get("disks", len(packing.r))
+    contacts, count, shapes = packing.contacts, _count(packing), packing.shapes
     walls = np.reshape(packing.info.get("walls", []), (-1, 4))
+    outlines = [] if shapes is None else shapes.polygons()
+    if outlines:
+        walls = _touched_sides(outlines[count:], packing.contact_points[contacts.j >= count])
     lids = packing.info.get("pressing", [])
     loaded = bool(np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any())
     found = hulls.hull(packing) if len(contacts.i) and loaded else None
     box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
     return {
+        "one": ONE.get(packing.info.get("scene", ""), "disk"),
+        "outlines": [body.ravel().tolist() for body in outlines[:count]],
         "x": packing.x[:count].ravel(),
         "r": packing.r[:count],
         "load": packing.load[:count].ravel(),
@@ -62,9 +68,19 @@ def geometry(packing: Packing) -> dict[str, Any]:
         "normal": contacts.normal.ravel(),
         "arm_i": contacts.arm_i,
         "arm_j": contacts.arm_j,
+        "levers": contacts.offsets.ravel(),
         "names": names(packing, count),
         **({} if found is None else _balance(found)),
     }
+
+
+def _touched_sides(bodies: Sequence[Floats], points: Floats) -> Floats:
+    """The sides (k, 4) of polygons on which points (n, 2) lie: fixed bodies are drawn as walls."""
+    sides = np.concatenate([np.hstack([body, np.roll(body, -1, axis=0)]) for body in bodies])
+    begin, along = sides[:, :2], sides[:, 2:] - sides[:, :2]
+    share = np.sum((points[:, None] - begin) * along, axis=-1) / np.sum(along**2, axis=-1)
+    nearest = begin + np.clip(share, 0, 1)[..., None] * along
+    return sides[(np.abs(points[:, None] - nearest).max(axis=-1) < SNAP).any(axis=0)]
 
 
 def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
@@ -79,19 +95,38 @@ def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
     }
 
 
+def _count(packing: Packing) -> int:
+    """The number of disks, or of bodies that can move, which come first."""
+    free = int(np.isfinite(packing.load[:, 0]).sum())
+    return int(packing.info.get("disks", len(packing.r) if packing.shapes is None else free))
+
+
 def names(packing: Packing, count: int) -> list[str]:
     """The position of each contact, in words."""
     contacts, places = packing.contacts, []
     several, lids = count > 1, len(packing.info.get("pressing", []))
-    for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
+    one, ends = ONE.get(packing.info.get("scene", ""), "disk"), _ends(packing)
+    for i, j, (n_x, n_y), end in zip(contacts.i, contacts.j, contacts.normal, ends, strict=True):
         if j < count:
-            places.append(f"between disks {i + 1} and {j + 1}")
+            places.append(f"between {one}s {i + 1} and {j + 1}{end}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
         wall = "left wall" if wall == "right wall" and n_x < 0 else wall
         wall = "press" if j < count + lids else wall
-        places.append(f"disk {i + 1} at the {wall}" if several else f"at the {wall}")
+        places.append((f"{one} {i + 1} at the {wall}" if several else f"at the {wall}") + end)
     return places
+
+
+def _ends(packing: Packing) -> list[str]:
+    """For contacts at the two ends of a shared edge, which end, in words; empty for others."""
+    i, j, points = packing.contacts.i, packing.contacts.j, packing.contact_points
+    found = [""] * len(i)
+    for c in range(len(i)) if packing.shapes is not None else ():
+        for other in np.flatnonzero((i == i[c]) & (j == j[c]) & (np.arange(len(i)) != c)):
+            x, y = points[c] - points[other]
+            upright = ("upper" if y > 0 else "lower", "right" if x > 0 else "left")
+            found[c] = f", {upright[int(abs(y) < abs(x))]} end"
+    return found
 
 
 def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
@@ -99,7 +134,7 @@ def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
 
     Flat; empty without a proof.
     """
-    packing, count = _loaded(packing, load), packing.info.get("disks", len(packing.r))
+    packing, count = _loaded(packing, load), _count(packing)
     count += len(packing.info.get("pressing", []))
     try:
         motion = hulls.fall(packing)
@@ -147,7 +182,7 @@ def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
     """The packing under other loads on its disks, flat."""
     if load is None:
         return packing
-    count = packing.info.get("disks", len(packing.r))
+    count = _count(packing)
     changed = packing.load.copy()
     changed[:count] = float_array(load, (3 * count,), "loads").reshape(-1, 3)
     return packing._replace(load=changed)

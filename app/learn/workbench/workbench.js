@@ -95,7 +95,8 @@ class Workbench {
   }
 
   /** Write text into a part of the page if it differs: unchanged parts are not laid out again. */
-  write(name, text, how = "textContent") {
+  write(name, said, how = "textContent") {
+    const text = said.replaceAll("disk", this.hand?.scene.one ?? "disk")
     if (this.written[name] !== text) this.part(name)[how] = this.written[name] = text
   }
 

@@ -71,7 +71,7 @@ class Workbench(Scripted):
                     "plane": plane,
                 }:
                     self._find(what, scene, built, mu, load, plane)
-                case {"scene": name} if name in (*made.EVERY, scene_links.OWN):
+                case {"scene": name} if name in (*scene_links.SMALL, scene_links.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
                     request = scene_links.request_of(query)

@@ -1,7 +1,7 @@
 // The packing on canvases: disks, chains and marks on separate layers, so that a frame repaints
 // only chains. One unit of length is the same number of pixels in x and y.
 
-import { addPolygon, polygon } from "../../browser/canvas_paths.js"
+import { addPolygon, inside, polygon, unflat } from "../../browser/canvas_paths.js"
 import { made } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
 import { highlight, markForces, markSelected } from "./marks.js"
@@ -170,10 +170,7 @@ export class Scene {
   }
 
   /** Corners of a body relative to its centre; null for a disk. */
-  outline(grain) {
-    const flat = this.geometry.outlines?.[grain]
-    return flat?.length ? Array.from({ length: flat.length / 2 }, (_, k) => flat.slice(2 * k, 2 * k + 2)) : null
-  }
+  outline(grain) { return unflat(this.geometry.outlines?.[grain]) }
 
   /** The displacement of a grain at this moment of an animated displacement field. */
   shift(grain, axis) {
@@ -272,7 +269,7 @@ export class Scene {
     const [a, b] = this.toPlace(px, py), { x, y, r, grain } = this.geometry
     for (let k = 0; k < x.length; k++) {
       const corners = this.outline(grain[k])
-      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2 && (!corners || within(corners, a - x[k], b - y[k]))) return k
+      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2 && (!corners || inside(corners, [a - x[k], b - y[k]]))) return k
     }
     return -1
   }
@@ -343,12 +340,4 @@ export class Scene {
     this.tip.style.inset = `${low ? "auto" : `${py + 14}px`} ${right ? `${this.size - px + 14}px` : "auto"} ` +
       `${low ? `${this.size - py + 14}px` : "auto"} ${right ? "auto" : `${px + 14}px`}`
   }
-}
-
-/** Whether a point is inside a convex polygon with anticlockwise corners. */
-function within(corners, px, py) {
-  return corners.every(([x, y], k) => {
-    const [u, v] = corners[(k + 1) % corners.length]
-    return (u - x) * (py - y) >= (v - y) * (px - x)
-  })
 }

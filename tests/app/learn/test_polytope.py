@@ -9,7 +9,7 @@ from app.learn.model import small_scenes
 SCENES = [
     *(("groove", 0.5), ("pyramid", 0.4), ("press", 0.4)),
     *(("box", 0.1), ("box", 0.3), ("leaning", 0.3), ("leaning", 0.5)),
-    *(("solid", 0.3), ("solid", 0.5)),
+    *(("solid", 0.3), ("solid", 0.5), ("ladder", 0.4)),
 ]
 
 

@@ -25,6 +25,7 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
         ("?scene=groove", "groove", None),
         ("?scene=elsewhere", "groove", None),
         ("?scene=many", "many", None),
+        ("?scene=ladder", "ladder", None),
         ("?mu=0.1&n=30", "many", 0.1),  # links from before there were scenes
         ("?scene=box&mu=steep", "box", None),
     ],
@@ -42,13 +43,35 @@ def test_every_scene_of_the_library_is_on_the_list():
 
 
 @pytest.mark.parametrize(
-    "name", ["groove", "box", "pyramid", "press", "leaning", "solid", "column", "thirteen"]
+    "name",
+    [
+        "groove",
+        "box",
+        "pyramid",
+        "press",
+        "leaning",
+        "solid",
+        "column",
+        "thirteen",
+        "ladder",
+        "stones",
+    ],
 )
 def test_forces_less_equations_is_free(name):
     drawn = small_scenes.drawn(name)
     count = len(drawn["i"])
     assert 2 * count - drawn["equations"] == drawn["h"] == gf.ensemble(gf.scene(name)).dimension
     assert len(drawn["names"]) == count
+
+
+def test_the_ladder_is_drawn_between_two_lines_and_stones_have_two_ends():
+    ladder, stones = small_scenes.drawn("ladder"), small_scenes.drawn("stones")
+    assert ladder["names"] == ["at the floor", "at the right wall"] and ladder["h"] == 1
+    assert len(ladder["walls"]) == 2 * 4 and len(ladder["outlines"]) == 1
+    assert stones["names"][:2] == [
+        f"between stones 1 and 2, {end} end" for end in ("lower", "upper")
+    ]
+    assert len(set(stones["names"])) == len(stones["i"]) and len(stones["x"]) == 2 * 3
 
 
 def test_a_hull_holds_all_networks_and_nothing_else():
