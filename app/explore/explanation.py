@@ -28,7 +28,7 @@ def summary_html(replay: Replay) -> str:
             f"the same disks in place. Play goes through some such {term('network', 'networks')}, "
             "sampled at random: alternatives, not moments in time."
         )
-    return f"<h2>{found}</h2><p>{text}</p>"
+    return worded(replay, f"<h2>{found}</h2><p>{text}</p>")
 
 
 def rest(replay: Replay) -> str:
@@ -57,7 +57,8 @@ def rest(replay: Replay) -> str:
             f"indeterminacy. {term('s')} is the set of networks in which no contact pulls (fₙ ≥ "
             "0) and none slips (|fₜ| ≤ μ fₙ)."
         )
-    return (
+    return worded(
+        replay,
         f"<p><b>Why not just one?</b> {why}</p><p><b>How undetermined?</b> {term('eta1')}: how "
         f"much a contact's force varies between networks. {term('eta2')}: how far apart two "
         f"networks are. {term('eta3')}: how long the intervals of possible forces are. All are "
@@ -70,7 +71,7 @@ def rest(replay: Replay) -> str:
         f"come from.</b> {term('walk')}: perturb all forces at random, move to the nearest "
         f"network in balance, and repeat. The {term('original')} is the one it came to rest with. "
         f"All this follows {term('paper')}.</p><p><b>Around the picture.</b> Dashed: the "
-        f"box{_sides(replay)}; disks outside it are periodic copies of those inside.</p>"
+        f"box{_sides(replay)}; disks outside it are periodic copies of those inside.</p>",
     )
 
 
@@ -90,7 +91,7 @@ def _dependent(count: int) -> str:
 
 def more(replay: Replay) -> str:
     """The longer part, collapsed, as HTML for a page without scripts of its own."""
-    return worded(replay, f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>")
+    return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
 
 
 def follow(state: AppState, header: Header) -> None:
@@ -98,7 +99,7 @@ def follow(state: AppState, header: Header) -> None:
 
     def tell(*events: Any) -> None:
         if state.replay is not None:
-            header.help = worded(state.replay, summary_html(state.replay) + rest(state.replay))
+            header.help = summary_html(state.replay) + rest(state.replay)
 
     state.param.watch(tell, "replay")
     tell()

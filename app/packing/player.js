@@ -9,6 +9,7 @@ import { extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
 import { plain } from "../browser/to_object.js"
 import { Pins } from "./drawing/pins.js"
+import { drawThrust } from "./drawing/thrust.js"
 import { Plots } from "./drawing/bokeh_plots.js"
 import { Playback } from "./replay/playback.js"
 import { Pushed } from "./hand/push_animation.js"
@@ -55,11 +56,13 @@ class Player {
     this.pins = new Pins(this)
     this.tell = tell
     this.listeners = new Set() // functions called when other numbers are on screen
+    this.thrust = plain(model.thrust)
     this.scene.onMarks = (context, scene) => {
+      this.drawThrust(context)
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
     }
-    this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
+    this.scene.onSheet = (sheet, scene) => { this.drawThrust(sheet); this.pins.onSheet(sheet, scene) }
     this.split = new Split(this)
     this.sway = new Sway(this.scene)
     this.pushed = new Pushed(this)
@@ -69,6 +72,10 @@ class Player {
       grain: (k) => this.look.grain(k, this.replay),
       forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
     }
+  }
+
+  drawThrust(context) {
+    if (this.replay && !this.scene.frozen && !this.scene.offset) drawThrust(context, this.scene, this.thrust, this.replay.mixed)
   }
 
   /** Whether the tab for pushing a contact is open: playing would distract. */
@@ -350,6 +357,7 @@ class Player {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
+      thrust: loaded(() => { this.thrust = plain(model.thrust); scene.drawMarks() }),
       pins: loaded(() => { this.recover(); scene.drawMarks() }),
       contact: loaded(() => { this.recover(); this.mark() }),
     }

@@ -35,6 +35,9 @@ class Player(Scripted, Seen):
     measured = param.Dict(default={}, doc="of a frame, see packing.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
+    thrust = param.Dict(
+        default={}, doc="where resultants at joints can pass, see drawing/thrust.js"
+    )
     plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
     scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")

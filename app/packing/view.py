@@ -7,7 +7,7 @@ import xarray as xr
 
 from granforce.types import Floats
 
-from ..results import progress_feed
+from ..results import compute, progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.planes import Plane
 from ..results.replays import Replay, worded
@@ -40,6 +40,10 @@ LEGEND = """
 <label>widths times <input name="stretch" type="number" step="any"
   min="{stretch_least:g}" max="{stretch_most:g}" value="{stretch:g}"></label>
 </details>
+"""
+THRUST = """
+<span>green: where the force through a joint can pass (exact, over S); dark: the line of thrust now
+</span>
 """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
@@ -94,8 +98,11 @@ class PackingView:
         state.knowledge.param.watch(self._explain, ["known", "narrowed"])
         state.hand.param.watch(self._explain, "pulls")
         state.work.param.watch(self._explain, "moving")
+        self.thrust = state.work.task(reported=False)
+        state.param.watch(self._bound_thrust, "replay")
         self._show()
         self._accompany()
+        self._bound_thrust()
         self._pin()
         self._explain()
 
@@ -135,6 +142,19 @@ class PackingView:
             exact = exact_intervals(twin.exact, twin.replay)
             self.player.twin = frames(twin.replay) | {"exact": exact}
 
+    def _bound_thrust(self, *events: Any) -> None:
+        """Of bodies: compute where the resultants at their joints can pass."""
+        state, replay = self.state, self.state.replay
+        self.player.thrust = {}
+        if replay is not None and replay.outlines and replay.summary["dimension"]:
+            work = compute.thrust(state.library, state.cell)
+            self.thrust.start(work, lambda found: self._show_thrust(found, replay))
+
+    def _show_thrust(self, found: dict[str, Any], replay: Replay) -> None:
+        if replay is self.state.replay:
+            self.player.thrust = found
+            self._explain()
+
     def _pin(self, *events: Any) -> None:
         self.player.pins = pins(self.state.knowledge)
 
@@ -145,8 +165,9 @@ class PackingView:
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)
+        thrust = THRUST if self.player.thrust else ""
         self.player.param.update(
-            legend=JAMMING if self.state.work.moving else legend(self.state, pulled),
+            legend=JAMMING if self.state.work.moving else legend(self.state, pulled) + thrust,
         )
 
 

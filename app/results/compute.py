@@ -11,7 +11,7 @@ import xarray as xr
 
 from granforce.records import InputError, NotJammedError
 from granforce.study import cells as study
-from granforce.study import kinds
+from granforce.study import hulls, kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 
@@ -167,6 +167,17 @@ def volume(library: Library, cell: Cell) -> Work:
         return cell, found_or_made(library, job, "volume of S", kinds.VOLUME, params)
 
     return Work(work, wants=((kinds.VOLUME.name, params),))
+
+
+def thrust(library: Library, cell: Cell) -> Callable[[Job], dict[str, Any]]:
+    """Work that bounds where the resultant at every joint of a cell's bodies can pass."""
+
+    def work(job: Job) -> dict[str, Any]:
+        packing = library.packing(cell.selection.packing)
+        (a, b), low, high = hulls.thrust(packing, cell.mu)
+        return {"a": a.tolist(), "b": b.tolist(), "low": low, "high": high}
+
+    return work
 
 
 def _make_packing(job: Job, library: Library, packing: Parameters) -> None:

@@ -91,7 +91,7 @@ def outline(
     support = _Support(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
     with suppress(Cancelled):
         while len(new) and len(support.d) + len(new) <= _MOST:
-            support = _merged(support, _solved(solver, plane, new, len(support.d))[1])
+            support = _merged(support, solved(solver, plane, new, len(support.d))[1])
             corners, gap = _corners(support)
             allowed = max(tolerance * np.ptp(support.point, axis=0).max(), _FLOOR)
             new = _normals(support, gap > allowed)
@@ -115,7 +115,7 @@ def supports(
     solver = Solver(make_system(ensemble), workers=workers)
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    _, found = _solved(solver, plane, directions)
+    _, found = solved(solver, plane, directions)
     reached = (found.point * found.d).sum(axis=1)
     return reached, np.abs(found.bound - reached)
 
@@ -127,10 +127,10 @@ def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
-    return forces_of(ensemble, _solved(Solver(make_system(ensemble)), plane, directions)[0])
+    return forces_of(ensemble, solved(Solver(make_system(ensemble)), plane, directions)[0])
 
 
-def _solved(
+def solved(
     solver: Solver, plane: Any, directions: Floats, first: int = 0
 ) -> tuple[Floats, _Support]:
     """(y (k, n) farthest along new directions (k, 2), their _Support); keys start at first.

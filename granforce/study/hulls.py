@@ -12,6 +12,7 @@ import numpy as np
 
 from granforce.explore import bodies, stress_outline
 from granforce.explore import outline as outlines
+from granforce.explore import thrust as bands
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
@@ -91,6 +92,12 @@ def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -
     if chosen[0] == chosen[1] or not carrying.any(axis=(1, 2)).all():
         return np.empty((0, 2))
     return S.force_scale * outlines.outline(S, carrying, tolerance=_OUTLINED).inner
+
+
+def thrust(packing: Packing, mu: float) -> tuple[Integers, Floats, Floats]:
+    """Joints (2, k), and the parts low and high (k,) between which resultants can pass."""
+    found = bands.thrust(ensemble(packing, mu))
+    return found.contacts.T, found.low, found.high
 
 
 def stress_axes(packing: Packing, mu: float) -> Floats:

@@ -64,6 +64,27 @@ def test_bodies_are_found_by_their_outline_and_lines_turn_with_the_force(run):
     assert ends == pytest.approx([1 - 0.5**0.5, -(0.5**0.5), 1 + 0.5**0.5, 0.5**0.5])
 
 
+def test_the_line_of_thrust_passes_the_joints_of_an_arch_where_their_forces_do(run):
+    middles = [[0, 0], [0, 1], [3, 0], [3, 1]]
+    drawn = run(
+        "packing/drawing/thrust packing/drawing/svg_context",
+        """({ drawThrust, Sheet }, { middles, joints }) => {
+            const segments = () => middles.map((middle, k) => ({ k, contact: k, middle }))
+            const geometry = { unit: 1, i: [0, 0, 0, 0], j: [1, 1, 2, 2] }, sheet = new Sheet()
+            const palette = { known: "green", strong: "black" }
+            const scene = { geometry, palette, scale: 100, segments }
+            drawThrust(sheet, scene, joints, { normal: [1, 3, 1, 1] })
+            return sheet.drawn
+        }""",
+        middles=middles,
+        joints={"a": [0, 2], "b": [1, 3], "low": [0.25, 0], "high": [1, 0.5]},
+    )  # fmt: skip
+    ends = [
+        [one[key] for key in ("x1", "y1", "x2", "y2")] for one in drawn if one["name"] == "line"
+    ]
+    assert ends == [[0, -0.25, 0, -1], [3, 0, 3, -0.5], [0, -0.75, 3, -0.5]]
+
+
 @pytest.mark.parametrize("keys", [{}, {"ctrlKey": True}, {"metaKey": True}])
 def test_the_wheel_zooms_with_a_key_or_after_a_click_only(run, keys):
     zoomed = run(
