@@ -97,6 +97,7 @@ _HOME = {
     "save_packing": "packing.importers",
     "save_lammps": "packing.exporters",
     "save_vtk": "packing.exporters",
+    "read_blocks": "packing.importers",
     "read_known": "packing.importers",
     "read_lammps": "packing.importers",
     "open_lammps": "packing.importers",

@@ -72,6 +72,7 @@ from granforce.packing.importers import from_disks as from_disks
 from granforce.packing.importers import load_packing as load_packing
 from granforce.packing.importers import open_lammps as open_lammps
 from granforce.packing.importers import open_mercury as open_mercury
+from granforce.packing.importers import read_blocks as read_blocks
 from granforce.packing.importers import read_known as read_known
 from granforce.packing.importers import read_lammps as read_lammps
 from granforce.packing.importers import read_mercury as read_mercury

@@ -87,6 +87,8 @@ def folder(away):
     np.savetxt("grains.csv", size * rows, delimiter=",", header="x,y,r", comments="")
     pairs = np.column_stack([packing.contacts.i, packing.contacts.j])
     np.savetxt("contacts.csv", pairs, fmt="%d", delimiter=",", header="i,j", comments="")
+    corners = "g,-1,-1,1\ng,2,-1,1\ng,2,0,1\ng,-1,0,1\nb,0,0,0\nb,1,0,0\nb,1,1,0\nb,0,1,0\n"
+    Path("bodies.csv").write_text(f"body,x,y,fixed\n{corners}")
     Path("pile.csv").write_text("x,y,r\n1,1,1\n3,1,1\n2,2.7320508,1\n")
     grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
     frames.write(away, grains, rows)

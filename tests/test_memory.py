@@ -27,6 +27,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 # allocators and caches keep of calls without a leak goes to 0 the more calls are made.
 MOST = 0.02
 
+BODIES = "body,x,y,r,fixed\n0,0,0,1,1\n1,0,2,1,0\n"  # a disk on a disk
+
 
 @pytest.fixture(scope="module")
 def box():
@@ -151,6 +153,7 @@ CALLS = {
     "read_lammps": lambda S, _: read(gf.read_lammps, small_dumps(), mu=0.3),
     "read_mercury": lambda S, _: read(gf.read_mercury, mercury(), mu=MU, box=packed(N, MU).box),
     "read_yade": lambda S, _: read(gf.read_yade, yade(), mu=MU, box=packed(N, MU).box),
+    "read_blocks": lambda S, _: gf.read_blocks(io.StringIO(BODIES), mu=0.5),
     "read_table": lambda S, _: gf.read_table(*tables(cluster(gf.load_packing(SMALL), 2.6)), mu=0.3),
     "read_pegs": lambda S, _: read(gf.read_pegs, frames(), mu=0.3),
     "read_pegs, solved": lambda S, _: gf.read_pegs(mat(solved(16)[0]), mu=0.3),

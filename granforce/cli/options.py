@@ -51,7 +51,7 @@ def import_format(
     summary: str,
     example: str,
     grains: str,
-    contacts: str,
+    contacts: str | None,
     *,
     contacts_needed: bool = True,
 ) -> Parser:
@@ -64,9 +64,10 @@ def import_format(
     )
     command.set_defaults(run="import_")
     command.add_argument("grains", type=Input, help=grains)
-    command.add_argument(
-        "contacts", type=Input, nargs=None if contacts_needed else "?", help=contacts
-    )
+    if contacts is not None:
+        command.add_argument(
+            "contacts", type=Input, nargs=None if contacts_needed else "?", help=contacts
+        )
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
     command.add_argument(
         "--out", type=Output, metavar="FILE.npz", help="save the packing to this file"

@@ -41,7 +41,8 @@ def add_pack(commands: Commands) -> None:
         "make a jammed packing, or load it from the store",
         "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz\n"
         "  granforce pack --scene groove --mu 0.5\n"
-        "  granforce pack --scene arch --out arch.npz",
+        "  granforce pack --scene arch --out arch.npz\n"
+        "  granforce pack --scene wall --scene-options courses=10,blocks=5 --out wall.npz",
     )
     command.add_argument(
         "--scene",
@@ -49,7 +50,15 @@ def add_pack(commands: Commands) -> None:
         metavar="NAME",
         help="a small scene instead of a compressed packing: groove, box, pyramid, press, "
         "leaning, six, solid, column, thirteen or many, or blocks: slope, ladder, books, arch or "
-        "wall; only --mu applies to it",
+        "wall; of the options below only --mu applies to it",
+    )
+    command.add_argument(
+        "--scene-options",
+        type=str,
+        metavar="NAME=…,NAME=…",
+        help="numbers of the scene, separated by commas: courses, blocks, width, height (wall); "
+        "voussoirs, thickness, opening (arch); books, overhang (books); angle, width, height "
+        "(slope); angle (ladder, groove, pyramid); disks, angle (column)",
     )
     add_packing(command)
     add_store(command)
@@ -57,7 +66,8 @@ def add_pack(commands: Commands) -> None:
     command.add_argument(
         "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
     )
-    made = command.options.keys() - {"scene", "mu", "out", "json"}
+    made = command.options.keys() - {"scene", "scene_options", "mu", "out", "json"}
+    command.leaves_out("without --scene", lambda given: given.scene is None, {"scene_options"})
     command.leaves_out("with --scene", lambda arguments: arguments.scene is not None, made)
 
 
@@ -535,6 +545,7 @@ def add_import(commands: Commands) -> None:
         "  granforce import lammps particles.dump contacts.dump --mu 0.3 --frames all "
         "--out series.zarr\n"
         "  granforce import table grains.csv contacts.csv --box 30 30 --mu 0.3 --out packing.npz\n"
+        "  granforce import blocks bodies.csv --mu 0.6 --density 2 --out packing.npz\n"
         "  granforce import pegs positions.txt adjacency.txt --mu 0.5 --out frame.npz "
         "--measured frame.csv",
         reports=False,
@@ -606,6 +617,23 @@ def add_import(commands: Commands) -> None:
         "with a table of contacts and no walls",
         lambda arguments: arguments.contacts is not None and arguments.walls is None,
         {"tolerance"},
+    )
+    blocks = import_format(
+        *(formats, "blocks", "read rigid bodies of any shape: convex polygons and disks"),
+        "bodies.csv",
+        "CSV: a row for each corner, columns body, x, y, and if needed r (of a disk), density and "
+        'fixed (0 or 1); or JSON: {"bodies": [{"corners": [[x, y], …], "fixed": true}, {"disk": '
+        '[x, y, r], "density": 2}, …]}',
+        None,
+    )
+    blocks.add_argument(
+        "--density", type=float, help="mass per area of bodies that have none (default 1)"
+    )
+    blocks.add_argument(
+        "--tolerance",
+        type=float,
+        help="distance up to which surfaces touch or may overlap, in the unit of the bodies "
+        "(default 1e-9 of the largest body)",
     )
     pegs = import_format(
         *(formats, "pegs", "read a photoelastic frame of PeGS"),

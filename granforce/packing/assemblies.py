@@ -142,6 +142,11 @@ def _outline(body: npt.ArrayLike, number: int) -> Floats:
     return disk
 
 
+def area(body: npt.ArrayLike, number: int) -> float:
+    """The area of a body as `blocks` takes it; number: its place in the list, for messages."""
+    return _measured(_outline(body, number))[0]
+
+
 def _measured(body: Floats) -> tuple[float, Floats, float, float]:
     """Area, centre, polar second moment of area, and circumscribed radius."""
     if body.ndim == 1:

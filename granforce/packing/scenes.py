@@ -10,6 +10,7 @@ like any other, and nothing else in granforce depends on scenes.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -79,11 +80,11 @@ def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
         raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(EVERY)}")
     kind = EVERY[name]
     mu = kind.mu if mu is None else friction(mu)
-    try:
-        sketch = kind.make(mu, **options)
-    except TypeError:
-        unknown = ", ".join(options)
-        raise InputError(f"the scene {name} has no option {unknown}") from None
+    there = list(inspect.signature(kind.make).parameters)[1:]
+    for unknown in sorted(options.keys() - set(there)):
+        has = f"its options are {', '.join(there)}" if there else "it has no options"
+        raise InputError(f"the scene {name} has no option {brief(unknown)}: {has}")
+    sketch = kind.make(mu, **options)
     if isinstance(sketch, Sketch):
         sketch = assembled(*sketch[:4], mu, pressing=sketch.pressing)
     return sketch._replace(info=sketch.info | {"scene": name})

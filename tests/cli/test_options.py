@@ -71,6 +71,7 @@ LINES = {
         "run.data run.fstat --mu 0.5 --frames 0 --states 2",
     ],
     "import table": ["grains.csv --mu 0.3", "grains.csv contacts.csv --mu 0.3"],
+    "import blocks": ["bodies.csv --mu 0.5"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "export": ["p.npz g.vtp c.vtp"],
     "bench": ["--quick"],
@@ -112,6 +113,7 @@ def place(tmp_path_factory):
     save_packing(scene("slope"), folder / "blocks.npz")
     (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
+    (folder / "bodies.csv").write_text("body,x,y\n")
     (folder / "r.txt").write_text("1\n" * 8)
     (folder / "known.csv").write_text("contact,f_n_low\n0,0\n")
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)

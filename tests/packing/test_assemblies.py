@@ -1,10 +1,14 @@
 """Bodies of any shape: their contacts, closed forms for S, files, and what is refused."""
 
+import io
+import json
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 import granforce as gf
+from granforce.cli.parser import main
 from granforce.packing.assemblies import assembly
 from granforce.packing.masonry import rectangle
 from granforce.study.kinds import imported_parameters
@@ -252,9 +256,97 @@ def test_files_and_stores_carry_shapes(tmp_path):
         (lambda: gf.margin(gf.scene("slope")), "disks only"),
         (lambda: gf.save_vtk(gf.scene("slope"), "a.vtp", "b.vtp"), "disks only"),
         (lambda: gf.ensemble(gf.scene("slope"), prescribed="stress"), "for disks only"),
-        (lambda: gf.scene("arch", stones=3), "no option stones"),
+        (lambda: gf.scene("arch", stones=3), "no option 'stones'"),
     ],
 )
 def test_what_cannot_be_an_assembly_is_refused(call, words):
     with pytest.raises(gf.InputError, match=words):
         call()
+
+
+GIVEN = """{"bodies": [
+  {"corners": [[-3, -1], [3, -1], [3, 0], [-3, 0]], "fixed": true},
+  {"corners": [[0, 0], [1, 0], [1, 1], [0, 1]], "density": 2},
+  {"disk": [0.5, 1.3, 0.3]}
+]}"""
+ROWS = """body,x,y,r,density,fixed
+ground,-3,-1,0,1.5,1
+ground,3,-1,0,1.5,1
+ground,3,0,0,1.5,1
+ground,-3,0,0,1.5,1
+7,0,0,0,2,0
+7,1,0,0,2,0
+7,1,1,0,2,0
+7,0,1,0,2,0
+ball,0.5,1.3,0.3,1.5,0
+"""
+
+
+def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
+    ground, square = np.array([[-3, -1], [3, -1], [3, 0], [-3, 0]]), rectangle(0, 0, 1, 1)
+    weights = [1, 2, 1.5 * np.pi * 0.09]
+    expected = gf.blocks([ground, square, [0.5, 1.3, 0.3]], 0.5, fixed=[0], weights=weights)
+    for file in (
+        gf.read_blocks(io.StringIO(GIVEN), mu=0.5, density=1.5),
+        gf.read_blocks(io.StringIO(ROWS), mu=0.5),
+    ):
+        assert file.load == pytest.approx(expected.load, nan_ok=True)
+        assert file.contact_points == pytest.approx(expected.contact_points)
+        assert file.forces == pytest.approx(expected.forces)
+        assert file.info["source"] == "blocks" and "notes" not in file.info
+
+
+@pytest.mark.parametrize(
+    "text, options, words",
+    [
+        (ROWS, {"density": 3}, "density of every body: leave out density"),
+        (ROWS.replace("7,1,1,0,2,0", "7,1,1,0,3,0"), {}, "line 8: density differs within body 7"),
+        (ROWS.replace("7,1,1,0,2,0", "7,1,1,0,2,2"), {}, "line 8: fixed must be 0 or 1"),
+        (ROWS.replace("7,1,1,0,2", "7,1,1,0.2,2"), {}, "a disk is one row"),
+        (ROWS.replace("body,", "stone,"), {}, "no column body"),
+        (ROWS.replace("7,1,1,0", "7,0.5,0.2,0"), {}, "body 1 is not convex"),
+        (ROWS.replace(",2,0", ",-2,0"), {}, "the density of body 1"),
+        (GIVEN.replace("corners", "corner"), {}, 'either "corners" or "disk"'),
+        (GIVEN.replace("density", "mass"), {}, "body 1 has 'mass'"),
+        (GIVEN.replace("true", "1"), {}, "fixed of body 0 must be true or false"),
+        (GIVEN[:-1], {}, "not JSON"),
+        ("[1, 2]", {}, "give an object"),
+        (GIVEN.replace("0.3]", "null]"), {}, "body 2"),
+        (GIVEN, {"density": 0}, "density must be"),
+    ],
+)
+def test_what_cannot_be_read_as_bodies_is_one_line(text, options, words):
+    with pytest.raises(gf.InputError, match=words) as refused:
+        gf.read_blocks(io.StringIO(text), mu=0.5, **options)
+    assert "\n" not in str(refused.value)
+
+
+def test_pairs_of_bodies_in_doubt_are_noted():
+    near = GIVEN.replace("1.3", "1.30000001")
+    assert gf.read_blocks(io.StringIO(GIVEN), mu=0.5, tolerance=1e-7).info["nearly_touching"] == []
+    with pytest.raises(gf.NotJammedError):  # the ball hangs in the air
+        gf.read_blocks(io.StringIO(near), mu=0.5, tolerance=1e-9)
+    bodies = '{"corners": [[1, 1], [2, 1], [2, 2], [1, 2]], "fixed": true}, {"disk"'
+    found = gf.read_blocks(io.StringIO(GIVEN.replace('{"disk"', bodies)), mu=0.5)
+    assert found.info["notes"] == [
+        "pairs of bodies that meet corner on corner, which is no contact: 1"
+    ]
+
+
+@pytest.mark.parametrize(
+    "options, bodies", [("courses=2,blocks=3", 8), ("courses=3,blocks=2,height=0.1", 9)]
+)
+def test_scenes_take_their_options_on_the_command_line(options, bodies, capsys):
+    assert main(["pack", "--scene", "wall", "--scene-options", options, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["grains"] == bodies
+
+
+def test_options_that_a_scene_lacks_are_refused_with_those_it_has(capsys):
+    for words, said in (
+        (["--scene", "wall", "--scene-options", "course=2"], "courses, blocks, width, height"),
+        (["--scene", "box", "--scene-options", "disks=2"], "it has no options"),
+        (["--scene", "wall", "--scene-options", "courses=many"], "give numbers"),
+        (["--scene", "wall", "--scene-options", "courses=2.5"], "whole number"),
+    ):
+        assert main(["pack", *words]) == 2
+        assert said in capsys.readouterr().err

@@ -187,6 +187,7 @@ SIMULATIONS = {
     "yade": ["yade", "b.txt", "i.txt", "--mu", "0.3"],
     "mercury": ["mercury", "m.data", "m.fstat", "--mu", "0.3"],
 }
+SCENES = ["", "wall", "courses", "courses=", "=2", "courses=many", "courses=nan", "course=2"]
 EXPORTS = [
     *([name, "g.vtp", "c.vtp"] for name in FILES),
     *(["p.npz", out, "c.dump"] for out in OUTPUTS),
@@ -211,6 +212,8 @@ IMPORTS = [
         for word in words
     ),
     *(["table", "grains.csv", name, "--mu", "0.3"] for name in FILES),
+    *(["blocks", name, "--mu", "0.3"] for name in [*FILES, "grains.csv", "letters.csv"]),
+    *(["blocks", "blocks.csv", "--mu", "0.3", "--density", word] for word in POSITIVE),
     *(["table", "grains.csv", "--mu", mu] for mu in FRICTION),
     *(["table", "grains.csv", "--mu", "0.3", "--box", side, "9"] for side in POSITIVE),
     *(["table", "grains.csv", "--mu", "0.3", "--pressure", p] for p in POSITIVE),
@@ -260,6 +263,7 @@ def lines():
     found += [["export", *words] for words in EXPORTS]
     cell = ["scan", "-n", "8", "--mu", "0.3", "--states", "4"]
     found += [[*cell, f"--scheduler={word}"] for word in SCHEDULERS]
+    found += [["pack", "--scene", "wall", f"--scene-options={word}"] for word in SCENES]
     for command, (right, options) in COMMANDS.items():
         for option, wrong in options.items():
             others = _without(right, option)
@@ -305,6 +309,7 @@ def prepare(folder, packing):
     pairs = "ITEM: ENTRIES atom1 atom2 distance fx fy px py\n1 2 2 -1 0 0 0\n"
     (folder / "c.dump").write_text(head.format("ENTRIES", 1) + pairs)
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
+    (folder / "blocks.csv").write_text("body,x,y\n0,0,0\n0,1,0\n0,0,1\n")
     (folder / "nothing.csv").write_text("contact,comment\n1,strong\n")
     (folder / "letters.csv").write_text("contact,f_n\n1,strong\n")
     (folder / "beyond.csv").write_text("contact,f_n\n1000000,1\n")

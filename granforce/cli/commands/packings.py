@@ -53,8 +53,20 @@ def _report(lines: Mapping[str, Any], packing: Packing, arguments: argparse.Name
 
 def _scene(arguments: argparse.Namespace) -> None:
     check_outputs(arguments.out)
-    packing = scenes.scene(arguments.scene, arguments.mu)
+    options = scene_options(arguments.scene_options)
+    packing = scenes.scene(arguments.scene, arguments.mu, **options)
     _report({"scene": arguments.scene, **importers.report(packing)}, packing, arguments)
+
+
+def scene_options(text: str | None) -> dict[str, float]:
+    """The numbers of 'name=number,…'; InputError for anything else."""
+    if text is None:
+        return {}
+    pairs = importers.read_columns(text, "--scene-options")
+    try:
+        return {name: float(value) for name, value in pairs.items()}
+    except ValueError:
+        raise InputError(f"--scene-options {text[:40]!r}: give numbers, NAME=5,NAME=0.2") from None
 
 
 # Reader of each format; that of pegs returns more than a packing.
@@ -63,6 +75,7 @@ READERS: dict[str, Callable[..., Packing]] = {
     "yade": importers.read_yade,
     "mercury": importers.read_mercury,
     "table": importers.read_table,
+    "blocks": importers.read_blocks,
 }
 # Functions that open formats with many snapshots.
 OPENERS: dict[str, Callable[..., Snapshots]] = {
@@ -87,7 +100,8 @@ def import_(arguments: argparse.Namespace) -> int | None:
     if getattr(arguments, "frames", None) is not None:
         opened = OPENERS[arguments.format](arguments.grains, arguments.contacts, **options)
         return frames.import_frames(arguments, opened)
-    packing = READERS[arguments.format](arguments.grains, arguments.contacts, **options)
+    files = [getattr(arguments, name) for name in ("grains", "contacts") if name in arguments]
+    packing = READERS[arguments.format](*files, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
         raise InputError("--pressure applies only to a table without forces or loads: leave it out")
     for note in packing.info.get("notes", []):

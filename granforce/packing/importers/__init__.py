@@ -1,8 +1,9 @@
-"""Packings from files: NPZ, LAMMPS, YADE, MercuryDPM, and tables.
+"""Packings from files: NPZ, LAMMPS, YADE, MercuryDPM, tables, and bodies of any shape.
 
 These functions return a validated Packing or raise InputError.
 """
 
+from granforce.packing.importers.blocks import read_blocks
 from granforce.packing.importers.dem import open_mercury, read_mercury, read_yade
 from granforce.packing.importers.disks import from_disks
 from granforce.packing.importers.known import read_known
@@ -20,6 +21,7 @@ __all__ = [
     "load_packing",
     "open_lammps",
     "open_mercury",
+    "read_blocks",
     "read_columns",
     "read_known",
     "read_lammps",

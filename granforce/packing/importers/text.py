@@ -197,14 +197,14 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
     ]
 
 
-def read_columns(text: str) -> dict[str, str]:
-    """{name here: name in the file} of 'x=…,y=…'; InputError for anything else."""
+def read_columns(text: str, option: str = "--columns") -> dict[str, str]:
+    """{name here: name in the file} of 'x=…,y=…'; InputError, naming the option, otherwise."""
     pairs = [part.split("=", 1) for part in text.split(",")]
     if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
-        raise InputError(f"--columns {text[:40]!r}: give them as x=…,y=…,r=…")
+        raise InputError(f"{option} {text[:40]!r}: give them as NAME=…,NAME=…")
     names = [name.strip() for name, _ in pairs]
     if len(set(names)) < len(names):
-        raise InputError(f"--columns {text[:40]!r}: give each name once")
+        raise InputError(f"{option} {text[:40]!r}: give each name once")
     return dict(zip(names, (theirs.strip() for _, theirs in pairs), strict=True))
 
 
