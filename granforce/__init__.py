@@ -114,6 +114,7 @@ _HOME = {
     "synthetic_frame": "experiment.synthetic",
     "SyntheticFrame": "experiment.synthetic",
     "report": "packing.importers",
+    "scan": "study.scan",
     "evolution": "study.evolution",
     "frames_of": "experiment.frames",
     "Frame": "experiment.frames",

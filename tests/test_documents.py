@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import frames
@@ -103,6 +104,15 @@ def test_the_readme_is_short_and_gives_the_commands_that_install():
         assert any(
             line.startswith("python3 -m venv .venv") and line.endswith(ends) for line in lines
         )
+
+
+def test_the_text_of_the_wheel_names_nothing_outside_it():
+    described = tomllib.loads(text("pyproject.toml"))["project"]["readme"]["text"]
+    links = re.findall(r"\]\(([^)]+)\)", described)
+    assert links and all(link.startswith("https://") for link in links)
+    named = set(re.findall(r"`granforce (\w+)`", described))
+    assert named == {"app", "docs"} and named <= known()
+    assert not [word for word in re.findall(r"[\w/]+\.\w+", described) if (ROOT / word).exists()]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

@@ -166,6 +166,7 @@ CALLS = {
     "save_lammps": lambda S, folder: gf.save_lammps(S.packing, folder / "p", folder / "c"),
     "save_vtk": lambda S, folder: gf.save_vtk(S.packing, folder / "p.vtp", folder / "c.vtp"),
     "evolution": evolved,
+    "scan": lambda S, folder: gf.scan(folder / "scan.zarr", [0.3], 1, 8, 2, workers=1),
     "rest": lambda S, _: gf.rest(S, draws=1),
     "open_store": lambda S, folder: list(gf.open_store(folder / "store.zarr")),
     "measures": lambda S, _: measured(S),

@@ -551,3 +551,21 @@ def test_overlaps_and_pairs_in_doubt_are_noted_and_listed(cache, capsys):
     assert "in doubt" not in capsys.readouterr().err
     rigid = gf.from_disks([[1, 1], [3, 1]], [1, 1], mu=0.6, walls="floor", gravity=1)
     assert rigid.info["nearly_touching"] == [] and "notes" not in rigid.info
+
+
+def test_the_library_scans_the_cells_of_the_command(cache):
+    """The walk that the command stores is a cell of the scan: no process starts."""
+    walk = ["walk", "-n", "12", "--mu", "0.3", "--states", "3", "--radii", "uniform:0.8,1"]
+    assert main([*walk, "--cache", "s.zarr"]) == 0
+    rows, failed = gf.scan("s.zarr", [0.3], n=12, states=3, radii="uniform:0.8,1")
+    (entry,) = gf.open_store("s.zarr").find("walk")
+    assert not failed and rows == scan_rows(gf.open_store("s.zarr"))
+    assert rows[0]["cached"] and rows[0]["eta1"] == gf.open_store("s.zarr")[entry.name]["eta1"]
+    for wrong, said in (
+        ({"relax": "accelerated"}, "relax must be nearest"),
+        ({"seeds": 0}, "seeds must be at least 1"),
+        ({"workers": 0}, "workers"),
+        ({"states": 0}, "states"),
+    ):
+        with pytest.raises(gf.InputError, match=said):
+            gf.scan("s.zarr", [0.3], **{"n": 12, **wrong})

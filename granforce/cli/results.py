@@ -54,19 +54,21 @@ def check_outputs(*paths: str | None) -> None:
             check_file(path)
 
 
+def packing_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options of a packing, as arguments of `pack`."""
+    return {
+        "radii": radii(arguments.radii, arguments.n),
+        "pressure": arguments.pressure,
+        "dt": arguments.dt,
+        "box_mass": arguments.box_mass,
+        "sweeps": arguments.sweeps,
+        "accuracy": arguments.step_accuracy,
+        "box": arguments.box,
+    }
+
+
 def packing_parameters(arguments: argparse.Namespace, mu: float, seed: int) -> Parameters:
-    return kinds.PACKING.parameters(
-        arguments.n,
-        mu,
-        seed,
-        radii=radii(arguments.radii, arguments.n),
-        pressure=arguments.pressure,
-        dt=arguments.dt,
-        box_mass=arguments.box_mass,
-        sweeps=arguments.sweeps,
-        accuracy=arguments.step_accuracy,
-        box=arguments.box,
-    )
+    return kinds.PACKING.parameters(arguments.n, mu, seed, **packing_options(arguments))
 
 
 def required_mu(arguments: argparse.Namespace) -> float:

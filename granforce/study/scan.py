@@ -24,13 +24,15 @@ from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
+from granforce.glossary import RELAXATIONS
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, choice, real_array, whole, worker_count
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, get, load, row
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import open_store
+from granforce.system.memory import check_memory
 from granforce.system.terminal import one_line
 from granforce.types import Progress
 
@@ -48,6 +50,57 @@ _SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 
 
 def scan(
+    path: str | Path,
+    mu: Sequence[float] | float,
+    seeds: int = 1,
+    n: int = 400,
+    states: int = 1000,
+    *,
+    walk_seed: int = 0,
+    ensemble_mu: float | None = None,
+    relax: str = "nearest",
+    chains: int = 1,
+    keep: int | None = None,
+    workers: int = 2,
+    scheduler: str | None = None,
+    dtypes: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    **packing: Any,
+) -> tuple[list[dict[str, Any]], list[tuple[Parameters, str]]]:
+    """Packings and walks for many μ and seeds, computed into the store at path or loaded from it.
+
+    mu: friction coefficients; for each, packings of n disks with the seeds 1 … seeds. packing:
+    other options of `pack`. states, walk_seed, chains: of each walk, as for `walk`. ensemble_mu:
+    friction of the cones, by default the packing's. relax: "nearest", "nearest_piqp",
+    "gauss_seidel" or "gauss_seidel_only". keep: number of states to store, by default all.
+    workers, scheduler, dtypes, progress: as for `run`.
+
+    Returns a list of rows, as `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed,
+    packing_fraction, coordination, dimension h, eta1, eta2, eta3, …), and a list of (walk
+    parameters, error message). Raises InputError for wrong arguments. Workers are new processes:
+    in a script, call it under ``if __name__ == "__main__":``.
+    """
+    seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
+    worker_count(workers)
+    check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
+    cells = [
+        kinds.WALK.parameters(
+            kinds.PACKING.parameters(n, one, seed, **packing),
+            states,
+            walk_seed,
+            mu=ensemble_mu,
+            relax=RELAXATIONS[choice(relax, RELAXATIONS, "relax")],
+            chains=chains,
+            keep=keep,
+        )
+        for one in mus
+        for seed in range(1, seeds + 1)
+    ]
+    options = {"workers": workers, "scheduler": scheduler, "dtypes": dtypes, "progress": progress}
+    return walks(path, cells, **options)
+
+
+def walks(
     path: str | Path,
     cells: Sequence[Parameters],
     *,

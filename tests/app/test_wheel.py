@@ -78,6 +78,10 @@ def test_every_module_is_in_the_wheel_and_no_picture_of_a_readme(wheel):
     assert pictures == {name for name in pictures if name.startswith("granforce/data/")}
     assert {Path(name).name for name in pictures} == shown
     assert not [name for name in held if name.endswith("README.md")]
+    (metadata,) = (name for name in held if name.endswith("METADATA"))
+    described = zipfile.ZipFile(wheel).read(metadata).decode()
+    assert "granforce docs" in described
+    assert all(link.startswith("https://") for link in re.findall(r"\]\(([^)]+)\)", described))
 
 
 @pytest.mark.slow

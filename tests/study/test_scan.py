@@ -25,8 +25,8 @@ from granforce.study.store import open_store
 def test_a_scan_gives_the_same_for_any_number_of_workers(tmp_path):
     cells = [cell(mu, seed) for mu in (0, 0.3) for seed in (1, 2)]
     seen = []
-    one, failed = scan.scan(tmp_path / "one", cells, workers=1, on_row=seen.append)
-    two, _ = scan.scan(tmp_path / "two", cells, workers=2)
+    one, failed = scan.walks(tmp_path / "one", cells, workers=1, on_row=seen.append)
+    two, _ = scan.walks(tmp_path / "two", cells, workers=2)
     assert not failed
     assert one == two
     assert sorted(map(str, seen)) == sorted(map(str, one))
@@ -34,7 +34,7 @@ def test_a_scan_gives_the_same_for_any_number_of_workers(tmp_path):
     for name in stores[0]:
         a, b = (store[name].drop_vars("seconds", errors="ignore") for store in stores)
         assert a.equals(b)
-    found, _ = scan.scan(tmp_path / "one", cells, workers=2)
+    found, _ = scan.walks(tmp_path / "one", cells, workers=2)
     assert [line["cached"] for line in found] == [True] * 4
 
 
@@ -42,7 +42,7 @@ def test_a_failed_cell_leaves_the_others(tmp_path):
     # Three disks do not always jam: whatever happens to them, the other cell is there.
     hopeless = cell()
     hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
-    rows, failed = scan.scan(tmp_path / "s", [hopeless, cell()], workers=1)
+    rows, failed = scan.walks(tmp_path / "s", [hopeless, cell()], workers=1)
     assert len(rows) == 1
     assert "radii" in failed[0][1]
 
@@ -61,14 +61,14 @@ def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path):
 
 
 def test_a_cell_that_others_removed_is_computed_anew(tmp_path, monkeypatch):
-    wanted = scan.scan(tmp_path / "one", [cell()], workers=1)[0]
+    wanted = scan.walks(tmp_path / "one", [cell()], workers=1)[0]
 
     def run(path, cells, *, on_done):
         on_done(0, False)  # but when it is looked up, others have cleared the store
         return []
 
     monkeypatch.setattr(scan, "run", run)
-    assert scan.scan(tmp_path / "two", [cell()])[0] == wanted
+    assert scan.walks(tmp_path / "two", [cell()])[0] == wanted
 
 
 def test_a_killed_scan_loses_only_the_cells_under_way(tmp_path):
@@ -77,7 +77,7 @@ def test_a_killed_scan_loses_only_the_cells_under_way(tmp_path):
     code = (
         "from granforce.study import scan\n"
         "if __name__ == '__main__':\n"
-        f"    scan.scan({str(path)!r}, {cells!r}, workers=2)\n"
+        f"    scan.walks({str(path)!r}, {cells!r}, workers=2)\n"
     )
     script = tmp_path / "run.py"
     script.write_text(code)
@@ -89,7 +89,7 @@ def test_a_killed_scan_loses_only_the_cells_under_way(tmp_path):
     done = len(store.find("walk"))
     assert 2 <= done
     assert all(verdict.ok for verdict in store.verify())
-    rows, failed = scan.scan(path, cells, workers=2)
+    rows, failed = scan.walks(path, cells, workers=2)
     assert not failed
     assert sum(line["cached"] for line in rows) == done
     assert not list(path.glob(".tmp-*"))
@@ -123,7 +123,7 @@ def kill_parent_alone(path, seeds):
     script.write_text(
         "from granforce.study import scan\n"
         "if __name__ == '__main__':\n"
-        f"    scan.scan({str(path)!r}, {cells!r}, workers=2)\n"
+        f"    scan.walks({str(path)!r}, {cells!r}, workers=2)\n"
     )
     parent = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
     until_it_left(path, "packing-*", 1, parent)

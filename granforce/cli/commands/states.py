@@ -12,20 +12,18 @@ from granforce.cli.results import (
     extents,
     found,
     numbers,
-    packing_parameters,
+    packing_options,
     unit,
     walked,
     write_csv,
     write_states,
 )
-from granforce.glossary import RELAXATIONS
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
-from granforce.system.memory import check_memory
 from granforce.system.terminal import Bar, print_report, report_after, table
 from granforce.types import Rows
 
@@ -140,29 +138,24 @@ def scan(arguments: argparse.Namespace) -> int:
     mus = numbers("--mu", arguments.mu, float) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     worker_count(arguments.workers, "--workers")
-    check_memory(scans.CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
-    cells = [
-        kinds.WALK.parameters(
-            packing_parameters(arguments, mu, seed),
-            arguments.states,
-            arguments.walk_seed,
-            mu=arguments.ensemble_mu,
-            relax=RELAXATIONS[arguments.relax],
-            chains=arguments.chains,
-            keep=arguments.keep,
-        )
-        for mu in mus
-        for seed in range(1, seeds + 1)
-    ]
     store = open_store(arguments.out or arguments.cache)
     with Bar("scan", "cell") as progress:
         rows, failed = scans.scan(
             store.path,
-            cells,
+            mus,
+            seeds,
+            arguments.n,
+            arguments.states,
+            walk_seed=arguments.walk_seed,
+            ensemble_mu=arguments.ensemble_mu,
+            relax=arguments.relax,
+            chains=arguments.chains,
+            keep=arguments.keep,
             workers=arguments.workers,
             scheduler=arguments.scheduler,
             dtypes={"states": "float32"} if arguments.float32 else None,
             progress=progress,
+            **packing_options(arguments),
         )
     _report_scan(rows, failed, arguments.json)
     return 1 if failed else 0

@@ -1,6 +1,7 @@
 """Contacts of given disks in a cell, and checks that a file's contacts match its positions."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -91,13 +92,10 @@ def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
             f"{pairs} in doubt: gaps below {near:.2g} of the largest radius, but no contacts; "
             "nearly_touching in the report by --json (in packing.info) lists them"
         )
-    info = {
-        "nearly_touching": [
-            list(row) for row in zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
-        ]
-    }
+    rows = zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
+    info: dict[str, Any] = {"nearly_touching": [list(row) for row in rows]}
     if notes:
-        info |= {"notes": [*packing.info.get("notes", []), *notes]}
+        info["notes"] = [*packing.info.get("notes", []), *notes]
     return packing._replace(info=packing.info | info)
 
 
