@@ -96,8 +96,9 @@ def scan(
         for one in mus
         for seed in range(1, seeds + 1)
     ]
-    options = {"workers": workers, "scheduler": scheduler, "dtypes": dtypes, "progress": progress}
-    return walks(path, cells, **options)
+    return walks(
+        path, cells, workers=workers, scheduler=scheduler, dtypes=dtypes, progress=progress
+    )
 
 
 def walks(
