@@ -5,7 +5,7 @@ from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import CustomAction, CustomJS, SaveTool
+from bokeh.models import CustomAction, CustomJS, GlyphRenderer, SaveTool, TapTool
 from bokeh.plotting import figure as Figure
 
 from ..browser.bundle import SHARED
@@ -29,20 +29,15 @@ SVG_ICON = (
     "<text x='12' y='16' font-family='sans-serif' font-size='10' font-weight='bold' "
     "text-anchor='middle' fill='gray'>SVG</text></svg>"
 )
-SAVE = """
+SAVE = """(async () => {
 const view = fig.document.views_manager.find_one(fig)
-const blob = await view.export(kind).to_blob()
+const blob = await view.export("svg").to_blob()
 const link = document.createElement("a")
 link.href = URL.createObjectURL(blob)
-link.download = `${name}.${kind}`
+link.download = `${name}.svg`
 link.click()
 setTimeout(() => URL.revokeObjectURL(link.href), 1000)
-"""
-SAVED = f"(async () => {{{SAVE}}})()"
-NEWEST = """
-const fig = [...button.document._all_models.values()].findLast(one => one.tags.includes(mark))
-const name = fig.toolbar.tools.find(one => one.filename).filename;
-"""
+})()"""
 
 
 class TabView:
@@ -98,27 +93,10 @@ def savable(fig: Figure, name: str) -> Figure:
         CustomAction(
             icon=SVG_ICON,
             description="Save as SVG",
-            callback=CustomJS(args={"fig": fig, "name": name, "kind": "svg"}, code=SAVED),
+            callback=CustomJS(args={"fig": fig, "name": name}, code=SAVE),
         ),
     )
     return fig
-
-
-def saving(mark: str) -> list[Any]:
-    """Buttons that save the newest figure with this tag as PNG and SVG, shared by all figures.
-
-    They outlive figures: a widget that leaves the page during its first rendering causes an error
-    in React.
-    """
-    buttons = []
-    for kind in ("png", "svg"):
-        button = pmui.Button(
-            label=f"Picture ({kind.upper()})", variant="outlined", size="small", margin=(4, 5),
-            sx=PLAIN,
-        )  # fmt: skip
-        button.js_on_click(args={"button": button, "mark": mark, "kind": kind}, code=NEWEST + SAVED)
-        buttons.append(button)
-    return buttons
 
 
 def plotted(fig: Figure) -> pn.pane.Bokeh:
@@ -129,6 +107,23 @@ def plotted(fig: Figure) -> pn.pane.Bokeh:
 def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figure:
     """A savable figure in the style of all others."""
     return savable(plot(title, x, y, **options), name)
+
+
+def on_tap(
+    fig: Figure, act: Callable[[int, dict[str, Any]], object], *renderers: GlyphRenderer
+) -> None:
+    """Call act(row, data of the source) when a mark of these renderers is clicked."""
+    fig.add_tools(TapTool(renderers=list(renderers)))
+    for renderer in renderers:
+        renderer.nonselection_glyph = renderer.selection_glyph = renderer.glyph
+    for source in {renderer.data_source for renderer in renderers}:
+
+        def tapped(name: str, old: object, new: list[int], of: Any = source) -> None:
+            if new:
+                of.selected.indices = []
+                act(int(new[0]), of.data)
+
+        source.selected.on_change("indices", tapped)
 
 
 CLAIMS = """

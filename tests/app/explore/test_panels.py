@@ -656,10 +656,11 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     assert not view.plots.objects
     press(view.every)
     wait_for(state, lambda: view.loads is not None)
-    assert view.loads.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
+    loads, drawn = view.loads
+    assert loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
     assert state.looks.contact == 8
-    assert list(view.loads.chosen.data["y"]) == [view.loads.loads.load[8]]
+    assert list(drawn.chosen.data["y"]) == [loads.load[8]]
 
 
 def test_nothing_is_pushed_without_friction(state):

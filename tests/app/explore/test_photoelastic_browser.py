@@ -15,6 +15,14 @@ PICTURES = """() => {
     .map(model => model.properties.inner_width.is_unset ? 0 : model.inner_width)
 }"""
 
+# The toolbar is hidden until the pointer is on the picture; its button works all the same.
+SAVE = """() => {
+  const models = [...Bokeh.documents[0].all_models]
+  const {toolbar} = models.findLast(model => model.name === "photoelastic_network")
+  const tool = toolbar.tools.find(({description}) => description === "Save as SVG")
+  return tool.callback.execute(tool)
+}"""
+
 
 def dropped(page, tmp_path, numbers=NUMBERS):
     """Drop some frames of one packing, measured anew each time, and wait for the last."""
@@ -49,12 +57,11 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     # Nothing is wider than the page.
     wide = page.evaluate("() => document.scrollingElement.scrollWidth")
     assert wide <= width
-    for kind, least in (("PNG", 5000), ("SVG", 20_000)):
-        with page.expect_download() as download:
-            page.get_by_role("button", name=f"Picture ({kind})").click()
-        path = tmp_path / download.value.suggested_filename
-        download.value.save_as(path)
-        assert path.name == f"frame1.{kind.lower()}" and path.stat().st_size > least
+    with page.expect_download() as download:
+        page.evaluate(SAVE)
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    assert path.name == "frame1.svg" and path.stat().st_size > 20_000
     assert "unit of the file" in path.read_text() and "⟨fₙ⟩" in path.read_text()
 
 

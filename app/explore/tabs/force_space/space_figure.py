@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJS, DataRange1d, TapTool
+from bokeh.models import ColumnDataSource, CustomJS, DataRange1d
 
 from ....results import planes
 from ....results.planes import Outlined, Plane
 from ....results.replays import Replay
-from ....widgets.parts import MOVES, figure
+from ....widgets.parts import MOVES, figure, on_tap
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, hover, lines, text
 
 Columns = dict[str, Any]  # of a ColumnDataSource
@@ -56,9 +56,7 @@ class SpaceFigure:
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7
         )
-        states = fig.scatter(
-            "x", "y", source=self.path, size=5, color=STATES, alpha=0.9, nonselection_alpha=0.9
-        )
+        states = fig.scatter("x", "y", source=self.path, size=5, color=STATES, alpha=0.9)
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=14, color=ORIGINAL,
             line_color="#333333",
@@ -70,16 +68,10 @@ class SpaceFigure:
         # The state on screen moves too often to be included in the range.
         fig.x_range.renderers = fig.y_range.renderers = [*edges, states]
         rows = ("network", "@state"), ("at", "@x{0.000}, @y{0.000}")
-        fig.add_tools(hover([states], *rows), TapTool(renderers=[states]))
+        fig.add_tools(hover([states], *rows))
+        on_tap(fig, lambda row, data: show(row), states)
         for axis in (*fig.xaxis, *fig.yaxis):
             axis.js_on_change("axis_label_text_color", CustomJS(code=KEEP))
-
-        def tapped(name: str, old: object, new: list[int]) -> None:
-            if new:
-                self.path.selected.indices = []
-                show(int(new[0]))
-
-        self.path.selected.on_change("indices", tapped)
 
     def clear(self) -> None:
         """Remove everything of another plane."""

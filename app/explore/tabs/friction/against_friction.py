@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, FixedTicker, GlyphRenderer, TapTool
+from bokeh.models import ColumnDataSource, FixedTicker, GlyphRenderer
 
 from granforce.types import Floats
 
-from ....widgets.parts import figure
+from ....widgets.parts import figure, on_tap
 from ....widgets.plot_style import DOT, SERIES, hover
 
 Points = Sequence[tuple[float, float, float]]  # x, y and standard error
@@ -16,7 +16,7 @@ Points = Sequence[tuple[float, float, float]]  # x, y and standard error
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
-HERE, OWN = "this packing", "other packings on this page"
+HERE = "this packing"
 
 
 class Line(NamedTuple):
@@ -25,7 +25,6 @@ class Line(NamedTuple):
     label: str
     points: Points
     dash: str = "solid"
-    colour: int | None = None  # by default its place among the lines
 
 
 class AgainstFriction:
@@ -42,7 +41,7 @@ class AgainstFriction:
         self.own: list[ColumnDataSource] = []
         self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
         for k, line in enumerate(lines):
-            self._draw(k if line.colour is None else line.colour, line)
+            self._draw(k, line)
         fig.scatter(
             "x", "y", source=self.here, size=13, fill_alpha=0, line_color=DOT, line_width=2,
             legend_label=HERE,
@@ -80,17 +79,7 @@ class AgainstFriction:
 
     def choosable(self, choose: Callable[[float], object]) -> None:
         """choose(μ): called when a point is clicked."""
-        for renderer in self.points:
-            source = renderer.data_source
-            renderer.nonselection_glyph = renderer.selection_glyph = renderer.glyph
-
-            def tapped(name: str, old: Any, new: list[int], of: ColumnDataSource = source) -> None:
-                if new:
-                    choose(float(of.data["x"][new[0]]))
-                    of.selected.indices = []
-
-            source.selected.on_change("indices", tapped)
-        self.figure.add_tools(TapTool(renderers=self.points))
+        on_tap(self.figure, lambda row, data: choose(float(data["x"][row])), *self.points)
 
 
 def shown(points: Points) -> Floats:

@@ -12,11 +12,12 @@ from ....results.distributions import Row
 from ....results.library import Cell, Library
 from ....results.replays import Replay
 from ....state.app_state import AppState
+from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import TabView, folded_away, note, plotted
 from ....widgets.progress import Progress
 from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
-from .this_packing import Scatter, forces
+from .this_packing import extents, forces
 
 # If it is wide enough, z is drawn inside Figure 1, where there is no curve; otherwise below it.
 INSET = """
@@ -59,7 +60,7 @@ class View(TabView):
         self.folded = [pn.Column(**WIDE) for _ in THIS]
         self.indeterminacy: Indeterminacy | None = None
         self.correlations: Correlations | None = None
-        self.scatter: Scatter | None = None
+        self.scatter: ContactScatter | None = None
         self.task.param.watch(self.failed, "message")
         self.looks.param.watch(self._mark, "contact")
         self.catch_up()
@@ -117,7 +118,7 @@ class View(TabView):
     def _show_packing(self, replay: Replay, rows: Rows) -> None:
         """Draw the figures of the packing on screen alone."""
         exact = exact_intervals(self.state.exact, replay)
-        self.scatter = Scatter(replay, exact, self._select)
+        self.scatter = extents(replay, exact, self._select)
         self._mark()
         fig, sentence = forces(replay)
         self.folded[0].objects = [plotted(self.scatter.figure)]

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
-from bokeh.models import ColumnDataSource, Range1d, TapTool
+from bokeh.models import ColumnDataSource, Range1d
 
 from granforce.types import Floats, Integers
 
 from ....packing.view import Bounds
 from ....results.replays import Replay
-from ....widgets.parts import MOVES, figure
+from ....widgets.parts import MOVES, figure, on_tap
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, now
 
 COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
@@ -47,15 +47,10 @@ class BarsFigure:
             )
         ]  # fmt: skip
         _, exact, seen = self.layers
-        for layer in self.layers:
-            layer.nonselection_glyph = None
         seen.name = "seen"  # see plot_layer.js
-        look = {"source": self.bars, "color": ORIGINAL, "nonselection_alpha": 1}
         self.line = fig.line("rank", "original", source=self.bars, color=ORIGINAL, line_width=1.5)
-        self.packed = fig.scatter("rank", "original", size=2.5, **look)
-        self.dots = fig.scatter(
-            "rank", "now", source=self.bars, color=now(False), nonselection_alpha=1, name="dots"
-        )
+        self.packed = fig.scatter("rank", "original", source=self.bars, size=2.5, color=ORIGINAL)
+        self.dots = fig.scatter("rank", "now", source=self.bars, color=now(False), name="dots")
         for moving in (seen, self.line, self.packed, self.dots):
             moving.tags = MOVES
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
@@ -68,15 +63,9 @@ class BarsFigure:
                 ("seen", "@low{0.000} … @high{0.000}"),
                 ("possible", "@exact_low{0.000} … @exact_high{0.000}"),
             ),
-            TapTool(renderers=[exact, seen, self.dots]),
         )
-
-        def tapped(name: str, old: object, new: list[int]) -> None:
-            if new:
-                choose(int(self.contacts[new[0]]))
-                self.bars.selected.indices = []
-
-        self.bars.selected.on_change("indices", tapped)
+        marks = *self.layers, self.packed, self.dots
+        on_tap(fig, lambda row, data: choose(int(data["at"][row])), *marks)
 
     def show(
         self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, own: bool

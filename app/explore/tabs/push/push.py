@@ -15,11 +15,11 @@ from ....state import perturbations
 from ....state.app_state import AppState
 from ....state.perturbations import Loads, Pushed
 from ....state.view_settings import PUSHES
+from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import PRIMARY, TabView, folded, note, plotted, question
 from ....widgets.progress import Progress
 from ..friction import claims
 from . import all_contacts, one_contact
-from .all_contacts import LimitLoads
 from .load_slider import LoadSlider
 from .over_packings import responses
 
@@ -55,7 +55,7 @@ class View(TabView):
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.numbers, self.details = note(), note(), note()
         self.task = state.work.task(reported=False)
-        self.loads: LimitLoads | None = None
+        self.loads: tuple[Loads, ContactScatter] | None = None
         self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
         self.gave = False  # whether the push has reached the load at which disks move
         self._shown: Replay | None = None
@@ -173,16 +173,17 @@ class View(TabView):
 
     def _loads_known(self, replay: Replay, found: Loads) -> None:
         if replay is self.state.replay:
-            self.loads = LimitLoads(replay, found, self._choose)
+            self.loads = found, all_contacts.drawn(replay, found, self._choose)
             self.refresh()
 
     def _all(self) -> Shown:
         note_of_held = all_contacts.HELD if self.state.knowledge.known else ""
         if self.loads is None:
             return Shown(all_contacts.ASKED + note_of_held)
-        self.loads.mark(self.looks.contact)
-        lead = self.loads.sentence() + note_of_held
-        return Shown(lead, [self.loads.figure], details=folded(self.loads.computed()))
+        loads, drawn = self.loads
+        drawn.mark(self.looks.contact)
+        lead = all_contacts.sentence(loads) + note_of_held
+        return Shown(lead, [drawn.figure], details=folded(all_contacts.computed(loads)))
 
     def _choose(self, contact: int) -> None:
         self.looks.contact = contact

@@ -19,7 +19,7 @@ from ....results.photoelastic_frames import Frame
 from ....results.saved_file import File
 from ....results.uploads import Files
 from ....widgets.file_buttons import Handover
-from ....widgets.parts import PRIMARY, choice, figure, note, saving
+from ....widgets.parts import PRIMARY, choice, figure, note
 from ....widgets.plot_style import BLUE, ORANGE, corner, hover, legend_above
 from . import frame_picture
 
@@ -30,7 +30,6 @@ SHOWN = {
     "beside": "Both",
     "deviation": "Difference in σ",
 }
-SAVED = "photoelastic_saved"  # name of the picture that the buttons save
 TOLD = 12  # contacts that are listed
 PLAYED_MS = 700  # per frame of a series
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
@@ -77,7 +76,7 @@ class Frames:
             self.found,
             self.choice,
             self.pictures,
-            pn.FlexBox(*saving(SAVED), self.open, **WIDE),
+            self.open,
             note(OPENED),
             self.listed,
             self.compared,
@@ -113,7 +112,7 @@ class Frames:
             for line in photoelastic_frames.account(frame.report)
         )
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
-        self.picture, self.layers = frame_picture.network(frame, tags=[SAVED])
+        self.picture, self.layers = frame_picture.network(frame)
         self.pictures[:] = self._panes()
         self.found.object = head + rows + found(frame.report)
         self.listed.object = listed(frame)
