@@ -20,7 +20,7 @@ from ..results.selection import Selection, brief, command, link, read_link
 from . import known, perturbations
 from .comparison import Beside
 from .known import Knowledge
-from .links import OF_A_REPLAY, UNSEEN, VIEW, Numbered, Numbers, View, fitting, read_view, spelled
+from .links import OF_A_REPLAY, VIEW, Numbered, Numbers, View, fitting, read_view, spelled
 from .page_tasks import Work
 from .pulls import Hand
 from .view_settings import Looks
@@ -106,6 +106,11 @@ class AppState(param.Parameterized):
     def _as_new(self) -> View:
         """The view of a new page, except for the theme: what a link omits."""
         return {name: self._viewed[name].default for name in VIEW if name != "dark"}
+
+    @property
+    def _unseen(self) -> View:
+        """The part of the view that belongs to the states on screen, for new states."""
+        return {name: self._viewed[name].default for name in OF_A_REPLAY}
 
     @property
     def view(self) -> View:
@@ -256,7 +261,7 @@ class AppState(param.Parameterized):
 
     def _show(self, shown: Shown, view: View | None = None) -> None:
         cell, replay, exact = shown
-        fresh = dict(UNSEEN)
+        fresh = self._unseen
         # A walk that was replaced may have reached numbers that the replay does not have.
         if (self.seen is replay and view is None) or self._is_grown(replay):
             fresh = {}
@@ -351,7 +356,7 @@ class AppState(param.Parameterized):
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
             self.param.update(seen=replay, plane=None, source=source, displacement=None)
-            self._look(UNSEEN)
+            self._look(self._unseen)
 
     def follow(self) -> Following | Arriving | None:
         """The computation in progress, from `work`; if it failed, the previous view returns."""
@@ -359,7 +364,7 @@ class AppState(param.Parameterized):
             if self.work.live is not None and not self.work.computation.running:
                 plane = None if self.growing else self.plane
                 self.param.update(seen=self.replay, plane=plane, source=self._source())
-                self._look(UNSEEN)
+                self._look(self._unseen)
             return self.work.follow()
 
     @property

@@ -12,11 +12,23 @@ from ..results.replays import Replay
 from . import known, pulls
 
 View = dict[str, Any]  # parameters stored in links
+Number = Callable[[int], int]
 
 
 def _pair(text: str) -> tuple[int, int]:
     a, b = (int(part) for part in text.split("-"))
     return a, b
+
+
+def _two(text: str) -> tuple[int, int]:
+    a, b = _pair(text)
+    if a == b:
+        raise ValueError("one contact twice")
+    return a, b
+
+
+def _joined(pair: tuple[int, int]) -> str:
+    return "-".join(map(str, pair))
 
 
 def _place(text: str) -> tuple[float, ...]:
@@ -34,77 +46,71 @@ def _flag(text: str) -> bool:
     return {"0": False, "1": True}[text]
 
 
-# Parameters stored in a link if they differ from a new page, and their parsers.
-VIEW: dict[str, Callable[[str], Any]] = {
-    "tab": _tab,
-    "contact": int,
-    "pair": _pair,
-    "paused": _flag,
-    "opened": lambda text: text.split("."),
-    "frame": int,
-    "reference": int,
-    "between": _pair,
-    "zoom": _place,
-    "split": _flag,
-    "beside": float,
-    "pulls": pulls.read,
-    "known": known.read,
-    "colour": str,
-    "thickness": str,
-    "full": float,
-    "stretch": float,
-    "drawn": str,
-    "sort": str,
-    "scale": str,
-    "pushing": str,
-    "axes": str,
-    "dark": _flag,
-}
-SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": pulls.spelled, "known": known.spelled}
-SPELLED["opened"] = ".".join
-SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
-# Parameters that belong to the states on screen, with their values for new states.
-UNSEEN: View = {"contact": None, "pair": None, "frame": 0, "reference": 0, "between": None}
-UNSEEN |= {"pulls": [], "known": []}
-OF_A_REPLAY = tuple(UNSEEN)
+class Stored(NamedTuple):
+    """How links hold a parameter.
 
-Number = Callable[[int], int]
+    Contacts are given by their numbers in the packing and networks by their numbers in the walk,
+    under the parameter's `key`; under its own name, as in older links, they are positions in the
+    arrays of a Replay.
+    """
+
+    read: Callable[[str], Any]
+    spell: Callable[[Any], Any] = lambda value: value
+    key: str = ""  # in links; by default its own name
+    # (value, contact, network) → the value with each contact and each network translated; only of
+    # parameters that belong to the states on screen.
+    numbered: Callable[[Any, Number, Number], Any] | None = None
+
+
+# Parameters stored in a link if they differ from a new page.
+VIEW: dict[str, Stored] = {
+    "tab": Stored(_tab),
+    "contact": Stored(int, key="select", numbered=lambda value, contact, _: contact(value)),
+    "pair": Stored(_two, _joined, "span", lambda pair, contact, _: tuple(map(contact, pair))),
+    "paused": Stored(_flag, int),
+    "opened": Stored(lambda text: text.split("."), ".".join, "open"),
+    "frame": Stored(int, key="network", numbered=lambda value, _, network: network(value)),
+    "reference": Stored(int, key="pinned", numbered=lambda value, _, network: network(value)),
+    "between": Stored(_pair, _joined, "swing", lambda pair, _, network: tuple(map(network, pair))),
+    "zoom": Stored(_place, lambda place: ":".join(f"{value:g}" for value in place)),
+    "split": Stored(_flag, int),
+    "beside": Stored(float),
+    "pulls": Stored(
+        pulls.read, pulls.spelled, "pull",
+        lambda given, contact, _: pulls.renumbered(given, contact),
+    ),
+    "known": Stored(
+        known.read, known.spelled, "hold",
+        lambda given, contact, _: known.renumbered(given, contact),
+    ),
+    "colour": Stored(str),
+    "thickness": Stored(str),
+    "full": Stored(float),
+    "stretch": Stored(float),
+    "drawn": Stored(str),
+    "sort": Stored(str),
+    "scale": Stored(str),
+    "pushing": Stored(str),
+    "axes": Stored(str),
+    "dark": Stored(_flag, int),
+}  # fmt: skip
+OF_A_REPLAY = tuple(name for name, stored in VIEW.items() if stored.numbered)
+
+
+def key(name: str) -> str:
+    """The name of a parameter in links."""
+    return VIEW[name].key or name
+
+
+def _translated(name: str, value: Any, contact: Number, network: Number) -> Any:
+    numbered = VIEW[name].numbered
+    return value if value is None or numbered is None else numbered(value, contact, network)
 
 
 class Numbered(NamedTuple):
     """A value of a link in which contacts and networks are given by number."""
 
     value: Any
-
-
-# Names of parameters in links. Those of UNSEEN give contacts by their numbers in the packing and
-# networks by their numbers in the walk; under the parameters' own names, as in older links, they
-# are positions in the arrays of a Replay.
-KEYS = {
-    "contact": "select",
-    "pair": "span",
-    "pulls": "pull",
-    "known": "hold",
-    "frame": "network",
-    "reference": "pinned",
-    "between": "swing",
-    "opened": "open",
-}
-# (value, contact, network) → the value with each contact and each network translated.
-TRANSLATED: dict[str, Callable[[Any, Number, Number], Any]] = {
-    "contact": lambda value, contact, network: contact(value),
-    "pair": lambda value, contact, network: tuple(map(contact, value)),
-    "pulls": lambda value, contact, network: pulls.renumbered(value, contact),
-    "known": lambda value, contact, network: known.renumbered(value, contact),
-    "frame": lambda value, contact, network: network(value),
-    "reference": lambda value, contact, network: network(value),
-    "between": lambda value, contact, network: tuple(map(network, value)),
-}
-
-
-def key(name: str) -> str:
-    """The name of a parameter in links."""
-    return KEYS.get(name, name)
 
 
 class Numbers(NamedTuple):
@@ -115,27 +121,21 @@ class Numbers(NamedTuple):
 
     def of(self, view: View) -> View:
         """A view with contacts and networks given by number instead of position."""
-        contacts, networks = self
-        return {
-            name: value
-            if value is None or name not in TRANSLATED
-            else TRANSLATED[name](value, lambda c: int(contacts[c]), lambda f: int(networks[f]))
-            for name, value in view.items()
-        }
+        contact, network = (lambda k, of=of: int(of[k]) for of in self)
+        return {name: _translated(name, value, contact, network) for name, value in view.items()}
 
     def positions(self, name: str, value: Any) -> Any:
-        """A parameter's value by positions; KeyError for unknown numbers.
+        """A parameter's value by positions; ValueError for unknown numbers.
 
         A network that was not stored is replaced by the nearest stored one.
         """
-        contacts = {int(number): k for k, number in enumerate(self.contacts)}
 
         def row(number: int) -> int:
             if not 0 <= number <= self.networks[-1]:
-                raise KeyError(number)
+                raise ValueError(number)
             return int(np.argmin(np.abs(self.networks - number)))
 
-        return TRANSLATED[name](value, contacts.__getitem__, row)
+        return _translated(name, value, self.contacts.tolist().index, row)
 
 
 def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
@@ -148,15 +148,7 @@ def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
         view = {name: value for name, value in view.items() if name not in OF_A_REPLAY}
     else:
         view = numbers.of(view)
-    return {key(name): _plain(name, value) for name, value in view.items()}
-
-
-def _plain(name: str, value: Any) -> Any:
-    if name in SPELLED:
-        return SPELLED[name](value)
-    if isinstance(value, tuple):
-        return "-".join(str(part) for part in value)
-    return int(value) if isinstance(value, bool) else value
+    return {key(name): VIEW[name].spell(value) for name, value in view.items()}
 
 
 def read_view(given: Mapping[str, str], parameters: Any) -> View:
@@ -165,10 +157,10 @@ def read_view(given: Mapping[str, str], parameters: Any) -> View:
     Values given by number become Numbered, for `fitting`.
     """
     view: View = {}
-    for name, cast in VIEW.items():
-        numbers = key(name) in given and name in TRANSLATED
+    for name, stored in VIEW.items():
+        numbers = key(name) in given and name in OF_A_REPLAY
         try:
-            value = cast(given[key(name) if key(name) in given else name])
+            value = stored.read(given[key(name) if key(name) in given else name])
             parameters[name]._validate(value)
         except (KeyError, ValueError):
             continue
@@ -180,27 +172,14 @@ def read_view(given: Mapping[str, str], parameters: Any) -> View:
 
 def fitting(view: View, replay: Replay) -> View:
     """The rows and contacts that exist in a Replay, as positions."""
-    numbers, found = Numbers(replay.backbone, replay.number), {}
+    numbers = Numbers(replay.backbone, replay.number)
+    places = [range(len(of)).index for of in numbers]  # ValueError for others
+    found = {}
     for name in OF_A_REPLAY:
-        with suppress(KeyError):
+        with suppress(KeyError, ValueError):
             value = view[name]
             if isinstance(value, Numbered):
-                value = numbers.positions(name, value.value)
-            if _fits(name, value, replay):
-                found[name] = value
+                found[name] = numbers.positions(name, value.value)
+            else:
+                found[name] = _translated(name, value, *places)
     return found
-
-
-def _fits(name: str, value: Any, replay: Replay) -> bool:
-    if value is None:
-        return True
-    frames, contacts = replay.normal.shape
-    size = contacts if name in ("contact", "pair", "pulls", "known") else frames
-    values = value if name in ("between", "pair") else (value,)
-    if name == "pulls":
-        values = list(pulls.contacts(value))
-    if name == "known":
-        values = [one.contact for one in value]
-    if name == "pair" and len(set(values)) < 2:
-        return False
-    return all(0 <= one < size for one in values)

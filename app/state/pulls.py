@@ -327,9 +327,3 @@ def renumbered(pulls: Iterable[Pull], number: Callable[[int], int]) -> list[Pull
         (planes.renumbered(name, number) if isinstance(name, str) else number(name), *at)
         for name, *at in pulls
     ]
-
-
-def contacts(pulls: Iterable[Pull]) -> Iterator[int]:
-    """Positions of the contacts in pulls."""
-    for name, *_ in pulls:
-        yield from (c for c, _ in planes.read(name)) if isinstance(name, str) else (name,)
