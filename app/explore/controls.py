@@ -59,7 +59,9 @@ class Controls:
         self._following = False
         self.scene, self.mu = SceneList(margin=0), FrictionSlider(self._typed, margin=0)
         draw = self.mu.param.update
-        self.work.task(reading).start(lambda job: study_data.hill(), lambda hill: draw(hill=hill))
+        self.work.task(reading).start(
+            lambda job: study_data.against_friction("eta2"), lambda hill: draw(hill=hill)
+        )
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, MOST_SEED)
         self.packed = pmui.TextInput(

@@ -94,7 +94,6 @@ class Library:
         self.catalogue: list[Cell] = []  # as last read
         self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
         self._damaged: set[tuple[Path, str]] = set()  # entries that could not be read
-        self._rows: dict[str, dict[str, Any]] = {}
         self._shown: OrderedDict[str, Shown] = OrderedDict()
         self._kept, self._lock = kept, threading.Lock()
 
@@ -201,14 +200,6 @@ class Library:
         if found is not None:
             return dataset_packing(found)
         raise InputError("the packing of these states is not in any open store")
-
-    def table(self, cells: Sequence[Cell]) -> list[dict[str, Any]]:
-        """One row of measures for each cell, as study.row with the ensemble's μ."""
-        for cell in cells:
-            if cell.name not in self._rows:
-                row = study.row(cell.params, self.dataset(cell), True)
-                self._rows[cell.name] = row | {"mu": cell.mu}
-        return [self._rows[cell.name] for cell in cells]
 
     def exact(self, selection: Selection) -> xr.Dataset | None:
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""

@@ -17,7 +17,7 @@ from granforce import measures
 from granforce.study.keys import Parameters
 from granforce.types import Floats, Integers
 
-from .replays import FRAME_BYTES, Replay, fitting
+from .replays import FRAME_BYTES, Replay, fitting, flat
 from .selection import Selection
 
 Message = dict[str, Any]  # to the player
@@ -199,11 +199,7 @@ def _batch(parts: list[tuple[Any, tuple[float, ...]]]) -> Message:
     """States for the player: flat arrays, one state after the other."""
     forces = np.stack([state for state, _ in parts])
     rows = np.array([numbers for _, numbers in parts], dtype=np.float32).T
-    return {
-        "normal": forces[..., 0].ravel(),
-        "tangential": forces[..., 1].ravel(),
-        **dict(zip(NUMBERS, rows, strict=True)),
-    }
+    return flat(forces) | dict(zip(NUMBERS, rows, strict=True))
 
 
 class Following:

@@ -162,6 +162,14 @@ def _replay(
     )
 
 
+def flat(states: Any) -> dict[str, Any]:
+    """Networks (…, N_c, 2) for scripts: flat arrays, one network after the other."""
+    return {
+        name: states[..., part].astype(np.float32).ravel()
+        for part, name in enumerate(("normal", "tangential"))
+    }
+
+
 def fitting(contacts: int, most_bytes: float) -> int:
     """Number of states of this many contacts that fit in most_bytes, at least two."""
     return max(2, int(most_bytes / (8 * max(1, contacts))))

@@ -2,12 +2,12 @@
 
 import json
 import math
-import statistics
 import threading
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from granforce.measures import statistics
 from granforce.paper import tables
 from granforce.paper.claims.groups import outside
 from granforce.records import InputError
@@ -81,9 +81,6 @@ def in_force_space(part: str) -> list[dict[str, Any]]:
     return [row for row in rows(part) if row["mu"] not in beyond]
 
 
-def hill() -> list[tuple[float, float]]:
-    """Indeterminacy against friction: [(μ, η2)], η2 averaged over the walks at each μ."""
-    by_mu: dict[float, list[float]] = {}
-    for row in rows("walk"):
-        by_mu.setdefault(row["mu"], []).append(row["eta2"])
-    return [(mu, statistics.fmean(found)) for mu, found in sorted(by_mu.items())]
+def against_friction(measure: str) -> list[tuple[float, float]]:
+    """[(μ, value)] of a measure such as η2, averaged over the walks at each μ."""
+    return [(mu, value) for mu, value, _ in statistics.means(rows("walk"), measure)]

@@ -18,7 +18,7 @@ from ..background.jobs import Job
 from ..results.compute import found_or_made
 from ..results.distributions import Row, alike, rows
 from ..results.library import Cell, Library, readable
-from ..results.replays import Replay
+from ..results.replays import Replay, flat
 from .pulls import puller_of
 
 # With fewer contacts the mean is not meaningful.
@@ -36,17 +36,15 @@ class Loads(NamedTuple):
 class Pushed(NamedTuple):
     """The effect of a force pair that pushes the grains of one contact apart. Forces in ⟨f_n⟩."""
 
-    contact: int  # position in the backbone
     limit: float  # limit load
     low: float  # F_crit: largest load at rest
     high: float  # least load that did not end at rest
     opened: int  # contacts that the first motion opens,
     slid: int  # contacts that slide
     kept: int  # contacts that stick
-    breach: float  # violation of Coulomb's law by the motion
-    loads: Floats  # (k,) from 0 to `low`
-    states: Floats  # (k, N_c, 2) networks under them, nearest to the original
-    residual: Floats  # (k,) residuals of these
+    path: dict[
+        str, Any
+    ]  # networks under loads from 0 to `low`, nearest to the original, for scripts
     displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
     distance: Floats  # (k,) of the backbone's grains from the contact, length
     size: Floats  # (k,) |u| of those grains
@@ -54,10 +52,7 @@ class Pushed(NamedTuple):
     profile: Floats  # (shells,) mean |u|
     exponent: float  # α of |u| ~ r^−α for this contact alone
     fit: tuple[float, ...]  # smallest and largest r of its fit, length
-    spread: tuple[
-        float, float
-    ]  # smallest and largest α of other ranges of r; NaN where no fit is possible
-    seconds: float
+    spread: tuple[float, float]  # α of other ranges of r; NaN where no fit is possible
 
 
 def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
@@ -92,12 +87,18 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
         job.begin("networks under smaller loads")
         under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)
         packing = library.packing(cell.selection.packing)
-        return _pushed(found, packing, contact, under)
+        return _pushed(found, packing, under)
 
     return work
 
 
-def _pushed(found: xr.Dataset, packing: Packing, contact: int, under: Any) -> Pushed:
+def path(under: Any, scale: float) -> dict[str, Any]:
+    """Networks under growing loads for a script: flat arrays, forces in ⟨f_n⟩."""
+    networks = flat(under.states / scale)
+    return {"values": under.loads / scale, **networks, "residual": under.residual}
+
+
+def _pushed(found: xr.Dataset, packing: Packing, under: Any) -> Pushed:
     scale = found["force_scale"].item()
 
     def force(name: str) -> float:
@@ -109,17 +110,13 @@ def _pushed(found: xr.Dataset, packing: Packing, contact: int, under: Any) -> Pu
     u = found["displacement"].values[0]
     distance, size = moved_grains(packing, found)
     return Pushed(
-        contact=contact,
         limit=force("limit_load"),
         low=force("critical_low"),
         high=force("critical_high"),
         opened=count("opened"),
         slid=count("slid"),
         kept=count("kept"),
-        breach=float(found["motion_breach"].values[0]),
-        loads=under.loads / scale,
-        states=under.states / scale,
-        residual=under.residual,
+        path=path(under, scale),
         displacement=np.nan_to_num(u),
         distance=distance,
         size=size,
@@ -128,7 +125,6 @@ def _pushed(found: xr.Dataset, packing: Packing, contact: int, under: Any) -> Pu
         exponent=found["decay_exponent"].item(),
         fit=tuple(json.loads(found.attrs["fit_range"])),
         spread=_range(found["fit_exponent"].values),
-        seconds=found["contact_seconds"].values[0].item(),
     )
 
 

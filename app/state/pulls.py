@@ -20,7 +20,7 @@ from granforce.types import Floats
 from ..background.jobs import Job, reading
 from ..results import planes
 from ..results.library import Cell, Library
-from ..results.replays import Replay
+from ..results.replays import Replay, flat
 from . import known
 
 Pull = tuple[Any, ...]  # see above
@@ -191,7 +191,8 @@ class Hand(param.Parameterized):
 
     def _show(self, made: list[tuple[Pull, Held]]) -> None:
         pull, held = made[-1]
-        self.tell({"held": _spelled(held) | {"pull": list(pull)}})
+        network = flat(held.forces) | {"residual": held.residual}
+        self.tell({"held": network | {"pull": list(pull)}})
 
     def _failed(self, event: Any) -> None:
         if event.new:
@@ -257,15 +258,7 @@ def _to_pull(
         yield {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
         return
     for rail in puller.rails(int(replay.backbone[grabbed]), last.forces * scale):
-        yield {"rail": {"contact": grabbed} | _rail(rail, scale)}
-
-
-def _spelled(held: Held) -> Message:
-    return {
-        "normal": held.forces[:, 0].astype(np.float32),
-        "tangential": held.forces[:, 1].astype(np.float32),
-        "residual": held.residual,
-    }
+        yield {"rail": {"contact": grabbed} | rail_of(rail, scale)}
 
 
 def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
@@ -274,21 +267,19 @@ def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
     return {
         "x": points[:, 0].copy(),
         "y": points[:, 1].copy(),
-        "normal": (fan.states[..., 0] / scale).astype(np.float32).ravel(),
-        "tangential": (fan.states[..., 1] / scale).astype(np.float32).ravel(),
+        **flat(fan.states / scale),
         "residual": fan.residual.astype(np.float64),
     }
 
 
-def _rail(rail: Any, scale: float) -> Message:
-    """A Rail for the player: flat arrays, forces in ⟨f_n⟩."""
+def rail_of(rail: Any, scale: float) -> Message:
+    """A Rail for a script: flat arrays, forces in ⟨f_n⟩."""
     return {
         "lower": rail.low / scale,
         "upper": rail.high / scale,
         "whole": rail.whole,
         "values": (rail.values / scale).astype(np.float64),
-        "normal": (rail.states[..., 0] / scale).astype(np.float32).ravel(),
-        "tangential": (rail.states[..., 1] / scale).astype(np.float32).ravel(),
+        **flat(rail.states / scale),
         "residual": rail.residual.astype(np.float64),
         "opened": rail.opened.astype(np.uint8).ravel(),
         "sliding": rail.sliding.astype(np.uint8).ravel(),

@@ -14,6 +14,8 @@ from granforce.study.pulls import Puller
 from ...packing.player import frames
 from ...results import study_data
 from ...results.library import Cell, Library, Shown, best_cell
+from ...state.perturbations import path
+from ...state.pulls import rail_of
 from . import small_scenes
 
 MU = 0.1  # of the packing that is pulled and pushed
@@ -96,12 +98,7 @@ class Packings:
         contact, scale = self._grabbed(MU), replay.force_scale
         state = np.stack([replay.normal[0], replay.tangential[0]], axis=1).astype(np.float64)
         rail = self._puller().rail(int(replay.backbone[contact]), state * scale)
-        return {
-            "values": rail.values / scale,
-            **_networks(rail.states / scale, rail.residual),
-            "opened": rail.opened.astype(np.uint8).ravel(),
-            "sliding": rail.sliding.astype(np.uint8).ravel(),
-        }
+        return rail_of(rail, scale)
 
     def _push(self) -> dict[str, Any]:
         """Networks under a push on the most resistant contact near the centre, and the motion."""
@@ -115,8 +112,7 @@ class Packings:
         under = self._puller().loaded(int(replay.backbone[contacts[row]]), low)
         return {
             "contact": int(contacts[row]),
-            "values": under.loads / scale,
-            **_networks(under.states / scale, under.residual),
+            **path(under, scale),
             "limit": float(found["limit_load"].values[row] / scale),
             "opened": int(found["opened"].values[row]),
             "slid": int(found["slid"].values[row]),
@@ -137,10 +133,7 @@ class Packings:
 
 def curve() -> dict[str, Any]:
     """Variation of forces against friction, in the finished study: means over its packings."""
-    by_mu: dict[float, list[float]] = {}
-    for row in study_data.rows("walk"):
-        by_mu.setdefault(row["mu"], []).append(row["eta1"])
-    points = sorted((mu, float(np.mean(found))) for mu, found in by_mu.items() if mu > 0)
+    points = [(mu, spread) for mu, spread in study_data.against_friction("eta1") if mu > 0]
     return {"mu": [mu for mu, _ in points], "spread": [value for _, value in points]}
 
 
@@ -158,12 +151,3 @@ def _away(replay: Any) -> Any:
     nearest = np.full(len(replay.backbone), np.inf)
     np.minimum.at(nearest, links.contact, away / (right - left))
     return nearest
-
-
-def _networks(states: Any, residual: Any) -> dict[str, Any]:
-    """Networks (k, N_c, 2) for scripts: flat, one after the other."""
-    return {
-        "normal": states[..., 0].astype(np.float32).ravel(),
-        "tangential": states[..., 1].astype(np.float32).ravel(),
-        "residual": residual.astype(np.float64),
-    }

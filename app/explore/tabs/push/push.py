@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.plotting import figure as Figure
@@ -100,7 +99,7 @@ class View(TabView):
             return
         self.load.param.update(
             contact=self.contact,
-            path={} if self.pushed is None else path(self.pushed[0]),
+            path={} if self.pushed is None else self.pushed[0].path,
             most=float(f"{SCALE * replay.normal[0].max(initial=0.5):.2g}"),
         )
         if fixed:
@@ -200,16 +199,6 @@ class View(TabView):
     def _show_store(self, found: Shown) -> None:
         if self.what.value == "store":
             self._show(found)
-
-
-def path(pushed: Pushed) -> dict[str, Any]:
-    """Networks under growing loads for the slider: flat arrays, forces in ⟨f_n⟩."""
-    return {
-        "values": pushed.loads,
-        "normal": pushed.states[..., 0].astype(np.float32).ravel(),
-        "tangential": pushed.states[..., 1].astype(np.float32).ravel(),
-        "residual": pushed.residual,
-    }
 
 
 def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job], Shown]:
