@@ -213,12 +213,6 @@ def test_frames_beyond_the_budget_are_left_out_and_counted(library):
     np.testing.assert_array_equal(whole.normal[among], short.normal)
 
 
-def test_table_has_a_row_for_each_mu(state):
-    rows = state.library.table(state.cells())
-    assert [row["mu"] for row in rows] == [0, 0.1, 1]
-    assert rows[1]["eta1"] > rows[0]["eta1"]
-
-
 def test_the_last_cells_are_kept_in_memory_and_no_more(shipped, tmp_path):
     library = Library(shipped, tmp_path / "cache.zarr", kept=2)
     cells = library.cells()

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from bokeh.models import ColumnDataSource, FixedTicker, GlyphRenderer
+from bokeh.plotting import figure as Figure
 
 from granforce.types import Floats
 
@@ -59,15 +60,9 @@ class AgainstFriction:
         self.points.append(rings)
         if not len(x):
             return
-        fig.line(x, y, color=colour, line_width=1.6, line_dash=line.dash, legend_label=line.label)
-        fig.segment(x, y - error, x, y + error, color=colour, line_width=1.4)
-        source = ColumnDataSource({"x": x, "y": y, "error": error})
-        dots = fig.scatter(
-            "x", "y", source=source, color=colour, size=6, marker=marker, legend_label=line.label
-        )
-        values = line.label, "@y{0.0000} ± @error{0.0000}"
-        fig.add_tools(hover([dots], ("μ", "@x{0.[00000]}"), values))
-        self.points.append(dots)
+        columns = {"x": x, "y": y, "error": error}
+        rows = ("μ", "@x{0.[00000]}")
+        self.points.append(draw_means(fig, line.label, columns, k, rows, line_dash=line.dash))
 
     def mark(self, own: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
         """Open symbols at `own` points, of each line, and rings at `here`, (μ, value)."""
@@ -80,6 +75,23 @@ class AgainstFriction:
     def choosable(self, choose: Callable[[float], object]) -> None:
         """choose(μ): called when a point is clicked."""
         on_tap(self.figure, lambda row, data: choose(float(data["x"][row])), *self.points)
+
+
+def draw_means(
+    fig: Figure, label: str, columns: dict[str, Any], k: int, *rows: tuple[str, str], **options: Any
+) -> GlyphRenderer:
+    """Points with error bars, joined by a line, in the look of line k; returns the points.
+
+    columns: x, y, error and what the rows of the hint name; options: of the line.
+    """
+    x, y, error = columns["x"], columns["y"], columns["error"]
+    look = {"color": COLOURS[k], "legend_label": label}
+    fig.line(x, y, line_width=1.6, **look, **options)
+    fig.segment(x, y - error, x, y + error, color=COLOURS[k], line_width=1.4)
+    source = ColumnDataSource(columns)
+    dots = fig.scatter("x", "y", source=source, size=6, marker=MARKERS[k % len(MARKERS)], **look)
+    fig.add_tools(hover([dots], *rows, (label, "@y{0.0000} ± @error{0.0000}")))
+    return dots
 
 
 def shown(points: Points) -> Floats:

@@ -13,9 +13,9 @@ from ....results.distributions import Row
 from ....widgets.hints import term
 from ....widgets.label_places import labels
 from ....widgets.parts import figure
-from ....widgets.plot_style import hover, legend_above
+from ....widgets.plot_style import legend_above
 from ...result_values import with_error
-from ..friction.against_friction import COLOURS, MARKERS
+from ..friction.against_friction import COLOURS, MARKERS, draw_means
 
 ACROSS = "how undetermined the forces are, η₂"
 LINES = {"critical_force": "critical force", "limit_load": "limit load"}
@@ -70,13 +70,8 @@ def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
             continue
         mu = [m for m, _, _ in across]
         x, (y, error) = np.array([eta for _, eta, _ in across]), np.array(up).T[1:]
-        look = {"color": COLOURS[k], "legend_label": label}
-        fig.line(x, y, line_width=1.6, **look)
-        fig.segment(x, y - error, x, y + error, color=COLOURS[k], line_width=1.4)
-        source = ColumnDataSource({"x": x, "y": y, "mu": mu, "error": error})
-        dots = fig.scatter("x", "y", source=source, size=6, marker=MARKERS[k], **look)
-        value = label, "@y{0.0000} ± @error{0.0000}"
-        fig.add_tools(hover([dots], ("at μ", "@mu{0.[00000]}"), ("η₂", "@x{0.0000}"), value))
+        columns = {"x": x, "y": y, "mu": mu, "error": error}
+        draw_means(fig, label, columns, k, ("at μ", "@mu{0.[00000]}"), ("η₂", "@x{0.0000}"))
         drawn.append((mu, np.column_stack([x, y, error])))
     if not drawn:
         return
