@@ -1,9 +1,19 @@
 // The clipboard, which browsers offer only to pages of this machine and of https.
 
-import { made } from "./dom.js"
+import { button, made } from "./dom.js"
 
-/** Copy a text. */
-export async function copy(text) {
+const COPIED_MS = 1500 // for which a copy is confirmed
+
+/** A button that copies text() and confirms it briefly. */
+export function copyButton(label, text, look) {
+  return button(label, async (it) => {
+    await copy(text())
+    it.textContent = "Copied ✓"
+    setTimeout(() => { it.textContent = label }, COPIED_MS)
+  }, look)
+}
+
+async function copy(text) {
   if (navigator.clipboard) return navigator.clipboard.writeText(text)
   const area = made("textarea", { value: text })
   document.body.append(area)

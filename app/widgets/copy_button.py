@@ -1,4 +1,4 @@
-"""A button that copies a text, or the address of the page."""
+"""A button that copies a text."""
 
 import param
 
@@ -6,7 +6,7 @@ from ..browser.bundle import Scripted
 
 
 class CopyButton(Scripted):
-    """Copies `text`, or the page's address if it is empty, and confirms it briefly.
+    """Copies `text` and confirms it briefly.
 
     Not Panel's Button with js_on_click, which blocks the page's thread for 13 ms; this takes 5 ms.
     """

@@ -1,10 +1,9 @@
 // The header of every page: links to both entry pages, and tools that need no server.
 
 import { button, made } from "../browser/dom.js"
-import { copy } from "../browser/clipboard.js"
+import { copyButton } from "../browser/clipboard.js"
 
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
-const COPIED_MS = 1500
 const DOORS = [["explore", "Explore", ""], ["learn", "Learn", "learn"]]
 
 export function render({ model }) {
@@ -27,11 +26,7 @@ export function render({ model }) {
     theme.ariaLabel = theme.title = model.dark ? "Light theme" : "Dark theme"
   }
 
-  const link = button("Copy link", async () => {
-    await copy(window.location.href)
-    link.textContent = "Copied ✓"
-    setTimeout(() => { link.textContent = "Copy link" }, COPIED_MS)
-  })
+  const link = copyButton("Copy link", () => window.location.href)
   const theme = button("", () => { model.dark = !model.dark }, { innerHTML: HALF })
   const help = helpOf(model, root)
   const asked = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })

@@ -110,12 +110,9 @@ export function render({ model, view }) {
     if (!on) return
     if (root.open) { on.listeners.add(soon); fill() } else { on.listeners.delete(soon); if (on.look) dim(null, 0) }
   })
-  const ground = () => { root.style.setProperty("--ground", model.dark ? "#121212" : "#ffffff") }
-  model.on("dark", ground)
   const open = () => { root.open = model.open }
   model.on("open", open)
   open()
-  ground()
   model.on("remove", () => player()?.listeners.delete(soon))
   heads()
   return root

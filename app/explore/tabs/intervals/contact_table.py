@@ -9,10 +9,8 @@ from ....state.view_settings import Looks
 class Contacts(Scripted):
     """Number, disks, forces and bounds of each contact; can be sorted, searched and filtered."""
 
-    dark = param.Boolean()
     open = param.Boolean()
 
     def __init__(self, looks: Looks) -> None:
-        super().__init__(sizing_mode="stretch_width", dark=looks.dark)
-        looks.param.watch(lambda event: self.param.update(dark=event.new), "dark")
+        super().__init__(sizing_mode="stretch_width")
         looks.keep_open(self, "table")
