@@ -23,7 +23,6 @@ from .page_address import Address
 from .results_line import Results
 from .status_line import StatusLine
 from .tabs.tabs import Tabs, pale_when_old
-from .volume import Volume
 
 WAITING_MS = 250  # interval of sending messages that Panel holds back
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
@@ -146,7 +145,7 @@ class _Around:
         player.hears["tab"] = tabs.choose
         pale_when_old([*tabs.pages.items(), ("results", self.results), ("plane", self.space)])
         self.panels[:] = [tabs.tabs]
-        self.results[:] = [Results(state, Volume(state), **WIDE)]
+        self.results[:] = [Results(state, **WIDE)]
         tabs.reserve(self.space)
         state.looks.param.watch(lambda event: state.work.piecewise(tabs.beside(self.space)), "wide")
         yield

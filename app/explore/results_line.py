@@ -4,43 +4,67 @@ from collections.abc import Iterable
 from typing import Any
 
 import param
+import xarray as xr
 
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
+from ..results import compute
+from ..results.library import Cell
 from ..results.progress_feed import Summary
 from ..state.app_state import AppState
 from ..widgets.hints import term
 from . import result_values
 from .result_values import Quantity
-from .volume import Volume
 
 MEASURE = '<button type="button" class="soft">measure</button>'
 UNIT = {"extent": " ⟨fₙ⟩"}
 
 
 class Results(Scripted):
-    """Numbers with symbol and name, seen and exact; see results_line.js."""
+    """Numbers with symbol and name, seen and exact; see results_line.js.
+
+    The volume of S is looked up in the stores, and computed on request.
+    """
 
     html = param.String()
 
-    def __init__(self, state: AppState, volume: Volume, **params: Any) -> None:
+    def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
-        self._state, self._volume = state, volume
-        state.param.watch(self._tell, ["replay", "exact"])
+        self._state, self._work = state, state.work
+        self._volume: xr.Dataset | None = None
+        state.param.watch(self._look, "replay")
+        state.param.watch(self._tell, "exact")
         state.knowledge.param.watch(self._tell, "narrowed")
-        volume.param.watch(self._tell, ["found", "offered"])
+        self._work.measuring.param.watch(self._tell, "running")
+        self._look()
+
+    def _look(self, *events: Any) -> None:
+        """Look up the volume of the packing on screen."""
+        state, self._volume = self._state, None
+        self._work.measuring.cancel()
         self._tell()
+        if state.replay is not None and state.cell is not None:
+            self._work.looking.start(compute.known_volume(state.library, state.cell), self._take)
+
+    def _take(self, found: tuple[Cell, xr.Dataset | None]) -> None:
+        if found[0] == self._state.cell:
+            self._volume = found[1]
+            self._tell()
 
     def _tell(self, *events: Any) -> None:
-        if self._state.replay is not None:
-            self.html = tables(self._state, self._volume)
+        replay = self._state.replay
+        if replay is not None:
+            free = replay.summary["dimension"] > 0 and not self._work.measuring.running
+            self.html = tables(self._state, self._volume, free)
 
     def _heard(self, message: Message) -> None:
-        self._volume.measure()
+        if self._state.cell is not None:
+            work = compute.volume(self._state.library, self._state.cell)
+            self._work.measuring.start(work, self._take)
 
 
-def tables(state: AppState, volume: Volume) -> str:
-    """All numbers as HTML, and a note on omitted work."""
+def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
+    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume."""
     known = " under what is held" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
@@ -50,8 +74,8 @@ def tables(state: AppState, volume: Volume) -> str:
     rows = [[seen, *_values(measures, "seen")]]
     if any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
-    packing = result_values.packing(state, volume.found)
-    values = [one.exact or (MEASURE if volume.offered else "–") for one in packing]
+    packing = result_values.packing(state, volume)
+    values = [one.exact or (MEASURE if offered else "–") for one in packing]
     doubt = (
         f'<p class="flag" role="note">⚠ {sampling.doubt}</p>' if sampling and sampling.doubt else ""
     )

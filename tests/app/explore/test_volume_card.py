@@ -4,19 +4,13 @@ import pytest
 from visitor import wait_for
 
 from app.explore.results_line import Results
-from app.explore.volume import Volume
 
 
 @pytest.fixture
-def volume(state):
-    made = Volume(state)
+def results(state):
+    made = Results(state)
     wait_for(state)
     return made
-
-
-@pytest.fixture
-def results(state, volume):
-    return Results(state, volume)
 
 
 def test_the_volume_is_measured_once_and_found_again(state, results):
@@ -25,7 +19,7 @@ def test_the_volume_is_measured_once_and_found_again(state, results):
     assert state.work.measuring.running and "measure</button>" not in results.html
     wait_for(state)
     assert "measure</button>" not in results.html and " ± " in results.html
-    again = Results(state, Volume(state))
+    again = Results(state)
     wait_for(state)
     assert again.html == results.html
 
