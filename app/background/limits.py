@@ -4,7 +4,7 @@ import math
 import os
 from typing import Any, NamedTuple
 
-from granforce.records import InputError
+from granforce.records import InputError, brief
 
 LIMITS_VARIABLE = "GRANFORCE_LIMITS"
 
@@ -89,19 +89,13 @@ def _check_radii(text: Any) -> None:
     ):
         raise InputError(
             "radii must be named as uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION, the "
-            f"largest at most {SIZE_RATIO} times the smallest, got {short(text)}"
+            f"largest at most {SIZE_RATIO} times the smallest, got {brief(text)}"
         )
 
 
 def _plain(number: float) -> str:
     """A number as people write it: 1e+09, not 1000000000.0."""
-    return f"{number:g}" if isinstance(number, float) else short(number)
-
-
-def short(value: Any) -> str:
-    """A value in few characters."""
-    text = repr(value)
-    return text if len(text) <= 30 else f"{text[:12]}… ({len(text)} characters)"
+    return f"{number:g}" if isinstance(number, float) else brief(number)
 
 
 def read_limits(text: str | None = None) -> Limits:
@@ -121,7 +115,7 @@ def read_limits(text: str | None = None) -> Limits:
         if name not in Limits._fields or not 1 <= int(digits) <= most:
             names = ", ".join(Limits._fields)
             raise InputError(
-                f"{LIMITS_VARIABLE}: {short(part)} is none of {names} = a whole number from 1 to "
+                f"{LIMITS_VARIABLE}: {brief(part)} is none of {names} = a whole number from 1 to "
                 f"{most}"
             )
         given[name] = int(value)

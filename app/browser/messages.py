@@ -79,7 +79,6 @@ TO_BROWSER = {
         {"name": str, "mime": str, "content": object},  # a file
         {"name": str, "caption": dict},  # a picture or movie made by the browser
         {"name": str, "caption": dict, "width": int},  # with the plots, in mm
-        {"rest": True},  # no file follows
     ),
     "Lesson": (
         {"what": str, "name": str, "given": dict},  # the requested data

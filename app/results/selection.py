@@ -10,10 +10,11 @@ from urllib.parse import parse_qsl, urlencode
 from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, choice, friction
+from granforce.records import brief as shortened
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 
-from ..background.limits import Limits, short
+from ..background.limits import Limits
 
 # Names on screen of kinds.RELAXATIONS; the first is the default of a new walk.
 SOLVERS = {
@@ -259,7 +260,7 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
     try:
         for name, count in Counter(name for name, _ in pairs).items():
             if count > 1:
-                raise InputError(f"it contains {short(name)} {count} times")
+                raise InputError(f"it contains {shortened(name)} {count} times")
         if given.get("scene") in BLOCKS:
             given.setdefault("mu", str(BLOCKS[given["scene"]].mu))
         return (_read_selection(given) if "mu" in given else None), given
@@ -307,9 +308,9 @@ def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
     """The whole number of a name, which is taken out; InputError if it is no such number."""
     text = given.pop(name, str(usual))
     if not text.lstrip("+-").isdecimal():
-        raise InputError(f"{name} must be a whole number, got {short(text)}")
+        raise InputError(f"{name} must be a whole number, got {shortened(text)}")
     if len(text) > MOST_DIGITS:
-        raise InputError(f"{name} must be a number of few digits, got {short(text)}")
+        raise InputError(f"{name} must be a number of few digits, got {shortened(text)}")
     return int(text)
 
 
@@ -318,6 +319,6 @@ def _number(given: dict[str, str], name: str) -> float:
     try:
         return float(given[name])
     except ValueError:
-        raise InputError(f"{name} must be a number, got {short(given[name])}") from None
+        raise InputError(f"{name} must be a number, got {shortened(given[name])}") from None
     finally:
         del given[name]

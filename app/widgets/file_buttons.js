@@ -19,19 +19,12 @@ export function render({ model, view }) {
   const deep = (given) => (given instanceof Map || given?.constructor === Object
     ? Object.fromEntries(Object.entries(plain(given)).map(([name, part]) => [name, deep(part)])) : given)
 
-  function offered(key, words) {
-    const act = (it) => { it.classList.add("busy"); ask(model, view, { key }) }
-    const it = button(words, act, { className: "soft" })
-    it.dataset.key = key
-    return it
-  }
-
   function offer() {
     root.replaceChildren()
     for (const [heading, files] of Object.entries(plain(model.files))) {
       const group = document.createElement("section")
       if (heading) group.append(made("h4", { textContent: heading }))
-      for (const [key, words] of Object.entries(plain(files))) group.append(offered(key, words))
+      for (const [key, words] of Object.entries(plain(files))) group.append(button(words, () => ask(model, view, { key }), { className: `soft ${key}` }))
       root.append(group)
     }
   }
@@ -59,7 +52,7 @@ export function render({ model, view }) {
     it.show(0, false)
     it.play(true)
     recorder.start(250)
-    const begun = performance.now(), words = button?.textContent
+    const begun = performance.now(), words = button.textContent
     let over // time at which the last network was shown
     const frame = (now) => {
       context.fillStyle = caption.background
@@ -70,7 +63,7 @@ export function render({ model, view }) {
       context.font = "15px Helvetica, Arial, sans-serif"
       context.textAlign = "right"
       context.fillText(it.replay.title, WHERE[0], SIDE + WHERE[1])
-      if (button) button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
+      button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
       const swung = it.replay.swinging && it.playback.turns > 1
       if (!it.playing || swung) over ??= now
       if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
@@ -84,7 +77,7 @@ export function render({ model, view }) {
     scene.size = 0
     scene.resize()
     it.show(position)
-    if (button) button.textContent = words
+    button.textContent = words
     return timed(new Blob(pieces, { type: "video/webm" }), took)
   }
 
@@ -105,18 +98,14 @@ export function render({ model, view }) {
 
   async function take(message) {
     if (!root.isConnected) return // from an earlier rendering
-    const file = plain(message)
-    if (file.rest) return rest()
-    const caption = file.caption && deep(file.caption)
-    const button = root.querySelector(".busy")
+    const file = plain(message), caption = file.caption && deep(file.caption)
+    if (file.width) return together(file, caption)
     let blob
-    if (file.width) return await together(file, caption)
     if (!caption) blob = new Blob([file.content], { type: file.mime })
-    else if (file.name.endsWith(".webm")) blob = await recorded(caption, button)
+    else if (file.name.endsWith(".webm")) blob = await recorded(caption, root.querySelector(".webm"))
     else blob = drawn(caption)
     if (caption && file.name.endsWith(".png")) blob = await rendered(blob)
     save(blob, file.name)
-    rest()
   }
 
   /** Packing and plots as one figure, to save or print. */
@@ -125,11 +114,6 @@ export function render({ model, view }) {
     const figure = composed(packing, plots, width, caption.background)
     if (name.endsWith(".pdf")) printFigure(figure, width)
     else save(new Blob([figure.text], { type: "image/svg+xml" }), name)
-    rest()
-  }
-
-  function rest() {
-    for (const button of root.querySelectorAll(".busy")) button.classList.remove("busy")
   }
 
   model.on("files", offer)

@@ -36,10 +36,6 @@ class Handover(Scripted):
         """
         self.tell({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
-    def rest(self) -> None:
-        """Cancel the request: no file follows."""
-        self.tell({"rest": True})
-
     def _heard(self, message: Message) -> None:
         key = message["key"]
         if any(key in group for group in self.files.values()):

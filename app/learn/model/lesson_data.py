@@ -12,6 +12,7 @@ from granforce.study.cells import entries
 from granforce.study.pulls import Puller
 
 from ...packing.player import frames
+from ...packing.view import exact_intervals
 from ...results import study_data
 from ...results.library import Cell, Library, Shown, best_cell
 from ...state.perturbations import path
@@ -66,12 +67,11 @@ class Packings:
         replay, exact = self.shown(mu).replay, self.shown(mu).exact
         if exact is None:
             raise InputError("this chapter needs exact intervals that the store does not have")
-        low, high = _bounds(exact)
-        summary = replay.summary
+        bounds, summary = exact_intervals(exact, replay), replay.summary
         return {
             **frames(replay),
-            "least": low.astype(np.float32),
-            "largest": high.astype(np.float32),
+            "least": bounds["low"],
+            "largest": bounds["high"],
             "typical": replay.typical,
             "grabbed": self._grabbed(mu),
             "spread": summary["eta1"],
@@ -81,12 +81,10 @@ class Packings:
 
     def _grabbed(self, mu: float) -> int:
         """The contact to pull: of the strong ones near the centre, the least determined one."""
-        shown = self.shown(mu)
-        replay = shown.replay
-        assert shown.exact is not None  # checked by `packing`
-        low, high = _bounds(shown.exact)
+        replay = self.shown(mu).replay
+        bounds = exact_intervals(self.shown(mu).exact, replay)
         fits = (_away(replay) < NEAR) & (replay.normal[0] > STRONG)
-        return int(np.argmax(np.where(fits, high - low, -1.0)))
+        return int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
 
     def _puller(self) -> Puller:
         cell = self.cells[MU]
@@ -135,11 +133,6 @@ def curve() -> dict[str, Any]:
     """Variation of forces against friction, in the finished study: means over its packings."""
     points = [(mu, spread) for mu, spread in study_data.against_friction("eta1") if mu > 0]
     return {"mu": [mu for mu, _ in points], "spread": [value for _, value in points]}
-
-
-def _bounds(exact: xr.Dataset) -> tuple[Any, Any]:
-    scale = exact["force_scale"].item()
-    return exact["low"].values[:, 0] / scale, exact["high"].values[:, 0] / scale
 
 
 def _away(replay: Any) -> Any:

@@ -150,7 +150,6 @@ class View:
         self.details = note()
         for task in (self.task, self.making):
             task.param.watch(self._follow, "message")
-        self.making.param.watch(self._rest, "running")
 
     def panel(self) -> pn.Column:
         """Buttons with explanations."""
@@ -167,18 +166,12 @@ class View:
         self.details.object = ""
         if state.replay is None:
             self.details.object = "Nothing is on screen yet."
-            self.buttons.rest()
         elif kind.make is None:
             name = f"{stem(state.cell.selection)}.{key}"
             self.buttons.hand_over_picture(name, caption(state))
         else:
             task = self.making if kind.long else self.task
             task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)
-
-    def _rest(self, event: Any) -> None:
-        """After a failure or cancellation no file follows: reset the button."""
-        if not event.new:
-            self.buttons.rest()
 
     def _follow(self, event: Any) -> None:
         if event.new:

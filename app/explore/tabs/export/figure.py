@@ -25,10 +25,9 @@ def panel(state: AppState) -> Any:
         state.work.message = line
 
     def make(kind: str) -> None:
-        if state.replay is None:
-            return buttons.rest()
-        name = f"{stem(state.cell.selection)}_figure.{kind}"
-        buttons.hand_over_picture(name, caption(state), width.value)
+        if state.replay is not None:
+            name = f"{stem(state.cell.selection)}_figure.{kind}"
+            buttons.hand_over_picture(name, caption(state), width.value)
 
     buttons = Handover(make, files=FILES, margin=(4, 10, -8, 10))
     width = NumberField(

@@ -147,7 +147,7 @@ def _mark(fig: Figure, frame: Frame) -> None:
 
 
 def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
-    """Scales of force and length below the grains, which zoom with the picture."""
+    """The scale of force below the grains, which zooms with the picture."""
     r = frame.r[:, None]
     (left, bottom), (right, _) = (frame.x - r).min(axis=0), (frame.x + r).max(axis=0)
     across = right - left
@@ -163,14 +163,5 @@ def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
     fig.text(at + 0.1 * across, np.full(3, y), labels, **words)
     y -= STRIP * across
     fig.text([left], [y], [f"⟨fₙ⟩ = {unit:.3g} (unit of the file)"], **words)
-    length, y = _round_length(0.25 * across), y - STRIP * across
-    fig.segment([left], [y], [left + length], [y], color=QUIET, line_width=3, name="length_scale")
-    fig.text([left + length + 0.015 * across], [y], [f"{length:g} (unit of the file)"], **words)
     for one in fig.renderers[before:]:
         one.tags = [SCALE]
-
-
-def _round_length(most: float) -> float:
-    """The largest of 1, 2, 5, 10, 20, … (or their tenths, …) up to this."""
-    power = 10.0 ** np.floor(np.log10(most))
-    return float(max(k * power for k in (1, 2, 5) if k * power <= most))

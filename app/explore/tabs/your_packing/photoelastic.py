@@ -10,8 +10,6 @@ import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure as Figure
 
-from granforce.records import InputError
-
 from ....background.jobs import Task
 from ....browser.panel_patches import together
 from ....results import photoelastic_frames
@@ -137,10 +135,7 @@ class Frames:
 
     def _hand_over(self, key: str) -> None:
         name = f"frame{self.frame.report['frame']}.csv"
-        try:
-            self.save.hand_over(File(name, "text/csv", photoelastic_frames.table(self.frame)))
-        except InputError:
-            self.save.rest()
+        self.save.hand_over(File(name, "text/csv", photoelastic_frames.table(self.frame)))
 
 
 OPENED = """
