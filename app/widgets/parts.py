@@ -49,7 +49,6 @@ class TabView:
 
     name: str
     update: Callable[[], None]
-    details: pn.pane.HTML  # the place of notes
 
     def __init__(
         self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
@@ -75,11 +74,6 @@ class TabView:
         """Update, now or when next seen."""
         self._stale = True
         self.catch_up()
-
-    def failed(self, event: Any) -> None:
-        """Show the error of a task whose message is watched."""
-        if event.new:
-            self.details.object = event.new
 
     def _changed(self, *events: Any) -> None:
         self._stale |= any(event.name not in ("tab", "wide") for event in events)

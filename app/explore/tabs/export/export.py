@@ -142,40 +142,28 @@ class View:
 
     def __init__(self, state: AppState) -> None:
         self.state = state
-        self.task, self.making = (
-            state.work.task(reading, reported=False),
-            state.work.task(reported=False),
-        )
+        self.task, self.making = state.work.task(reading), state.work.task()
         self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
-        self.details = note()
-        for task in (self.task, self.making):
-            task.param.watch(self._follow, "message")
 
     def panel(self) -> pn.Column:
         """Buttons with explanations."""
         return pn.Column(
             self.buttons,
             Progress(self.making, self.task),
-            self.details,
             note(HELP),
             sizing_mode="stretch_width",
         )
 
     def _asked(self, key: str) -> None:
         state, kind = self.state, KINDS[key]
-        self.details.object = ""
         if state.replay is None:
-            self.details.object = "Nothing is on screen yet."
+            state.work.message = "Nothing is on screen yet."
         elif kind.make is None:
             name = f"{stem(state.cell.selection)}.{key}"
             self.buttons.hand_over_picture(name, caption(state))
         else:
             task = self.making if kind.long else self.task
             task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)
-
-    def _follow(self, event: Any) -> None:
-        if event.new:
-            self.details.object = event.new
 
 
 def all_states(library: Library, cell: Cell, job: Job) -> xr.Dataset:

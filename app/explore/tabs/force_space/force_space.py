@@ -38,14 +38,9 @@ class View(TabView):
         aspect = WIDE_ASPECT if self.looks.wide else ASPECT
         self.drawing = SpaceFigure(self.name, aspect, self._choose)
         self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
-        self.task, self.placing = (
-            state.work.task(reported=False),
-            state.work.task(reading, reported=False),
-        )
+        self.task, self.placing = state.work.task(), state.work.task(reading)
         self.others = OtherStates(state, self._show_others)
         self.lead, self.finding, self.details = note("Placing the networks …"), note(), note()
-        for task in (self.placing, self.task):
-            task.param.watch(self.failed, "message")
         self.planes.param.watch(self.refresh, "value")
         self.looks.param.watch(self._span, "contact")
         self.looks.param.watch(self._title, "dark")

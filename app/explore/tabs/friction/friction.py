@@ -61,7 +61,6 @@ class View(TabView):
         self.indeterminacy: Indeterminacy | None = None
         self.correlations: Correlations | None = None
         self.scatter: ContactScatter | None = None
-        self.task.param.watch(self.failed, "message")
         self.looks.param.watch(self._mark, "contact")
         self.catch_up()
 

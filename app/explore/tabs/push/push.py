@@ -53,7 +53,7 @@ class View(TabView):
         )
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.numbers, self.details = note(), note(), note()
-        self.task = state.work.task(reported=False)
+        self.task = state.work.task()
         self.loads: tuple[Loads, ContactScatter] | None = None
         self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
         self.gave = False  # whether the push has reached the load at which disks move
@@ -61,7 +61,6 @@ class View(TabView):
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
         self.every.on_click(lambda event: self._find_loads())
-        self.task.param.watch(self.failed, "message")
         self.task.param.watch(lambda event: self.load.param.update(running=event.new), "running")
         self.looks.param.watch(self._animate, "tab")
         state.knowledge.param.watch(self.refresh, "known")
