@@ -316,9 +316,8 @@ def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
 
 def _number(given: dict[str, str], name: str) -> float:
     """The number of a name, which is taken out; InputError if it is none."""
+    text = given.pop(name)
     try:
-        return float(given[name])
+        return float(text)
     except ValueError:
-        raise InputError(f"{name} must be a number, got {shortened(given[name])}") from None
-    finally:
-        del given[name]
+        raise InputError(f"{name} must be a number, got {shortened(text)}") from None

@@ -1,6 +1,5 @@
 """The view of the states on screen, as parameters: no widgets, no plots."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import param
@@ -108,26 +107,14 @@ class Looks(Seen):
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 
-    def keep_open(self, panel: Any, name: str) -> None:
-        """Keep the parameter `open` of a panel and `opened` in sync."""
-        self._keep(panel, "open", lambda: name in self.opened, lambda on: [name] * on, [name])
+    def keep_open(self, panel: Any, *names: str) -> None:
+        """Keep `opened` in sync with a panel: its `active` parts, or whether it is `open`."""
+        parameter = "active" if "active" in panel.param else "open"
 
-    def keep_active(self, folds: Any, *names: str) -> None:
-        """Keep the parameter `active` of stacked panels and `opened` in sync."""
+        def wanted() -> list[int] | bool:
+            there = [k for k, name in enumerate(names) if name in self.opened]
+            return there if parameter == "active" else bool(there)
 
-        def active() -> list[int]:
-            return [k for k, name in enumerate(names) if name in self.opened]
-
-        self._keep(folds, "active", active, lambda now: [names[k] for k in now], names)
-
-    def _keep(
-        self,
-        panel: Any,
-        parameter: str,
-        wanted: Callable[[], Any],
-        opened: Callable[[Any], list[str]],
-        names: Sequence[str],
-    ) -> None:
         def follow(*events: Any) -> None:
             if getattr(panel, parameter) != wanted():
                 panel.param.update({parameter: wanted()})
@@ -135,7 +122,8 @@ class Looks(Seen):
         def tell(event: Any) -> None:
             if event.new != wanted():
                 others = [other for other in self.opened if other not in names]
-                self.opened = [*others, *opened(event.new)]
+                there = [0] * event.new if isinstance(event.new, bool) else event.new
+                self.opened = [*others, *(names[k] for k in there)]
 
         self.param.watch(follow, "opened")
         panel.param.watch(tell, parameter)

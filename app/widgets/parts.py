@@ -156,18 +156,6 @@ def by_words(labels: dict[str, str]) -> dict[str, str]:
     return {words: value for value, words in labels.items()}
 
 
-def choice(labels: dict[str, str], value: str) -> Any:
-    """Buttons of which one is selected; labels {value: words}."""
-    return pmui.RadioButtonGroup(
-        options=by_words(labels),
-        value=value,
-        size="small",
-        margin=(6, 8),
-        # Capitals would turn fₙ and fₜ into other symbols.
-        sx={"& .MuiToggleButton-root": PLAIN, **PLAIN},
-    )
-
-
 def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
     """A labelled list of the values {value: words} of the parameter with this name."""
     look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}

@@ -46,13 +46,13 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     page = visit("?scene=many&tab=upload", width, 900)
     dropped(page, tmp_path, (1,))
     for name, count in (("Both", 2), ("Difference in σ", 1), ("Measured", 1), ("Inferred", 1)):
-        page.get_by_role("button", name=name, exact=True).click()
+        page.get_by_label("Forces").select_option(name)
         page.wait_for_function(
             f"count => {{const all = ({PICTURES})(); "
             "return all.length === count && all.every(w => w > 100)}",
             arg=count,
         )
-        page.get_by_role("button", name="Both").evaluate("e => e.scrollIntoView()")
+        page.get_by_label("Forces").evaluate("e => e.scrollIntoView()")
         picture(page, f"photoelastic/{width}_{name.split()[0]}")
     # Nothing is wider than the page.
     wide = page.evaluate("() => document.scrollingElement.scrollWidth")

@@ -36,5 +36,5 @@ def panel(state: AppState) -> Any:
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
     fold = folded_away(TITLE, inside)
-    state.looks.keep_active(fold, "figure")
+    state.looks.keep_open(fold, "figure")
     return fold

@@ -66,7 +66,7 @@ class View(TabView):
         """Choices and bars; collapsed table and growth."""
         wide = {"sizing_mode": "stretch_width"}
         grows = folded_away(GROWS, plotted(self.growth.figure))
-        self.looks.keep_active(grows, "growth")
+        self.looks.keep_open(grows, "growth")
         return pn.Column(
             self.lead,
             plotted(self.drawing.figure),

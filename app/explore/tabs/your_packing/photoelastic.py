@@ -17,8 +17,9 @@ from ....results.photoelastic_frames import Frame
 from ....results.saved_file import File
 from ....results.uploads import Files
 from ....widgets.file_buttons import Handover
-from ....widgets.parts import PRIMARY, choice, figure, note
+from ....widgets.parts import PRIMARY, by_words, figure, note
 from ....widgets.plot_style import BLUE, ORANGE, corner, hover, legend_above
+from ....widgets.select import Select
 from . import frame_picture
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
@@ -49,7 +50,7 @@ class Frames:
         self.files, self.task, self.options = files, task, options
         self.known = {first.report["frame"]: first}
         self.frame, self.playing = first, 0
-        self.choice = choice(SHOWN, "inferred")
+        self.choice = Select(label="Forces", options=by_words(SHOWN), value="inferred", width=180)
         self.choice.param.watch(lambda event: together(self._dress), "value")
         self.pictures = pn.Row(styles={"flex-wrap": "wrap"}, **WIDE)
         self.save = Handover(
