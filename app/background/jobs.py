@@ -329,7 +329,7 @@ class Task(param.Parameterized):
     ) -> None:
         """wake(function): call a function soon on the page's thread; without it, call `poll`."""
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param has no type hints
-        self._pool, self._wake, self._visitor = pool, wake, visitor
+        self.pool, self._wake, self._visitor = pool, wake, visitor
         self.job: Job | None = None  # the running job
         self._done: Callable[[Any], object] | None = None
         self._closed = False
@@ -345,7 +345,7 @@ class Task(param.Parameterized):
         if self._closed:
             return
         on_end = None if self._wake is None else partial(self._wake, self.poll)
-        self.job, self._done = Job(work, self._pool, on_end, self._visitor), done
+        self.job, self._done = Job(work, self.pool, on_end, self._visitor), done
         self.param.update(
             running=True, stage=self.job.doing, fraction=None, seconds_left=None, keeps=False,
             message="",

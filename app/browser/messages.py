@@ -42,7 +42,6 @@ FROM_BROWSER = {
         {"live": {"seen": bool}},  # whether the page is visible
         {"live": {"painted": int}},  # number of the last message that was painted
     ),
-    "Progress": ({"stop": True}, {"cancel": True}),
     "Results": ({"measure": True},),  # measure the volume of S
     "Workbench": (
         {"scene": str},

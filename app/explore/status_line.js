@@ -3,25 +3,48 @@
 import { ask } from "../browser/send.js"
 import { button, made } from "../browser/dom.js"
 import { knows, remember } from "../browser/local_storage.js"
-import { taskLine } from "../widgets/progress.js"
+import { plain } from "../browser/to_object.js"
 
 const NEW = "learn" // name under which a browser remembers that the line for new visitors was closed
+const LATE_MS = 200 // after which a computation is shown; shorter ones would flicker
 
 export function render({ model, view }) {
   const root = made("div", { className: "line" }), facts = made("p", { className: "facts" })
-  const failed = made("p", { className: "failed", role: "alert" })
-  root.append(failed, taskLine(model, view), facts)
+  const failed = made("p", { className: "failed", role: "alert" }), task = made("div", { className: "task", hidden: true })
+  task.innerHTML = `
+    <div class="bar" role="progressbar" aria-label="progress" aria-valuemin="0" aria-valuemax="100"><div></div></div><span></span>`
+  const [bar, words] = task.children
+  const stop = button("Stop and keep", () => ask(model, view, { stop: true }), { className: "soft" })
+  const cancel = button("Cancel", () => ask(model, view, { cancel: true }), { className: "soft" })
+  task.append(stop, cancel)
+  root.append(failed, task, facts)
+  let late = 0
 
   function show() {
+    const { fraction = null, words: said, keeps } = plain(model.progress), known = fraction !== null
+    late = 0
     failed.hidden = !model.failed
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
-    facts.hidden = model.running
-    view.el.classList.toggle("urgent", model.running || Boolean(model.failed)) // visible at any scroll position
     facts.replaceChildren(...model.facts.map((fact) => made("span", { innerHTML: fact })))
+    task.hidden = !said
+    facts.hidden = !task.hidden
+    view.el.classList.toggle("urgent", !task.hidden || Boolean(model.failed)) // visible at any scroll position
+    if (task.hidden) return
+    bar.classList.toggle("unknown", !known)
+    bar.firstElementChild.style.width = `${known ? Math.round(100 * fraction) : 40}%`
+    bar.ariaValueNow = known ? Math.round(100 * fraction) : null
+    stop.hidden = !keeps
+    cancel.textContent = keeps ? "Discard" : "Cancel"
+    words.textContent = words.title = said
+  }
+
+  function follow() {
+    if (!plain(model.progress).words || !task.hidden) { clearTimeout(late); show() } else late ||= setTimeout(show, LATE_MS)
   }
 
   if (!knows(NEW)) root.append(invitation())
-  model.on(["failed", "facts", "running"], show)
+  model.on(["failed", "facts"], show)
+  model.on("progress", follow)
   show()
   return root
 }

@@ -7,34 +7,37 @@ import numpy as np
 import param
 
 from ..background.jobs import Job, reading
+from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results.library import Cell
 from ..state.app_state import AppState
-from ..widgets.progress import Progress
 from . import result_values
 
 CERTIFICATE = "distance_to_rest"  # in the record of a packing certified to be at rest
 
 
-class StatusLine(Progress):
-    """Facts about the states on screen, a task's progress, or a failure; see status_line.js."""
+class StatusLine(Scripted):
+    """Facts about the states on screen, a task's progress, or a failure; see status_line.js.
+
+    If the partial result of the task is a valid result, its buttons are Stop and keep, and Discard.
+    """
+
+    progress = param.Dict(default={}, doc="as of Work")
 
     facts = param.List(doc="HTML, one each")
     failed = param.String(doc="what went wrong, in one line; empty if nothing did")
 
     def __init__(self, state: AppState, **params: Any) -> None:
-        knowledge, work = state.knowledge, state.work
-        tasks = work.computation, work.loading, work.measuring, state.besides.task
-        super().__init__(*tasks, knowledge.task, knowledge.ranking, **params)
-        self._state = state
+        super().__init__(**params)
+        self._state, work = state, state.work
         self._rest: tuple[Cell, bool] | None = None  # whether it is certified
         self._looking = work.task(reading, reported=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
         state.param.watch(self._look, "cell")
-        work.param.watch(self._fail, "message")
+        work.param.watch(self._report, ["message", "progress"])
         self._look()
         self._tell()
-        self._fail()
+        self._report()
 
     def _look(self, *events: Any) -> None:
         """Read the certificate of rest in the packing's record."""
@@ -56,15 +59,18 @@ class StatusLine(Progress):
             lines.append("at rest: certified" if self._rest[1] else "at rest: not certified")
         self.facts = lines
 
-    def _fail(self, *events: Any) -> None:
-        self.failed = self._state.work.message
+    def _report(self, *events: Any) -> None:
+        work = self._state.work
+        self.param.update(failed=work.message, progress=work.progress)
 
     def _heard(self, message: Message) -> None:
-        match message:
-            case {"read": True}:
-                self._state.work.message = ""
-            case {"stop": True} | {"cancel": True}:
-                super()._heard(message)
+        work = self._state.work
+        if "read" in message:
+            work.message = ""
+        elif work.foremost is not None and "stop" in message:
+            work.foremost.stop()
+        elif work.foremost is not None and "cancel" in message:
+            work.foremost.dismiss()
 
 
 def facts(state: AppState) -> Iterator[str]:

@@ -18,6 +18,7 @@ class Work(param.Parameterized):
 
     busy = param.Boolean(doc="whether any task is running")
     message = param.String(doc="one line about what went wrong, or empty")
+    progress = param.Dict(default={}, doc="fraction, words and keeps of `foremost`; {}: none")
     live = param.Parameter(doc="the Following of what is being computed, or None")
     arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")
     moving = param.Boolean(doc="whether a packing is on screen that is being compressed")
@@ -57,6 +58,7 @@ class Work(param.Parameterized):
         if reported:
             task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")
+        task.param.watch(self._follow, ["running", "fraction", "stage", "seconds_left", "keeps"])
         self.tasks.append(task)
         if self._closed:
             task.close()
@@ -94,6 +96,21 @@ class Work(param.Parameterized):
     def _count(self, event: Any) -> None:
         self.busy = any(task.running for task in self.tasks)
 
+    @property
+    def foremost(self) -> Task | None:
+        """The first computation under way, which the page reports; reading is not reported."""
+        return next((one for one in self.tasks if one.running and one.pool is computing), None)
+
+    def _follow(self, *events: Any) -> None:
+        task = self.foremost
+        now: dict[str, Any] = {}
+        if task is not None:
+            left = task.seconds_left
+            words = task.stage + ("" if left is None else f" — about {_duration(left)} more")
+            now = {"fraction": task.fraction, "words": words, "keeps": task.keeps}
+        if now != self.progress:
+            self.progress = now
+
     # Intermediate results
 
     def compute(
@@ -126,3 +143,7 @@ class Work(param.Parameterized):
         if not self.computation.running:
             self.param.update(live=None, moving=False, arriving=None)
         return self.live or self.arriving
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"

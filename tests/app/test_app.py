@@ -54,7 +54,6 @@ from app.state.links import Numbers, fitting, read_view, spelled
 from app.state.pulls import Hand
 from app.state.view_settings import SORTS, Looks
 from app.state.visit import turns
-from app.widgets.progress import Progress
 from granforce import measures
 from granforce.cli import parser
 from granforce.records import Cancelled, InputError
@@ -1084,8 +1083,8 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
 
 def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     task = state.work.task()
-    progress, told = Progress(task), threading.Event()
-    assert not progress.running
+    line, told = StatusLine(state), threading.Event()
+    assert not line.progress
 
     def work(job):
         job.begin("counting")
@@ -1100,11 +1099,11 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     task.start(work)
     assert told.wait(60)
     state.work.poll()
-    assert progress.running and progress.fraction == 0.25
-    assert progress.words == "counting — about 20 min more"
-    progress.hear({"cancel": True})
+    assert line.progress["fraction"] == 0.25
+    assert line.progress["words"] == "counting — about 20 min more"
+    line.hear({"cancel": True})
     wait_for(state)
-    assert not progress.running
+    assert not line.progress
 
 
 def test_a_job_wakes_the_page_when_it_ends():

@@ -19,14 +19,14 @@ from app.packing import player
 from app.packing.replay import stream
 from app.state.known import Knowledge
 from app.state.pulls import Hand
-from app.widgets import file_buttons, file_drop, number, progress
+from app.widgets import file_buttons, file_drop, number
 
 COMPONENTS = {
     kind.__name__: kind
     for kind in (
         page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider,
         file_buttons.Handover, known_forces.Known, lesson.Lesson, load_slider.LoadSlider,
-        my_computations.Mine, number.NumberField, player.Player, progress.Progress,
+        my_computations.Mine, number.NumberField, player.Player,
         results_line.Results, status_line.StatusLine, workbench.Workbench,
     )
 }  # fmt: skip
@@ -130,8 +130,7 @@ def test_what_is_listed_is_handled(name):
 
 
 def test_every_component_that_sends_or_hears_is_listed():
-    kinds = [*Scripted.__subclasses__(), *progress.Progress.__subclasses__()]
-    mine = {kind.__name__ for kind in kinds if "_heard" in vars(kind)}
+    mine = {kind.__name__ for kind in Scripted.__subclasses__() if "_heard" in vars(kind)}
     assert mine == set(FROM_BROWSER) == set(COMPONENTS)
     assert set(TO_BROWSER) <= set(COMPONENTS)
 

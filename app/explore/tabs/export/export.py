@@ -19,7 +19,6 @@ from ....results.saved_file import File, csv
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
-from ....widgets.progress import Progress
 from . import files, standalone
 
 
@@ -149,7 +148,6 @@ class View:
         """Buttons with explanations."""
         return pn.Column(
             self.buttons,
-            Progress(self.making, self.task),
             note(HELP),
             sizing_mode="stretch_width",
         )

@@ -14,7 +14,6 @@ from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....state.view_settings import PLANES
 from ....widgets.parts import TabView, folded, note, plotted, question
-from ....widgets.progress import Progress
 from . import sentences
 from .other_states import MARKED, OtherStates
 from .space_figure import Columns, SpaceFigure
@@ -56,10 +55,8 @@ class View(TabView):
             plotted(self.drawing.figure),
             self.planes,
             self.finding,
-            Progress(self.placing, self.task),
             self.details,
             self.others.switch,
-            self.others.progress,
             **wide,
         )
 

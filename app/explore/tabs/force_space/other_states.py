@@ -10,7 +10,6 @@ from ....results import compute, planes
 from ....results.library import Shown
 from ....results.replays import Replay
 from ....state.app_state import AppState
-from ....widgets.progress import Progress
 
 # The label of the switch for states of a kind.
 ALSO = {"walk": "also uniformly sampled networks", "uniform": "also the walk"}
@@ -27,7 +26,6 @@ class OtherStates:
         self.replay: Replay | None = None
         self.switch = pmui.Switch(label=ALSO["walk"], size="small", margin=(6, 8))
         self.task = state.work.task()
-        self.progress = Progress(self.task)
         self.switch.param.watch(lambda event: together(self.fetch), "value")
 
     @property

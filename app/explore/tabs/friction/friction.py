@@ -14,7 +14,6 @@ from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import TabView, folded_away, note, plotted
-from ....widgets.progress import Progress
 from . import claims, study_figures
 from .study_figures import Correlations, Indeterminacy
 from .this_packing import extents, forces
@@ -71,7 +70,7 @@ class View(TabView):
         folds = folded_away(*pairs)
         self.looks.keep_open(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
-            Progress(self.task), self.first, first, self.fourth, fourth, self.sixth,
+            self.first, first, self.fourth, fourth, self.sixth,
             sixth, folds, self.details, **WIDE,
         )  # fmt: skip
 

@@ -16,7 +16,6 @@ from ....state.perturbations import Loads, Pushed
 from ....state.view_settings import PUSHES
 from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import PRIMARY, TabView, folded, note, plotted, question
-from ....widgets.progress import Progress
 from ..friction import claims
 from . import all_contacts, one_contact
 from .load_slider import LoadSlider
@@ -74,7 +73,6 @@ class View(TabView):
             self.lead,
             self.load,
             self.every,
-            Progress(self.task),
             self.numbers,
             self.animate,
             self.plots,

@@ -14,7 +14,6 @@ from ....results.selection import Selection
 from ....state.app_state import AppState
 from ....widgets.file_drop import Dropper
 from ....widgets.parts import PRIMARY, by_words, note
-from ....widgets.progress import Progress
 from ....widgets.select import Select
 from . import photoelastic as measured
 from .my_computations import Mine
@@ -86,7 +85,6 @@ class View:
                 *(self.mu, self.box, self.pressure, self.walls, self.reverse, self.read),
                 sizing_mode="stretch_width",
             ),
-            Progress(self.task),
             self.error,
             self.waiting,
             self.report,
