@@ -73,6 +73,10 @@ GRID = {
             "gridArea": "panels", "height": "auto", "overflow": "hidden auto",
             "padding": "0 14px 0 0", "marginLeft": "-10px",
         },
+        "& .space": {
+            "gridArea": "panels", "height": "auto", "overflow": "hidden auto", "zIndex": 1,
+            "padding": "0 14px 0 0", "margin": "44px 0 0 -10px",  # below the titles of the tabs
+        },
         "& .results": {"gridArea": "results", "padding": "4px 24px 8px 0"},
         "& .status": {"gridArea": "status"},
     },
@@ -85,9 +89,7 @@ GRID = {
                 " / min(40vw, 100dvh - 244px) minmax(0, 1fr) minmax(0, 1.1fr)"
             ),
         },
-        "& .space": {
-            "gridArea": "space", "height": "auto", "overflow": "hidden auto", "padding": 0,
-        },
+        "& .space": {"gridArea": "space", "padding": 0, "margin": 0},
     },
 }  # fmt: skip
 
@@ -133,7 +135,7 @@ class _Around:
         self.results = pn.Column(css_classes=["results"], **WIDE)
         self.status = StatusLine(state, css_classes=["status"], **WIDE)
         self.columns = [
-            self.controls, side, self.space, self.panels, self.results, self.status
+            self.controls, side, self.panels, self.space, self.results, self.status
         ]  # fmt: skip
 
     def parts(self, player: Player) -> Iterator[None]:
@@ -141,16 +143,15 @@ class _Around:
         state, controls = self.state, Controls(self.state)
         self.controls[:] = [controls.line, controls.made]
         yield
-        tabs = Tabs(state)
+        tabs = Tabs(state, self.space)
         player.hears["tab"] = tabs.choose
-        pale_when_old([*tabs.pages.items(), ("results", self.results), ("plane", self.space)])
+        pale_when_old([*tabs.pages.items(), ("results", self.results)])
         self.panels[:] = [tabs.tabs]
         self.results[:] = [Results(state, **WIDE)]
-        tabs.reserve(self.space)
-        state.looks.param.watch(lambda event: state.work.piecewise(tabs.beside(self.space)), "wide")
         yield
         yield from tabs.filling(state.looks.tab)
-        yield from tabs.beside(self.space)
+        if state.looks.wide:
+            yield from tabs.filling("plane")
         self.panels.extend([self.address, Hints()])
         explanation.follow(state, self.header)
         state.read_ahead()

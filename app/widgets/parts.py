@@ -54,7 +54,7 @@ class TabView:
         self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
     ) -> None:
         self.state, self.looks = state, state.looks
-        self._stale, self.left = True, False  # whether it was removed from the page
+        self._stale = True
         state.param.watch(self._changed, [*watched])
         self.looks.param.watch(self._changed, ["tab", "wide", *looks])
         state.work.param.watch(self._changed, [*work])
@@ -62,7 +62,7 @@ class TabView:
     @property
     def visible(self) -> bool:
         """Whether the view's tab is on screen."""
-        return not self.left and self.looks.shows(self.name)
+        return bool(self.looks.shows(self.name))
 
     def catch_up(self) -> None:
         """Update if necessary and visible; call it once after building the view."""

@@ -34,8 +34,7 @@ class View(TabView):
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "seen", looks=["contact", "pair"], work=["fourfold"])
-        aspect = WIDE_ASPECT if self.looks.wide else ASPECT
-        self.drawing = SpaceFigure(self.name, aspect, self._choose)
+        self.drawing = SpaceFigure(self.name, self._choose)
         self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
         self.task, self.placing = state.work.task(), state.work.task(reading)
         self.others = OtherStates(state, self._show_others)
@@ -43,8 +42,10 @@ class View(TabView):
         self.planes.param.watch(self.refresh, "value")
         self.looks.param.watch(self._span, "contact")
         self.looks.param.watch(self._title, "dark")
+        self.looks.param.watch(self._fit, "wide")
         self.shown: tuple[Any, ...] | None = None
         self.found: Outlined | None = None
+        self._fit()
         self.catch_up()
 
     def panel(self) -> pn.Column:
@@ -59,6 +60,9 @@ class View(TabView):
             self.others.switch,
             **wide,
         )
+
+    def _fit(self, *events: Any) -> None:
+        self.drawing.figure.aspect_ratio = WIDE_ASPECT if self.looks.wide else ASPECT
 
     # Contents
 

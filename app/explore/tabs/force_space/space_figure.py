@@ -23,8 +23,8 @@ KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
 class SpaceFigure:
     """A plane of force space; the player moves the state on screen along the path."""
 
-    def __init__(self, tab: str, aspect: float, show: Callable[[int], object]) -> None:
-        """tab: of the view; aspect: width over height; show(row): called when a dot is clicked."""
+    def __init__(self, tab: str, show: Callable[[int], object]) -> None:
+        """tab: of the view; show(row): called when a dot is clicked."""
         none: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(none | {"state": []}, name="path")
         self.here = ColumnDataSource(none, name="here", tags=["follows", "path", tab])
@@ -35,7 +35,7 @@ class SpaceFigure:
         around = {"range_padding": 0.06, "only_visible": True}
         self.figure = fig = figure(
             "force_space", None, "", "", x_range=DataRange1d(**around),
-            y_range=DataRange1d(**around), aspect_ratio=aspect, sizing_mode="scale_width",
+            y_range=DataRange1d(**around), sizing_mode="scale_width",
             toolbar_inner=False,  # the outline of S reaches up to the frame
         )  # fmt: skip
         fig.name = "path_figure"
