@@ -313,11 +313,8 @@ class Task(param.Parameterized):
     """
 
     running = param.Boolean()
-    stage = param.String(doc="what the job is doing")
     fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
-    seconds_left = param.Number(default=None, allow_None=True)
     dismissed = param.Boolean(doc="triggered when the visitor cancels; never stays True")
-    keeps = param.Boolean(doc="whether the job's partial result can be used")
     message = param.String(doc="one line about what went wrong, or empty")
 
     def __init__(
@@ -346,10 +343,7 @@ class Task(param.Parameterized):
             return
         on_end = None if self._wake is None else partial(self._wake, self.poll)
         self.job, self._done = Job(work, self.pool, on_end, self._visitor), done
-        self.param.update(
-            running=True, stage=self.job.doing, fraction=None, seconds_left=None, keeps=False,
-            message="",
-        )  # fmt: skip
+        self.param.update(running=True, fraction=None, message="")
 
     def poll(self) -> None:
         """Update the progress of the job and, when it has ended, its result."""
@@ -361,12 +355,7 @@ class Task(param.Parameterized):
             self.param.update(running=False, message="")
             return
         if not job.ended:
-            self.param.update(
-                stage=job.doing,
-                fraction=job.fraction,
-                seconds_left=job.seconds_left,
-                keeps=job.keeps,
-            )
+            self.fraction = job.fraction
             return
         done, self.job, self._done = self._done, None, None
         # Announced together, so that the work is never over without its result.

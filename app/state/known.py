@@ -202,7 +202,6 @@ class Knowledge(param.Parameterized):
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
     def _rank(self, found: Ranked | None) -> None:
-        """counted: whether exactly this many states are required, not any stored number."""
         if found is not None and found.replay is self.state.replay:
             self.ranked = found if found.known == tuple(self.known) else None
 

@@ -58,7 +58,6 @@ class Work(param.Parameterized):
         if reported:
             task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")
-        task.param.watch(self._follow, ["running", "fraction", "stage", "seconds_left", "keeps"])
         self.tasks.append(task)
         if self._closed:
             task.close()
@@ -74,6 +73,7 @@ class Work(param.Parameterized):
         """Update the progress of all tasks."""
         for task in self.tasks:
             task.poll()
+        self._report()
 
     def cancel(self) -> None:
         """End all running work of the page."""
@@ -95,19 +95,20 @@ class Work(param.Parameterized):
 
     def _count(self, event: Any) -> None:
         self.busy = any(task.running for task in self.tasks)
+        self._report()
 
     @property
     def foremost(self) -> Task | None:
         """The first computation under way, which the page reports; reading is not reported."""
         return next((one for one in self.tasks if one.running and one.pool is computing), None)
 
-    def _follow(self, *events: Any) -> None:
-        task = self.foremost
+    def _report(self) -> None:
+        job = self.foremost and self.foremost.job
         now: dict[str, Any] = {}
-        if task is not None:
-            left = task.seconds_left
-            words = task.stage + ("" if left is None else f" — about {_duration(left)} more")
-            now = {"fraction": task.fraction, "words": words, "keeps": task.keeps}
+        if job is not None:
+            left = job.seconds_left
+            words = job.doing + ("" if left is None else f" — about {_duration(left)} more")
+            now = {"fraction": job.fraction, "words": words, "keeps": job.keeps}
         if now != self.progress:
             self.progress = now
 

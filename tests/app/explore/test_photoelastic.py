@@ -97,7 +97,7 @@ def test_it_can_be_cancelled(state):
     new, _ = files(n=150, missing=0.1, noise=0.2)
     view = dropped(state, new)
     begin = time.monotonic()
-    while "waiting for a free processor" in view.task.stage and time.monotonic() < begin + 60:
+    while "waiting for a free processor" in view.task.job.doing and time.monotonic() < begin + 60:
         state.work.poll()
     view.task.cancel()
     wait_for(state)

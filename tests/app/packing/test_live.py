@@ -152,7 +152,9 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(visited):
     assert second.work.live is not first.work.live
     two.run(lambda: second.growing)
     assert second.seen is first.seen  # not computed anew
-    two.run(lambda: "already under way" in second.work.computation.stage or not second.work.busy)
+    two.run(
+        lambda: "already under way" in second.work.progress.get("words", "") or not second.work.busy
+    )
     while first.work.busy or second.work.busy:
         one.run(lambda: True)
         two.run(lambda: True)

@@ -36,12 +36,7 @@ export function begin(given, style) {
   shadow.append(render({ model, view }))
   data.player.scene.hand = null // no server computes networks for dragging
   data.player.select() // nor can a button hold a force
-  const { player } = data, paint = player.paintPlots.bind(player)
-  player.paintPlots = (now) => {
-    paint(now)
-    player.plots.follow("plane", player.replay)
-  }
-  player.again()
+  data.player.again()
   // Their marks were drawn before layout.
   for (const { type, change } of page._all_models.values()) if (type === "Legend") setTimeout(() => change.emit(), 100)
 }

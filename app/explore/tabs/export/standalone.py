@@ -103,6 +103,7 @@ def html(
         "frame": frame,
         "between": between,
         "tab": "intervals",
+        "wide": True,  # force space is beside the intervals
     }
     left = len(replay.normal) - len(kept.normal)
     text = PAGE.format(
