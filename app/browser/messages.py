@@ -69,7 +69,7 @@ PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
 PICTURE |= {"normal": Array, "tangential": Array}
 # States of a walk in progress, one after the other, each with the numbers shown next to it.
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
-STATES |= {"acceptance": Array, "eta1": Array, "eta2": Array, "eta3": Array}
+STATES |= {"eta1": Array, "eta2": Array, "eta3": Array}
 
 # {component: messages sent to its script}; forces in ⟨f_n⟩, arrays flat.
 TO_BROWSER = {

@@ -56,8 +56,6 @@ const BUTTONS = `
   <div class="read">
     <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
-    <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
-    <span tabindex="0" data-term="distance">from the centre of all networks <b class="distance"></b> mean forces</span>
     <span class="running">
       <span>of the <b class="played"></b> shown so far:</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
@@ -164,15 +162,12 @@ export class Buttons {
   read(replay) {
     const { walk, seen, residual } = replay
     const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
-    const accepted = walk.acceptance[seen]
     const texts = {
       apart: `${Math.round(100 * replay.apart)} %`,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
       eta3: form(walk.eta3[seen], 3),
       played: seen,
-      acceptance: accepted <= 1 ? `${Math.round(100 * accepted)} %` : "–",
-      distance: form(replay.distance, 2),
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text

@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import param
 
-from granforce.types import Floats
-
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
@@ -79,9 +77,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "contacts": replay.normal.shape[1],
         "room": room,
         "number": replay.number.astype(np.int32),
-        "distance": replay.distance.astype(np.float32),
         "residual": replay.residual.astype(np.float32),
-        "acceptance": _acceptance(replay.attempts).astype(np.float32),
         **{name: values.astype(np.float32) for name, values in replay.growth.items()},
         "low": np.ascontiguousarray(replay.low[:, 0]),
         "high": np.ascontiguousarray(replay.high[:, 0]),
@@ -108,12 +104,3 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
             for name, values in links._asdict().items()
         },
     }
-
-
-def _acceptance(attempts: Floats) -> Floats:
-    """Accepted states per attempt (F,) up to each frame; NaN for the original."""
-    tried = np.append(np.nan, np.cumsum(attempts[1:]))
-    # With all forces determined nothing was tried, so nothing was accepted.
-    return np.divide(
-        np.arange(len(attempts)), tried, out=np.full(len(attempts), np.nan), where=tried > 0
-    )

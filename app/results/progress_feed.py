@@ -121,7 +121,7 @@ class Walking:
         self.parts = []
         self._every = every(replay.summary)
         self._growth = measures.Growth()
-        self._found = self._attempts = 0
+        self._found = 0
         self.replay = replay
         self.run += 1
 
@@ -131,10 +131,9 @@ class Walking:
         state = found.forces / self.replay.force_scale
         grown = self._growth.add(state)
         self._found += 1
-        self._attempts += found.attempts
         if (self._found - 1) % self._every:
             return
-        numbers = self._found, found.residual, self._found / self._attempts, *grown
+        numbers = self._found, found.residual, *grown
         self.parts.append((state.astype(np.float32), numbers))
 
 
@@ -192,7 +191,7 @@ def numbers(summary: Summary) -> Integers:
     return np.append(0, np.arange(1, summary["states"] + 1, every(summary)))
 
 
-NUMBERS = ("number", "residual", "acceptance", "eta1", "eta2", "eta3")
+NUMBERS = ("number", "residual", "eta1", "eta2", "eta3")
 
 
 def _batch(parts: list[tuple[Any, tuple[float, ...]]]) -> Message:

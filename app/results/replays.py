@@ -32,9 +32,7 @@ class Replay(NamedTuple):
     normal: Any  # (F, N_c) float32 f_n: the original network, then the stored states
     tangential: Any  # (F, N_c) float32 f_t
     number: Any  # (F,) number of the state, 0 for the original
-    distance: Floats  # (F,) from the centre of the states
     residual: Floats  # (F,) NaN for the original
-    attempts: Floats  # (F,) for each state; NaN for the original and for samples without attempts
     growth: Mapping[str, Floats]  # {"eta1", "eta2", "eta3": (F,)} of the states up to each
     low: Any  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
     high: Any  # (N_c, 2) float32 largest
@@ -74,13 +72,6 @@ def make_replay(
     summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
     summary |= {"kept": len(pick), "states": walked}
 
-    def column(name: str) -> Floats:
-        if name not in dataset:
-            return np.full(len(pick) + 1, np.nan)
-        return np.append(np.nan, dataset[name].values[pick])
-
-    distance = column("distance_to_centre")
-    distance[0] = summary["original_distance"]
     growing = measures.growing(frames[1:]).items()
     return _replay(
         packing,
@@ -88,9 +79,7 @@ def make_replay(
         scale,
         frames,
         number=np.append(0, number),
-        distance=distance,
-        residual=column("residual"),
-        attempts=column("attempts"),
+        residual=np.append(np.nan, dataset["residual"].values[pick]),
         growth={name: np.append(np.nan, values) for name, values in growing},
         low=(dataset["low"].values / scale).astype(np.float32),
         high=(dataset["high"].values / scale).astype(np.float32),
@@ -112,9 +101,7 @@ def first_replay(S: Any, states: int) -> Replay:
         S.force_scale,
         original[None],
         number=np.zeros(1),
-        distance=nothing,
         residual=nothing,
-        attempts=nothing,
         growth=dict.fromkeys(("eta1", "eta2", "eta3"), nothing),
         low=original,
         high=original,

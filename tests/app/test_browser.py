@@ -418,7 +418,6 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
     original = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)[0]
     apart = np.mean(np.abs(states[-1, :, 0] - original))
     assert page.locator("b.apart").text_content() == f"{100 * apart:.0f} %"
-    assert page.locator("b.acceptance").text_content().endswith("%")
     assert re.fullmatch(r"\de-\d+", page.locator("b.residual").text_content())
 
 

@@ -8,7 +8,7 @@ const STRIP = 1 // width of the strip around the box in which images are drawn, 
 export const CATCH_UP = 0.6 // s by which the player stays behind the newest state
 const WIDEST = 0.7 // widest chain in a moving packing, in largest radii: collisions carry most of the force
 export const FORCES = ["normal", "tangential"]
-const TOLD = ["residual", "acceptance", "eta1", "eta2", "eta3"]
+const TOLD = ["residual", "eta1", "eta2", "eta3"]
 
 /** A moving packing for the scene, including its periodic images. */
 function moving({ box, tilt, x, radius, i, j, reach }) {
@@ -65,7 +65,7 @@ export function roomy(walk) {
     return made
   }
   for (const name of FORCES) whole[name] = wide(walk[name], room * walk.contacts)
-  for (const name of [...TOLD, "distance"]) whole[name] = wide(walk[name], room)
+  for (const name of TOLD) whole[name] = wide(walk[name], room)
   whole.numbers = wide(walk.number, room)
   whole.number = whole.numbers.subarray(0, walk.number.length)
   return whole

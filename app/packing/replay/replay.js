@@ -101,21 +101,6 @@ export class Replay {
 
   // Text and numbers
 
-  /** From the centre: |(1−t) a + t b|² = (1−t) a² + t b² − t (1−t) |a − b|². */
-  get distance() {
-    if (this.held) return NaN
-    const { walk } = this, [a, b, t] = this.spot, size = walk.contacts
-    let square = (1 - t) * walk.distance[a] ** 2 + t * walk.distance[b] ** 2
-    if (t > 0) {
-      let apart = 0
-      for (const values of [walk.normal, walk.tangential]) {
-        for (let c = 0; c < size; c++) apart += (values[a * size + c] - values[b * size + c]) ** 2
-      }
-      square -= t * (1 - t) * apart
-    }
-    return Math.sqrt(Math.max(0, square))
-  }
-
   /** Mean |f_n − original f_n| of the contacts, in ⟨f_n⟩. */
   get apart() {
     const { walk, mixed: { normal } } = this

@@ -132,37 +132,33 @@ def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
 # Two contacts, four frames, the first one the original.
 NORMAL = np.array([[1.0, 2.0], [0.5, 3.0], [2.0, 1.0], [1.5, 2.5]])
 TANGENTIAL = np.array([[0.1, -0.2], [0.0, 0.4], [-0.3, 0.1], [0.2, 0.2]])
-CENTRE = np.array([1.2, 2.1, 0.0, 0.1])
 WALK = {
     "contacts": 2, "mu": 0.5, "states": 3, "number": [0, 1, 2, 3],
     "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
-    "distance": np.linalg.norm(np.hstack([NORMAL, TANGENTIAL]) - CENTRE, axis=1),
     "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8], "unit": 1,
 }  # fmt: skip
 
 
 def test_between_two_states_the_straight_line_is_shown(run):
-    """Forces, distance from the centre and range so far, at 1.3 of the track and back at 1."""
+    """Forces and range so far, at 1.3 of the track and back at 1."""
     there, back = run(
         "packing/replay/replay",
         """({ Replay }, { walk }) => {
             const replay = new Replay(walk, null)
             return [3, 1.3, 1].map((to) => {
                 replay.go(to)
-                const { mixed, distance, residual, low, high, place } = replay
+                const { mixed, residual, low, high, place } = replay
                 return {
                     normal: [...mixed.normal], tangential: [...mixed.tangential],
-                    low: [...low], high: [...high], distance, residual, place,
+                    low: [...low], high: [...high], residual, place,
                 }
             }).slice(1)
         }""",
         walk=WALK,
     )
     normal, tangential = (0.7 * all[1] + 0.3 * all[2] for all in (NORMAL, TANGENTIAL))
-    away = np.linalg.norm(np.hstack([normal, tangential]) - CENTRE)
     np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
     np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
-    assert there["distance"] == pytest.approx(away, rel=1e-6)
     assert (there["residual"], there["place"]) == (0.2, "of 3")
     assert back["low"] == back["high"] == NORMAL[1].tolist()  # the original is no state
     assert back["normal"] == NORMAL[1].tolist()

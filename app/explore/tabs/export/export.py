@@ -83,7 +83,7 @@ class Snapshot:
         """The view as a page that needs no server."""
         outlined = None
         if self.replay.summary["dimension"] > 0:
-            kept = standalone.thinned(self.replay)[0]
+            kept = standalone.thinned(self.replay)
             principal = planes.principal(kept)
             outlined = planes.outline(self.library, self.cell, kept, principal)(job)
         job.begin("making the page")

@@ -14,8 +14,6 @@ from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.resources import Resources
 
-from granforce.types import Floats
-
 from ....browser.bundle import Scripted, module
 from ....packing.player import Player, frames
 from ....packing.view import exact_intervals, full_extent, legend
@@ -76,7 +74,7 @@ def html(
     exact: with known forces; shown: loads, gone, measured and pins, as for the player.
     """
     intervals = exact_intervals(exact, replay)
-    kept, acceptance = thinned(replay)
+    kept = thinned(replay)
     plane = planes.principal(kept)
     figures = still.figures(library, kept, exact, plane, outlined, view)
     # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
@@ -94,7 +92,7 @@ def html(
     given |= {name: view[name] for name in same}
     given |= shown
     given |= {
-        "walk": frames(kept) | {"acceptance": acceptance},
+        "walk": frames(kept),
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
@@ -124,18 +122,18 @@ def html(
     return text.encode()
 
 
-def thinned(replay: Replay) -> tuple[Replay, Floats]:
-    """A Replay of at most FRAME_BYTES, and the acceptance of its frames."""
+def thinned(replay: Replay) -> Replay:
+    """A Replay of at most FRAME_BYTES."""
     count, contacts = replay.normal.shape
-    whole, pick = frames(replay)["acceptance"], evenly(count, contacts, FRAME_BYTES)
+    pick = evenly(count, contacts, FRAME_BYTES)
     if len(pick) == count:
-        return replay, whole
+        return replay
     rows: dict[str, Any] = {
         name: np.ascontiguousarray(getattr(replay, name)[pick])
-        for name in ("normal", "tangential", "number", "distance", "residual", "attempts")
+        for name in ("normal", "tangential", "number", "residual")
     }
     growth = {name: values[pick] for name, values in replay.growth.items()}
-    return replay._replace(**rows, growth=growth), whole[pick]
+    return replay._replace(**rows, growth=growth)
 
 
 def _plain(value: Any) -> Any:
