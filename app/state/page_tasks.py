@@ -103,7 +103,8 @@ class Work(param.Parameterized):
         return next((one for one in self.tasks if one.running and one.pool is computing), None)
 
     def _report(self) -> None:
-        job = self.foremost and self.foremost.job
+        task = self.foremost
+        job = None if task is None else task.job
         now: dict[str, Any] = {}
         if job is not None:
             left = job.seconds_left
