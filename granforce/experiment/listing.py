@@ -95,6 +95,7 @@ class Columns(NamedTuple):
     values: dict[str, Floats]  # {column: (rows,)}
     lines: Integers  # (rows,) line numbers
     description: str
+    frame_given: bool  # whether the column for the frame is one that was given
 
     @property
     def frames(self) -> Floats:
@@ -179,14 +180,21 @@ def read_frames(
     """The TextFrames in two files, paths or open files; InputError for other files.
 
     columns: {frame, id, x, y, r, flag, i, j, ft or fn: its header in the files, or its number from
-    1}. If one column of a file is given, the others are recognised by headers only.
+    1}. If one column of a file is given, the others are recognised by headers only. frame is that
+    of both files; its number applies to files of which other columns are given, too.
     """
     given = _by_name(columns or {})
-    grains, contacts = (
+    files = [
         _columns(source, wanted, {name: given[name] for name in wanted if name in given})
         for source, wanted in ((positions, _GRAINS), (adjacency, _CONTACTS))
-    )
-    return _with_frames(grains, contacts)
+    ]
+    if "frame" in given and not any(file.frame_given for file in files):
+        raise InputError(
+            f"{files[0].name} and {files[1].name}: no column has the header "
+            f"{given['frame'][:40]!r} for frame; to number it, give the other columns of its file, "
+            "too"
+        )
+    return _with_frames(*files)
 
 
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
@@ -275,13 +283,18 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
         # Lines of another length do not belong to this table.
         if len(fields) == width:
             row[:] = [_number(field) for field in fields]
-    if given.keys() - {"frame"}:
+    if given.keys() != {"frame"}:
+        taken = bool(given)
+    else:  # of the other file, perhaps
+        taken = header is not None and _plain(given["frame"]) in map(_plain, header)
+    if taken:
         named = _given(name, header, wanted, width, given)
     else:
         named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
     values = {column: numbers[:, k] for k, column in enumerate(named) if column}
     description = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
-    return Columns(name, values, np.array([k for k, _ in rows]), description)
+    places = np.array([k for k, _ in rows])
+    return Columns(name, values, places, description, taken and "frame" in given)
 
 
 def _number(text: str) -> float:
@@ -311,6 +324,11 @@ def _known(header: Sequence[str], wanted: Sequence[str]) -> list[str]:
     return [next((name for name in wanted if word in _WORDS[name]), "") for word in words]
 
 
+def _plain(word: str) -> str:
+    """A header as it is compared with a given one."""
+    return word.strip(" #\"'").lower()
+
+
 def _needed(wanted: Sequence[str]) -> set[str]:
     return {"x", "y", "radius"} if "x" in wanted else set(wanted) - {"frame"}
 
@@ -320,10 +338,10 @@ def _given(
 ) -> list[str]:
     """Names of the columns if some are given by header or number; "" for others."""
     header = header if header is not None and len(header) == width else [""] * width
-    plain_words = [word.strip(" #\"'").lower() for word in header]
+    plain_words = [_plain(word) for word in header]
     named = [name if name not in given else "" for name in _known(header, wanted)]
     for name, theirs in given.items():
-        word = theirs.strip().lower()
+        word = _plain(theirs)
         if word in plain_words:
             column = plain_words.index(word)
         elif word.isdecimal() and 1 <= int(word[:9]) <= width:

@@ -223,6 +223,32 @@ def test_columns_are_named_by_header_or_number(made, taken):
             read_pegs(io.StringIO(text), file(mixed), columns={**wrong}, **CLEAN)
 
 
+@pytest.mark.parametrize("headed", ["both", "positions", "adjacency"])
+def test_a_column_for_the_frame_is_named_by_its_header(made, headed):
+    """Where it is unknown to one file, that is the same in all frames."""
+    grains, rows = made
+    heads = {"positions": "Bild,id,x,y,r,flag\n", "adjacency": "Bild;i;j;ft;fn\n"}
+    files = []
+    for (name, head), listed in zip(heads.items(), made, strict=True):
+        has = headed in ("both", name)
+        twice = [[frame, *row[1:]] for frame in ((3, 8) if has else (1,)) for row in listed]
+        if headed != "both" and has:
+            twice = [[8, *row[1:]] for row in listed]
+        mark = ";" if ";" in head else ","
+        lines = [mark.join(f"{value:.12g}" for value in row[0 if has else 1 :]) for row in twice]
+        head = head if has else head.removeprefix(f"Bild{mark}")
+        files.append(io.StringIO(head + "\n".join(lines)))
+    found = read_pegs(*files, columns={"frame": "bild"}, **CLEAN)
+    assert found.report["frame"] == 8
+    same(found, read(grains, rows))
+
+
+@pytest.mark.parametrize("number", ["1", "9", "name"])
+def test_a_column_for_the_frame_alone_has_no_number(made, number):
+    with pytest.raises(InputError, match=f"header '{number}' for frame; to number it, give the"):
+        read(*made, columns={"frame": number})
+
+
 def test_columns_are_of_text_files(made):
     for given in ((io.BytesIO(b"MATLAB"), None), (made, None)):
         with pytest.raises(InputError, match="two text files"):
