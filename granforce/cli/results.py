@@ -108,7 +108,7 @@ def prepared(
     if packing is None:
         get_packing(store, named)
     else:
-        kinds.keep_packing(store, named, packing)
+        kinds.keep_packing(store, named, packing, hold=True)
     return store, parameters
 
 

@@ -88,9 +88,11 @@ def save(
     dataset: xr.Dataset,
     *,
     dtypes: Mapping[str, str] | None = None,
+    hold: bool = False,
 ) -> str:
     """Save a dataset under its kind and parameters, as Store.keep; returns the entry's name."""
-    return store.keep(kind.name, parameters, dataset, version=kind.version, dtypes=dtypes)
+    options: dict[str, Any] = {"version": kind.version, "dtypes": dtypes, "hold": hold}
+    return store.keep(kind.name, parameters, dataset, **options)
 
 
 def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:

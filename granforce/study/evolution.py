@@ -72,7 +72,7 @@ def evolution(
             failed.append((number, str(error)))
             continue
         named = kinds.imported_parameters(snapshot.packing)
-        kinds.keep_packing(store, named, snapshot.packing)
+        kinds.keep_packing(store, named, snapshot.packing, hold=True)
         cells = [StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
         if states:
             cells.append(StudyCell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))

@@ -169,7 +169,8 @@ class Store(Mapping[str, xr.Dataset]):
     def __init__(self, path: Path, *, readonly: bool = False) -> None:
         self.path = path
         self.readonly = readonly
-        self._unkept: dict[str, xr.Dataset] = {}  # by name, datasets that could not be written
+        self._held: dict[str, xr.Dataset] = {}  # by name, datasets kept in memory, too
+        self._incomplete = False
 
     def __repr__(self) -> str:
         return f"Store({str(self.path)!r}, readonly={self.readonly})"
@@ -216,7 +217,7 @@ class Store(Mapping[str, xr.Dataset]):
         dataset, reason = entries.checked(self.path / name)
         if reason:
             self._warn(name, reason)
-        return self._unkept.get(name) if dataset is None else dataset
+        return self._held.get(name) if dataset is None else dataset
 
     def save(
         self,
@@ -246,24 +247,33 @@ class Store(Mapping[str, xr.Dataset]):
         return name
 
     def keep(
-        self, kind: str, params: Mapping[str, Any], dataset: xr.Dataset, **options: Any
+        self,
+        kind: str,
+        params: Mapping[str, Any],
+        dataset: xr.Dataset,
+        *,
+        hold: bool = False,
+        **options: Any,
     ) -> str:
         """As `save`, but a dataset that cannot be written is kept in memory, with a warning.
 
-        This object loads it as if it were stored; `incomplete` is then True.
+        This object loads it as if it were stored, and is `incomplete`. hold: keep it in memory
+        although it was written, because another process may remove the entry.
         """
+        name = self.name(kind, params, version=options["version"])
         try:
-            return self.save(kind, params, dataset, **options)
+            self.save(kind, params, dataset, **options)
         except NotKeptError as error:
             warnings.warn(f"{error}; results are returned, but not saved", stacklevel=3)
-            name = self.name(kind, params, version=options["version"])
-            self._unkept[name] = dataset
-            return name
+            hold = self._incomplete = True
+        if hold:
+            self._held[name] = dataset
+        return name
 
     @property
     def incomplete(self) -> bool:
         """Whether a result could not be written."""
-        return bool(self._unkept)
+        return self._incomplete
 
     def refuse_unwritable(self) -> None:
         """Raise InputError if nothing can be saved, before a long computation."""

@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from heeding import heed, heeding, interrupted, until_it_computes, until_it_left
+from packings import packed
 
 import granforce as gf
 from granforce.cli import commands
 from granforce.cli.parser import main
+from granforce.packing.importers import save_packing
 from granforce.study.store import open_store
 from granforce.system import interrupts
 
@@ -35,6 +37,26 @@ def run(away, capsys):
         return code, out, err
 
     return call
+
+
+def test_a_packing_in_a_file_needs_no_store_that_lasts(away, run, monkeypatch):
+    """Another process clears the store whenever the packing has been saved to it."""
+    keep = commands.exact.kinds.keep_packing
+
+    def overtaken(store, *args, **options):
+        keep(store, *args, **options)
+        open_store(store.path).clear()
+
+    save_packing(packed(8, 0.3), "p.npz")
+    wanted = run("intervals", "--packing", "p.npz", "--out", "x.csv")
+    monkeypatch.setattr(commands.exact.kinds, "keep_packing", overtaken)
+    for words in (
+        ("intervals", "--packing", "p.npz", "--out", "y.csv"),
+        ("walk", "--packing", "p.npz", "--states", "3", "--out", "states.csv"),
+    ):
+        code, out, err = run(*words)
+        assert code == 0 and "cached" in out and "granforce:" not in err
+    assert wanted[0] == 0 and Path("x.csv").read_bytes() == Path("y.csv").read_bytes()
 
 
 def test_help_needs_no_heavy_import():

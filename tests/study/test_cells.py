@@ -119,6 +119,17 @@ def test_packings_from_elsewhere_are_named_by_their_content(tmp_path):
         kinds.get_packing(store, other)
 
 
+def test_a_packing_from_elsewhere_can_be_held(tmp_path):
+    """Another process may clear the store between two looks."""
+    store = open_store(tmp_path / "s")
+    packing, _ = kinds.get_packing(store, cell()["packing"])
+    named = kinds.imported_parameters(packing)
+    kinds.keep_packing(store, named, packing, hold=True)
+    open_store(store.path).clear()
+    assert kinds.imported_parameters(kinds.get_packing(store, named)[0]) == named
+    assert not store.incomplete and not len(store)
+
+
 @pytest.mark.parametrize("bad", [{"relax": "magic"}, {"states": 0}, {"keep": 0}])
 def test_bad_walks_are_refused(bad):
     options = {"states": 4} | bad

@@ -111,9 +111,14 @@ def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[P
     return dataset_packing(dataset), cached
 
 
-def keep_packing(store: Store, parameters: Parameters, packing: Packing) -> str:
-    """Save a packing under its parameters; returns the entry's name."""
-    return save(store, PACKING, parameters, packing_dataset(packing))
+def keep_packing(
+    store: Store, parameters: Parameters, packing: Packing, *, hold: bool = False
+) -> str:
+    """Save a packing under its parameters; returns the entry's name.
+
+    hold: as for Store.keep, for imported packings, which cannot be made again.
+    """
+    return save(store, PACKING, parameters, packing_dataset(packing), hold=hold)
 
 
 def cones_of(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
