@@ -54,8 +54,8 @@ CLOSINGS, FARTHEST = 8, 1e-2
 # Factor on forces at the start of a closing, so that displacements open only contacts that press
 # far less than others.
 ENLARGED = 1e3
-# Fraction of its gap that a closing may remove from a pair that does not press: with the whole gap,
-# pairs would touch because of the closing alone.
+# Fraction of its gap that a closing leaves to a pair that does not press: without it, pairs would
+# touch because of the closing alone. An overlap becomes a gap of this fraction of it.
 KEPT_APART = 0.5
 CLOSING_STEPS = 60
 # How often grains that move under noise continue here before the dynamics takes over again.
@@ -261,7 +261,7 @@ def _close(motion: Motion, near: _Near, work: dict[str, Any]) -> bool:
         for k in range(3):
             np.add.at(rows, 3 * side + k, network.columns[:, first + k] * forces[:, 0])
     border = network.border[:, : len(place.step.b_border)].T @ forces[:, 0]
-    apart = np.where(forces[:, 0] > 0, place.gap, KEPT_APART * place.gap)
+    apart = np.where(forces[:, 0] > 0, place.gap, place.gap - KEPT_APART * np.abs(place.gap))
     step = place.step._replace(b=rows, b_border=border, closing=apart)
     outcome = relax(step, Push(forces, 0, 0.0, CLOSING_STEPS, STEADY))
     work["linear_systems"] += outcome.iterations

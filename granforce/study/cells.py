@@ -17,7 +17,7 @@ from granforce.types import Cancel, Progress
 
 # Version of the algorithm that makes packings certified to be at rest. It is among their
 # parameters, so that it enters the key of everything that depends on a packing.
-PACKING_VERSION = 6
+PACKING_VERSION = 7
 
 
 def _unchanged(parameters: Parameters, dataset: xr.Dataset) -> Parameters:

@@ -9,6 +9,7 @@ from granforce.forces.balance import stress_of
 from granforce.forces.build import ensemble
 from granforce.motion import contact_dynamics as dynamics
 from granforce.motion.rest import rest
+from granforce.packing import settling
 from granforce.packing.closing import _stretch, margin, strained
 from granforce.packing.compaction import (
     WATCH_EVERY,
@@ -332,13 +333,28 @@ def test_a_cell_that_leans_back_keeps_its_lattice(rng):
     )
 
 
-def unfinished(settling):
+@pytest.mark.parametrize("seed", [4, 5])
+def test_overlaps_of_pairs_that_do_not_press_are_closed_in_one_round(monkeypatch, seed):
+    """Halved in each round, they would keep a compaction from rest for eight rounds."""
+    overlaps, gaps = [], settling._gaps
+
+    def watched(motion):
+        gap, pressing = gaps(motion)
+        overlaps.append(-gap[~pressing].min())
+        return gap, pressing
+
+    monkeypatch.setattr(settling, "_gaps", watched)
+    check(pack(400, 0.1, 700 + seed))
+    assert len(overlaps) <= 4 and max(overlaps) < CLOSED
+
+
+def unfinished(settled):
     """How many of 600 steps at μ = 1 end before they are accurate."""
     rng = np.random.default_rng(1)
     r = rng.uniform(0.5, 1.0, 100)
     motion = _dilute_gas(r / r.max(), rng, 1)
     motion.pace[:] = 0.003, dynamics.MOST_RELAXATION
-    pace = dynamics.Pace(100.0, 0.003, 0.03, 0.02, 150, settling, 0.01)
+    pace = dynamics.Pace(100.0, 0.003, 0.03, 0.02, 150, settled, 0.01)
     counters, work = np.zeros(4, np.int64), {"list_rebuilds": 0}
     for _ in range(24):
         motion, _, _ = _advance(motion, 1.0, pace, counters, work)
