@@ -46,6 +46,9 @@ INITIAL_FRACTION = 0.5
 # NEARLY_BALANCED in a step, in ⟨f_n⟩.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
+# From SEVERAL disks on, later by the square of their number: a system of the last phase then costs
+# far more than a sweep, and the many places where grains still move need many systems.
+SEVERAL = 2000
 # Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
 # than shorter ones, by 8 % at μ = 0.3, 13 % at 0.5, half at 1. Steps of 0.03 and less agree if the
 # last sweeps of a step settle, and then a quarter of the sweeps is enough.
@@ -394,7 +397,7 @@ def _finish(
 ) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
     """The finished packing in natural units with its certificate, or None if it still moves."""
     if mu > NEARLY_FRICTIONLESS:
-        if unbalance > NEARLY_BALANCED:
+        if unbalance > NEARLY_BALANCED * min(1.0, (SEVERAL / len(motion.r)) ** 2):
             return motion, None, None
         return come_to_rest(motion, mu, work, look)
     if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
