@@ -19,18 +19,18 @@ MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 
 # What entries are called since packings are of version 6, which all others name by its parameters.
 NAMES = {
-    "packing": ((20, 0.1, 1), {}, "packing-dc70e5d57c5abb998c77"),
-    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-6b236bcc451c2f2aaf84"),
-    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-e8f1719d2e28a69e533f"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-e80f4013e33c60008307"),
-    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-0777d4fa4413662edc74"),
-    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-0223c67f44639d7a4a80"),
-    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-0b9d0c4a4b5cc4a5efa7"),
-    "stress": ((MADE,), {"angles": 16}, "stress-aa70c5de3c49c75f2ed6"),
-    "perturbation": ((MADE,), {"random": 4}, "perturbation-720119d8f88c8dd5b2b7"),
-    "informative": ((MADE,), {"k": 5}, "informative-ac74199898c5e715fff2"),
-    "volume": ((MADE, 0.1), {}, "volume-154fb2bc53d4fa29339f"),
-    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-160db7aaaccd3122a7f7"),
+    "packing": ((20, 0.1, 1), {}, "packing-e92faea7640195223d3c"),
+    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-1d62362ee85d8524a995"),
+    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-50d4941ac9f07fe279e3"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-29479591e9f587d3b80d"),
+    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-c54698df5db99cfb720a"),
+    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-2130d78dc07681ab080e"),
+    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-348a39809923bad22be4"),
+    "stress": ((MADE,), {"angles": 16}, "stress-eff83621cfee69021951"),
+    "perturbation": ((MADE,), {"random": 4}, "perturbation-aeb68aaa444af9e906c4"),
+    "informative": ((MADE,), {"k": 5}, "informative-75ea4a9cb70db2293805"),
+    "volume": ((MADE, 0.1), {}, "volume-aca5da65c0a840eb75ab"),
+    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-9124df45defeba21ef73"),
 }
 
 
