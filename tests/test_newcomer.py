@@ -22,6 +22,7 @@ from granforce.cli.words import make_parser
 from granforce.glossary import TERMS
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
+from granforce.system.plain import spaced
 
 
 def test_tab_and_help_list_the_public_names_and_nothing_else():
@@ -198,26 +199,54 @@ def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
     assert set(xr.open_zarr("bounds.zarr").coords) == {"contact", "i", "j", "x", "y"}
 
 
-def test_help_explains_the_lines_of_reports_as_the_store_does(cache, capsys):
-    gf.save_packing(packed(30, 0.3), "p.npz")
-    for command, names in (
-        ("walk --states 4", report_lines.WALK),
-        ("uniform --states 8", report_lines.UNIFORM),
-        ("intervals", report_lines.INTERVALS),
-        ("informative --states 40 --best 2 --check 1", report_lines.INFORMATIVE),
-        ("stress", report_lines.STRESS),
-    ):
-        told = {
-            name.split(" [")[0] for name in report(capsys, *command.split(), "--packing", "p.npz")
-        }
-        assert told >= set(names)
+COMMANDS = {  # with lines that appear in this form only, and are explained all the same
+    "pack -n 12 --mu 0.3": set(),
+    "walk P --states 4": set(),
+    "measure P --states 4": set(),
+    "uniform P --states 8": set(),
+    "volume P --accuracy 0.5": set(),
+    "intervals P": set(),
+    "limit-loads P --contacts 0": set(),
+    "stress P --angles 4": set(),
+    "perturb P --random 1": set(),
+    "informative P --states 40 --best 2 --check 1": set(),
+    "load-factor wall.npz --load horizontal --critical": set(),
+    "infer P --measured m.csv --states 8 --certain": set(),
+    "import table pile.csv --mu 0.6 --walls floor --gravity 1": {
+        *("timestep", "time", "contacts_skipped"),
+    },
+}
+LABELS = {"contact", "i", "j", "x", "y"}  # columns, and what a report on no packing has
+
+
+def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsys):
+    gf.save_packing(packed(12, 0.3), "p.npz")
+    gf.save_packing(gf.scene("slope"), "wall.npz")
+    Path("m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
+    Path("pile.csv").write_text("x,y,r\n1,1,1\n3,1,1\n2,2.7320508,1\n")
+    for line, elsewhere in COMMANDS.items():
+        words = line.replace(" P", " --packing p.npz").split()
+        assert main([*words, "--json"]) in (0, 1), line
+        told = {name.split(" [")[0] for name in json.loads(capsys.readouterr().out)}
+        command = words[: 2 if words[0] == "import" else 1]
         with suppress(SystemExit):
-            main([command.split()[0], "--help"])
-        assert "Lines of the report:" in capsys.readouterr().out
+            main([*command, "--help"])
+        _, _, explained = capsys.readouterr().out.partition("Lines of the report:\n")
+        names = {
+            name
+            for name in report_lines.MEANINGS
+            if f"  {spaced(name)}  " in f"{explained} " or f"  {spaced(name)}\n" in explained
+        }
+        assert told - LABELS - {"nearly_touching"} <= names, line
+        assert names - told <= elsewhere | LABELS, line
     stored = {
         name: VARIABLES[name].long_name for name in report_lines.MEANINGS if name in VARIABLES
     }
-    assert len(stored) > 12 and stored.items() <= report_lines.MEANINGS.items()
+    for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
+        stored.pop(name)  # the store gives these names to something else, or one for each state
+    for name in ("pressure", "reached", "critical_force"):
+        stored.pop(name)
+    assert len(stored) > 25 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals --packing p.npz".split()) == 0
     assert "mean extent of f_n [packing]" in capsys.readouterr().out
 

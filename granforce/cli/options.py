@@ -6,7 +6,7 @@ import argparse
 from typing import TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
-from granforce.cli.report_lines import explained
+from granforce.cli.report_lines import IMPORT, explained
 from granforce.glossary import RELAXATIONS
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
@@ -60,7 +60,9 @@ def import_format(
     Options are named after the arguments of the format's reader in `granforce.packing.importers`.
     """
     command = subcommand(
-        formats, name, summary, f"granforce import {name} {example} --mu 0.3 --out packing.npz"
+        *(formats, name, summary),
+        f"granforce import {name} {example} --mu 0.3 --out packing.npz",
+        lines=() if name == "pegs" else IMPORT,  # pegs reports on the frame, in sentences
     )
     command.set_defaults(run="import_")
     command.add_argument("grains", type=Input, help=grains)

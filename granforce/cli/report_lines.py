@@ -33,18 +33,163 @@ MEANINGS = {
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
     "shear_stress_from_to": "range of σ_xy/P that the contacts can carry",
     "admissible_stress": "a stress well inside, as --stress takes it",
+    # of a packing
+    "grains": "disks or bodies, the fixed ones too",
+    "bodies": "bodies, the fixed ones too",
+    "contacts": "number of contacts",
+    "backbone_grains": "grains that can carry force",
+    "backbone_contacts": "contacts that can carry force",
+    "friction": "friction coefficient μ",
+    "mu": "friction coefficient μ",
+    "pressure": "pressure P0; undefined in an open packing",
+    "packing_fraction": "packing fraction φ, rattlers included",
+    "coordination": "mean coordination number z of the backbone",
+    "mean_normal_force": "mean normal force ⟨f_n⟩",
+    "residual": "largest unbalance of a grain, in ⟨f_n⟩",
+    "violation": "largest excess over Coulomb's law, in ⟨f_n⟩",
+    "largest_overlap": "of two bodies, in largest radii",
+    "largest_contact_gap": "largest gap of a contact, in largest radii",
+    "least_other_gap": "smallest gap of a pair that is no contact, likewise",
+    "steps": "time steps of the compaction",
+    "sweeps_done": "sweeps over all contacts in these steps",
+    "distance_to_rest": "change of the forces in one exact step of dynamics, in ⟨f_n⟩",
+    "scene": "name of the scene",
+    "timestep": "of the snapshot",
+    "time": "of the snapshot",
+    "contacts_skipped": "contacts of the file without force",
+    "contacts_with_walls": "contacts between a disk and a wall",
+    "walls": "ends x, y, x, y of each wall",
+    # of results
+    "entry": "name of the result in the store",
+    "cached": "whether the result was in the store already",
+    "seconds": "wall time of the computation",
+    "setup_seconds": "wall time until the first step",
+    "sampling_seconds": "wall time of the steps",
+    "states": "number of states",
+    "eta2": "indeterminacy η2 from pairs of states",
+    "eta3": "indeterminacy η3 from intervals",
+    "exact_eta3": "η3 of the exact intervals",
+    "accepted": "attempts that gave a new state",
+    "mean_iterations": "mean iterations of a relaxation",
+    "largest_residual": "largest unbalance of a grain, in ⟨f_n⟩",
+    "largest_violation": "largest excess over Coulomb's law, in ⟨f_n⟩",
+    "mean_distance_to_centre": "mean distance of states from the centre, in ⟨f_n⟩",
+    "mean_extent_of_f_n": "mean length of the interval of f_n",
+    "largest_extent_of_f_n": "largest length of the interval of f_n",
+    "correlation": "corr(f_n, ΔF_n) of the original network",
+    "correlation_low": "smallest corr(f_n, ΔF_n) of any state",
+    "correlation_high": "largest corr(f_n, ΔF_n) of any state",
+    "reached": "whether the requested size or accuracy was reached",
+    "largest_duality_gap": "largest certified error of a bound, in ⟨f_n⟩",
+    "ln_volume": "ln V, with forces in ⟨f_n⟩",
+    "standard_error": "standard error of ln V",
+    "ln_volume_on_the_way_down": "ln V from one half of the draws, as a check",
+    "ln_volume_on_the_way_up": "ln V from the other half",
+    "ln_volume_per_grain": "ln V per grain of the backbone",
+    "extent_over_mean_normal_force": "extent V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩",
+    "paths": "paths of the billiard walk",
+    "mean_limit_load": "mean of the largest force pair that contacts can balance",
+    "least_limit_load": "smallest limit load of a contact",
+    "largest_limit_load": "largest limit load of a contact",
+    "largest_shear_over_pressure": "largest √((σ_xx − σ_yy)²/4 + σ_xy²)/P that the contacts can "
+    "carry",
+    "certainly_not_above": "certified upper bound of it",
+    "own_shear_over_pressure": "the same of the packing's own forces",
+    "own_normal_difference": "(σ_xx − σ_yy)/2P of the packing's own forces",
+    "own_shear_stress": "σ_xy/P of the packing's own forces",
+    "critical_force": "mean force pair F_crit at which grains start to move",
+    "critical_force_deciles": "F_crit: smallest, after each tenth of the contacts, largest",
+    "limit_load": "mean force pair that contacts can balance at most",
+    "decay_exponent": "α of mean |u| ~ r^−α",
+    "decay_low": "lower end of the 95 % interval of α",
+    "decay_high": "upper end of the 95 % interval of α",
+    "fit_range": "distances r of the fit, in the packing's unit",
+    "loads_at_rest": "loads that ended at rest",
+    "loads_moving": "loads that ended in steady motion",
+    "loads_undecided": "loads that ended in motion not yet steady",
+    "largest_breach": "largest violation of Coulomb's law by a first motion, relative to the "
+    "fastest contact",
+    "load_factor": "largest multiple of the load that forces can balance",
+    "certified_error": "the load factor is certainly not larger by more than this",
+    "critical_factor_low": "largest multiple at which bodies stayed at rest",
+    "critical_factor_high": "smallest multiple at which they moved, or the load factor",
+    "breach": "violation of Coulomb's law by the first motion, relative to the fastest contact",
+    "converged": "whether low and high are close and the motion is steady",
+    "measured_components": "measured f_n and f_t",
+    "measured_where_nothing_can_carry": "measured f_n and f_t outside the backbone, not used",
+    "chi_square": "χ² of the likeliest network",
+    "freedom": "degrees of freedom of χ²",
+    "mean_change_of_f_n": "mean |inferred − measured| f_n",
+    "suspects": "contacts that deviate by more than 3 σ",
+    "mean_standard_error": "mean standard error of a force",
+    "unmeasured_contacts": "contacts whose f_n was not measured",
+    "carry_for_certain": "those that carry force in every network within 3 σ",
+    "mean_interval_now": "mean length of the interval of f_n before a measurement",
 }
-WALK = ("dimension", "eta1", "acceptance", "rejected", "unconverged", "skipped")
+_STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
+_CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
+PACKING = (
+    *("grains", "contacts", "backbone_grains", "backbone_contacts", "rattlers", "friction"),
+    *("pressure", "packing_fraction", "coordination", "dimension", "mean_normal_force"),
+    *("residual", "violation", "largest_overlap", "largest_contact_gap", "least_other_gap"),
+)
+PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "cached")
+IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
+WALK = (
+    *("entry", *_STATES, "acceptance", "accepted", "rejected", "unconverged", "skipped"),
+    *("rattlers", "unloaded_contacts", "mean_iterations", *_CHECKS),
+)
+SCAN = (*_STATES, "acceptance", "rejected", "unconverged", "skipped", "cached")
+MEASURE = (
+    *("mu", "states", *_STATES, "mean_normal_force", "mean_extent_of_f_n"),
+    *("largest_extent_of_f_n", "correlation", "correlation_low", "correlation_high"),
+    *("mean_distance_to_centre", "original_distance"),
+)
+_MIXING = ("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped")
 UNIFORM = (
-    *("dimension", "eta1", "worst_r_hat", "least_bulk_size", "least_tail_size", "turns"),
-    *("refused", "dropped", "held", "original_distance", "rattlers", "unloaded_contacts"),
+    *("entry", "states", *_STATES, *_MIXING, "held", "skipped", "rattlers", "unloaded_contacts"),
+    *("reached", "mean_distance_to_centre", "original_distance", "setup_seconds"),
+    *("sampling_seconds", *_CHECKS),
 )
+VOLUME = (
+    *("entry", "dimension", "ln_volume", "standard_error", "ln_volume_on_the_way_down"),
+    *("ln_volume_on_the_way_up", "ln_volume_per_grain", "extent_over_mean_normal_force"),
+    *("reached", "paths", "turns", "refused", "seconds", "cached"),
+)
+_SOLVED = ("programs", "again", "largest_duality_gap", "seconds", "cached")
 INTERVALS = (
-    *("dimension", "determined_contacts", "undetermined_clusters", "position_of_f_n_in_tenths"),
-    *("programs", "again"),
+    *("contacts", "dimension", "coordination", "exact_eta3", "mean_normal_force"),
+    *("mean_extent_of_f_n", "largest_extent_of_f_n", "correlation", "determined_contacts"),
+    *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
-INFORMATIVE = ("part_expected", "mean_interval_after")
-STRESS = ("normal_difference_from_to", "shear_stress_from_to", "admissible_stress", "programs")
+LIMIT_LOADS = (
+    *("contacts", "mean_normal_force", "mean_limit_load", "least_limit_load"),
+    *("largest_limit_load", *_SOLVED),
+)
+LOAD_FACTOR = (
+    *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
+    *("critical_factor_high", "residual", "breach", "converged"),
+)
+INFORMATIVE = (
+    *("entry", "mean_interval_now", "part_expected", "mean_interval_after", "seconds", "cached"),
+)
+STRESS = (
+    *("dimension", "largest_shear_over_pressure", "certainly_not_above"),
+    *("own_shear_over_pressure", "own_normal_difference", "own_shear_stress"),
+    *("normal_difference_from_to", "shear_stress_from_to", "admissible_stress", *_SOLVED),
+)
+PERTURB = (
+    *("contacts", "mean_normal_force", "critical_force", "critical_force_deciles", "limit_load"),
+    *("decay_exponent", "decay_low", "decay_high", "fit_range", "loads_at_rest", "loads_moving"),
+    *("loads_undecided", "rattlers", "unloaded_contacts", "largest_residual", "largest_breach"),
+    *("seconds", "cached"),
+)
+INFER = (
+    *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
+    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_contacts"),
+    *("carry_for_certain", "states", "mean_standard_error", *_MIXING, "held", "setup_seconds"),
+    *("sampling_seconds", "reached", "seconds", "cached"),
+)
 
 
 def explained(names: tuple[str, ...]) -> str:

@@ -43,6 +43,7 @@ def add_pack(commands: Commands) -> None:
         "  granforce pack --scene groove --mu 0.5\n"
         "  granforce pack --scene arch --out arch.npz\n"
         "  granforce pack --scene wall --scene-options courses=10,blocks=5 --out wall.npz",
+        lines=report_lines.PACK,
     )
     command.add_argument(
         "--scene",
@@ -116,6 +117,7 @@ def add_volume(commands: Commands) -> None:
         "volume",
         "measure the volume of all force networks of a packing, with its standard error",
         "granforce volume -n 400 --mu 0.1 --seed 1 --accuracy 0.1",
+        lines=report_lines.VOLUME,
     )
     add_any_packing(command)
     group = command.add_argument_group("the volume")
@@ -143,6 +145,7 @@ def add_infer(commands: Commands) -> None:
         "find the most likely admissible network given measured forces, with error bars",
         "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
+        lines=report_lines.INFER,
     )
     command.add_argument(
         "files",
@@ -256,6 +259,7 @@ def add_measure(commands: Commands) -> None:
         "measure",
         "measure the indeterminacy of a walk, optionally for each contact",
         "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --contacts contacts.csv",
+        lines=report_lines.MEASURE,
     )
     add_source(command)
     command.add_argument(
@@ -270,7 +274,7 @@ def add_scan(commands: Commands) -> None:
         "scan",
         "packings and walks for many μ and seeds, in parallel and resumable",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
-        lines=report_lines.WALK,
+        lines=report_lines.SCAN,
     )
     command.add_argument(
         "--mu", type=str, required=True, help="friction coefficients, separated by commas"
@@ -397,6 +401,7 @@ def add_limit_loads(commands: Commands) -> None:
         "limit-loads",
         "compute the largest force pair that can push the grains of each contact apart",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
+        lines=report_lines.LIMIT_LOADS,
     )
     add_exact(command)
 
@@ -408,6 +413,7 @@ def add_load_factor(commands: Commands) -> None:
         "compute the largest multiple of a load on all bodies that contact forces can balance",
         "granforce pack --scene wall --out wall.npz\n"
         "  granforce load-factor wall.npz --load horizontal",
+        lines=report_lines.LOAD_FACTOR,
     )
     command.add_argument("file", type=Input, metavar="FILE.npz", help="the packing, with weights")
     command.add_argument(
@@ -455,6 +461,7 @@ def add_perturb(commands: Commands) -> None:
         "push the grains of single contacts apart until the packing moves: critical force and "
         "first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
+        lines=report_lines.PERTURB,
     )
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")

@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from granforce.cli.results import (
     StoredResult,
@@ -26,6 +27,15 @@ from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.system.terminal import print_report, report_after
+
+# Of COUNTS, which also has the work done.
+LOADS = ("loads_at_rest", "loads_moving", "loads_undecided")
+
+
+def solved(dataset: xr.Dataset) -> dict[str, int]:
+    """Linear programs solved, once and again."""
+    counts = json.loads(dataset.attrs["counts"])
+    return {name: counts[name] for name in ("programs", "again") if name in counts}
 
 
 def perturb(arguments: argparse.Namespace) -> None:
@@ -52,8 +62,7 @@ def perturb(arguments: argparse.Namespace) -> None:
         **forces.reported(reported),
         **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
         "fit_range": json.loads(dataset.attrs["fit_range"]),
-        "decay_exponent_of_other_ranges": dataset["fit_exponent"].values.tolist(),
-        **{name: int(dataset[name].sum()) for name in COUNTS},
+        **{name: int(dataset[name].sum()) for name in LOADS},
         **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
         "largest_residual": float(dataset["load_residual"].max()),
         "largest_breach": float(dataset["motion_breach"].max()),
@@ -93,7 +102,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
         "position_of_f_n_in_tenths": histogram.tolist(),
-        **json.loads(dataset.attrs["counts"]),
+        **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
@@ -121,7 +130,7 @@ def limit_loads(arguments: argparse.Namespace) -> None:
     lines = {
         "contacts": len(load),
         **forces.reported(reported),
-        **json.loads(dataset.attrs["counts"]),
+        **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
@@ -136,7 +145,7 @@ def load_factor(arguments: argparse.Namespace) -> None:
     S = ensemble(importers.load_packing(arguments.file))
     limit = grain_loads.load_factor(S, arguments.load)
     lines: dict[str, Any] = {"bodies": len(S.packing.r), "contacts": len(S.packing.contacts.i)}
-    lines |= {"load_factor": limit.factor, "largest_duality_gap": limit.gap}
+    lines |= {"load_factor": limit.factor, "certified_error": limit.gap}
     if arguments.critical:
         critical = grain_loads.critical_load(S, arguments.load)
         lines |= {
@@ -145,7 +154,6 @@ def load_factor(arguments: argparse.Namespace) -> None:
             "residual": critical.residual,
             "breach": critical.breach,
             "converged": critical.converged,
-            **critical.counts,
         }
     print_report(lines, arguments.json)
 
@@ -168,7 +176,7 @@ def stress(arguments: argparse.Namespace) -> None:
         "normal_difference_from_to": np.quantile(carried[:, 0], [0, 1]).tolist(),
         "shear_stress_from_to": np.quantile(carried[:, 1], [0, 1]).tolist(),
         "admissible_stress": ",".join(f"{value:.8g}" for value in middle),
-        **json.loads(dataset.attrs["counts"]),
+        **solved(dataset),
         "largest_duality_gap": float(dataset["stress_gap"].max()),
         **ends,
     }

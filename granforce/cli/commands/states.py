@@ -101,7 +101,7 @@ def volume(arguments: argparse.Namespace) -> int:
         "ln_volume_per_grain": dataset["log_volume_per_grain"].item(),
         "extent_over_mean_normal_force": dataset["extent"].item(),
         "reached": reached,
-        **json.loads(dataset.attrs["counts"]),
+        **{name: n for name, n in json.loads(dataset.attrs["counts"]).items() if name != "rungs"},
         **ends,
     }
     print_report(lines, arguments.json)
