@@ -75,7 +75,8 @@ class Player {
   }
 
   drawThrust(context) {
-    if (this.replay && !this.scene.frozen && !this.scene.offset) drawThrust(context, this.scene, this.thrust, this.replay.mixed)
+    const { replay, scene, pushed } = this // networks under a push are outside S
+    if (replay && !scene.frozen && !pushed.held) drawThrust(context, scene, this.thrust, replay.mixed)
   }
 
   /** Whether the tab for pushing a contact is open: playing would distract. */

@@ -42,8 +42,8 @@ LEGEND = """
 </details>
 """
 THRUST = """
-<span>green: where the force through a joint can pass (exact, over S); dark: the line of thrust now
-</span>
+<span>green: where the resultant of a joint can pass (exact)</span>
+<span>dots: where it passes now</span>
 """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>

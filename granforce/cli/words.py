@@ -50,8 +50,8 @@ def add_pack(commands: Commands) -> None:
         type=str,
         metavar="NAME",
         help="a small scene instead of a compressed packing: groove, box, pyramid, press, "
-        "leaning, six, solid, column, thirteen or many, or blocks: slope, ladder, books, arch or "
-        "wall; of the options below only --mu applies to it",
+        "leaning, six, solid, column, thirteen or many, or blocks: slope, ladder, books, stones, "
+        "arch or wall; of the options below only --mu applies to it",
     )
     command.add_argument(
         "--scene-options",

@@ -24,7 +24,8 @@ ASKED = (
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open, {slid} slide and {kept} hold.</b> At the end "
     "of the slider the packing shows the first motion, scaled so that the fastest disk "
-    "({most:.3g} times the rms motion) moves back and forth by one mean radius."
+    "({most:.3g} times the rms motion) moves back and forth by one mean radius. "
+    "Rotations are not drawn."
 )
 HELD = (
     " Held forces are ignored here: {} may change like all others, and the push begins with the "
@@ -100,7 +101,7 @@ def decay(pushed: Pushed) -> Figure:
     seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
     fig.scatter(
         pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
-        legend_label="one dot, one disk",
+        legend_label="one dot, one grain",
     )  # fmt: skip
     known = np.isfinite(pushed.profile) & (pushed.profile > 0)
     fig.line(
