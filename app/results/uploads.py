@@ -22,6 +22,7 @@ FAMILIES = {
     "npz": ("NPZ of granforce", ("npz",), ()),
     "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
     "table": ("tables", ("grains",), ("joined",)),
+    "blocks": ("bodies", ("bodies",), ()),
     "pegs": ("photoelastic frame", ("positions", "adjacency"), ()),
     "solved": ("photoelastic frame", ("solved",), ()),
 }
@@ -31,6 +32,7 @@ WORDS = {
     "contacts": "dump of the contacts",
     "grains": "table of disks",
     "joined": "table of contacts",
+    "bodies": "file of bodies",
     "positions": "positions of the disks",
     "adjacency": "adjacency list with the forces",
     "solved": "frame solved by PeGS 2",
@@ -64,6 +66,8 @@ def role(name: str, content: bytes) -> str:
             return "contacts"
         raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
     columns = _columns(content)
+    if {"body", "x", "y"} <= columns or content.lstrip()[:1] == b"{":
+        return "bodies"
     if {"x", "y", "r"} <= columns:
         return "grains"
     if {"i", "j"} <= columns:
@@ -73,7 +77,8 @@ def role(name: str, content: bytes) -> str:
         return measured
     raise InputError(
         f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
-        "(disks) or i, j (contacts), nor a photoelastic list of positions or of forces"
+        "(disks), i, j (contacts) or body, x, y (bodies), nor a photoelastic list of positions or "
+        "of forces"
     )
 
 
@@ -159,6 +164,8 @@ def read(
         packing = importers.read_lammps(
             given["particles"], given["contacts"], mu, most_grains=limits.n
         )
+    elif "bodies" in files:
+        packing = importers.read_blocks(given["bodies"], mu=mu)
     else:
         packing = importers.read_table(
             given["grains"],
@@ -169,7 +176,7 @@ def read(
             pressure=pressure,
             most_grains=limits.n,
         )
-    limits.check(mu=packing.mu)
+    limits.check(mu=packing.mu, n=len(packing.r))
     return packing
 
 
@@ -219,7 +226,7 @@ def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 _ROWS = (
-    ("disks", "grains", ",d", ""),
+    ("disks or bodies", "grains", ",d", ""),
     ("rattlers", "rattlers", ",d", ""),
     ("contacts listed", "contacts", ",d", ""),
     ("contacts that can carry", "backbone_contacts", ",d", ""),

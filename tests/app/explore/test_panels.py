@@ -298,6 +298,26 @@ def test_bodies_of_a_file_are_drawn_as_they_are():
     assert np.allclose(ends.mean(axis=0).T, wall.contact_points[replay.backbone])
 
 
+@pytest.mark.parametrize(
+    "name, content",
+    [
+        (
+            "a.csv",
+            b"body,x,y,fixed\n1,0,0,0\n1,1,0,0\n1,0,1,0\n2,-1,-1,1\n2,2,-1,1\n2,2,0,1\n2,-1,0,1\n",
+        ),
+        (
+            "a.json",
+            b'{"bodies": [{"disk": [0, 1, 1]}, {"corners": [[-1, -1], [2, 0], [-1, 0]], '
+            b'"fixed": true}]}',
+        ),
+    ],
+)
+def test_a_file_of_bodies_is_read(name, content):
+    files = uploads.added({}, [(name, content)])
+    assert not uploads.missing(files) and not uploads.needs_box(files)
+    assert len(uploads.read(files, mu=0.5).shapes.sides) == 2
+
+
 def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):
     found, _ = read_link("?scene=arch")
     assert found.mu == 0.6 and read_link(link(found, {}))[0] == found

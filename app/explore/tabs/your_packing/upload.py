@@ -23,10 +23,12 @@ HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
-j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
-y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
-of PeGS 2, for which the nearest balanced forces are computed. Files are read into memory. A packing
-is saved in the cache; a frame is saved only if you open it as a packing.
+j and fn, ft; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
+for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
+(frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
+<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Files are
+read into memory. A packing is saved in the cache; a frame is saved only if you open it as a
+packing.
 """
 BOX_WANTED = (
     "Enter the sides of the periodic box in Box, such as 30, 30, and its tilt, if any; then press "
@@ -98,7 +100,7 @@ class View:
     def _ask(self) -> None:
         """Show the fields that these files need."""
         kind = uploads.family(self.files) if self.files else None
-        self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
+        self.mu.visible = kind not in (None, "npz")
         self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
         self.box.visible = self.pressure.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
