@@ -97,12 +97,14 @@ def test_a_frame_is_chosen(name):
         read(*given(*files), MU, frame=7, **options)
 
 
-# Of the last snapshot: its rows, its last row, all but its title, its number.
+# Of the last snapshot: its rows, its last row, all but its title, its number, the end of a number.
 CUTS = [
     *(("lammps", 0, cut) for cut in ("\n9 1 2.5", " 2.5 0.5\n", "\nITEM: ATOMS", "\n200\n")),
     *(("lammps", 1, cut) for cut in ("\n9 3 1", " 0 0\n", "\nITEM: NUMBER", "\n200\n")),
     *(("mercury", 0, cut) for cut in ("\n2.5 2.5", " 0 0\n", "\n0.5 0.5", " 3 3 1\n")),
     ("mercury", 1, " -1 0 0\n"),
+    *(("lammps", file, cut) for file, cut in ((0, ".5\n"), (0, "\n"), (1, "\n"))),
+    *(("mercury", file, "\n") for file in (0, 1)),
 ]
 
 
@@ -133,6 +135,24 @@ def test_a_single_frame_that_is_cut_off_is_refused():
     text = particles(100)
     with pytest.raises(InputError, match="8 rows where 9 are announced; is the file cut off"):
         read_lammps(*given(text[: text.rindex("\n9 1")], contacts(100, 1.0)), MU)
+
+
+@pytest.mark.parametrize("name, file", [(name, file) for name in READ for file in (0, 1)])
+def test_a_single_frame_needs_no_end_of_its_last_line(name, file):
+    """Editors strip it."""
+    read, _, options, _ = READ[name]
+    files = [particles(100), contacts(100, 1.0)] if name == "lammps" else [*mercury_files([1.0])]
+    files[file] = files[file].rstrip()
+    found = read(*given(*files), MU, **options)
+    assert found.pressure == pytest.approx(1.0) and found.info["residual"] < 1e-12
+
+
+def test_a_single_contact_that_is_cut_off_is_refused():
+    data, fstat = mercury_files([1.0])
+    for cut in (" -1 0 0\n", "\n0 "):
+        end = fstat.rindex(cut) + 2
+        with pytest.raises(InputError, match="fields where there should be 16; is the file cut"):
+            read_mercury(*given(data, fstat[:end]), MU, box=(3, 3))
 
 
 @pytest.mark.parametrize("columns", ["xs ys", "xsu ysu"])

@@ -391,8 +391,10 @@ def _plane(table: Table, dimensions: int) -> str:
     return "".join(axis for axis in "xyz" if axis != thin)
 
 
-def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str]]:
-    """Name, [(line number, fields)], and the comments before the first line of numbers."""
+def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str], bool]:
+    """Name, [(line number, fields)], the comments before the first line of numbers, and whether the
+    last line ends: of one that does not, the last number may be cut off.
+    """
     name, text = read_text(source)
     rows, comments = [], []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -402,12 +404,12 @@ def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str]]
             rows.append((number, line.replace(",", " ").split()))
     if not rows:
         raise InputError(f"{name}: no line with numbers")
-    return name, rows, comments
+    return name, rows, comments, text.endswith("\n")
 
 
 def _yade_links(source: Source, named: bool) -> Table:
     """A Table of interactions, with the names of the file if valid, otherwise the standard ones."""
-    name, rows, comments = _split(source)
+    name, rows, comments, _ = _split(source)
     words = [word.lower() for word in rows[0][1]]
     if words[0].lstrip("+-").replace(".", "").isdigit():
         words = comments[-1].split() if comments else []
@@ -422,7 +424,7 @@ def _yade_links(source: Source, named: bool) -> Table:
 
 def _yade_bodies(source: Source) -> Table:
     """A Table of bodies, with columns given by the format and the last comment."""
-    name, rows, comments = _split(source)
+    name, rows, comments, _ = _split(source)
     formats = [words[-1] for words in map(str.split, comments) if words[:1] == ["format"]]
     header = (formats[0] if formats else "x_y_z_r").removesuffix("_attrs").split("_")
     more = len(rows[0][1]) - len(header)
@@ -438,7 +440,7 @@ def _yade_bodies(source: Source) -> Table:
 
 def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
     """The complete time steps, at least one, and a description of one that is cut off."""
-    name, rows, _ = _split(source)
+    name, rows, _, ended = _split(source)
     at = 0
     steps: list[_TimeStep] = []
     while at < len(rows):
@@ -456,8 +458,8 @@ def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
         if not (count.is_integer() and 0 < count):
             raise InputError(f"{name}, line {number}: {fields[0][:20]} particles are announced")
         left = left[: int(count)]
-        ends = at + 1 + len(left) == len(rows)
-        if steps and ends and (len(left) < count or len(left[-1][1]) < len(left[0][1])):
+        whole = ended and len(left) == count and len(left[-1][1]) >= len(left[0][1])
+        if steps and at + 1 + len(left) == len(rows) and not whole:
             return steps, lost
         if len(left) < count:
             raise InputError(
@@ -471,8 +473,15 @@ def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
 
 def _mercury_contacts(source: Source) -> tuple[Table, Floats, bool]:
     """A Table of the contacts, their times, and whether the last line is cut off."""
-    name, rows, _ = _split(source)
-    cut = len(rows) > 1 and len(rows[-1][1]) < len(_FSTAT)
-    rows = rows[:-1] if cut else rows
-    table = make_table(name, _FSTAT, [fields for _, fields in rows], [k for k, _ in rows])
-    return table, table.numbers("time"), cut
+    name, rows, _, ended = _split(source)
+    short = len(rows) > 1 and len(rows[-1][1]) < len(_FSTAT)
+    whole = rows[:-1] if short else rows
+    table = make_table(name, _FSTAT, [fields for _, fields in whole], [k for k, _ in whole])
+    times = table.numbers("time")
+    if short and len(np.unique(times)) == 1:
+        number, fields = rows[-1]
+        raise InputError(
+            f"{name}, line {number}: {len(fields)} fields where there should be {len(_FSTAT)}; is "
+            "the file cut off?"
+        )
+    return table, times, short or not ended

@@ -57,6 +57,7 @@ class Dump(NamedTuple):
     name: str
     lines: list[str]
     at: dict[int, range]  # {timestep: its lines}, in the file's order; the last of equal ones
+    ended: bool  # whether the last line ends: of one that does not, the last number may be cut off
 
     def items(self, step: int) -> dict[str, _Item]:
         """The items of a snapshot by their titles."""
@@ -72,9 +73,11 @@ class Dump(NamedTuple):
         return found
 
     def is_cut(self, step: int) -> bool:
-        """Whether the file ends before all rows of a snapshot."""
+        """Whether the file ends before all rows of a snapshot, or within the last."""
         if self.at[step].stop != len(self.lines):
             return False
+        if not self.ended:
+            return True
         items = self.items(step)
         number = items.get("NUMBER OF")
         item = items.get(" ".join(number.words)) if number else None
@@ -180,7 +183,7 @@ def read_dump(source: Source) -> Dump:
         step = _whole("" if number is None else lines[line].split()[0], name, line + 1)
         at.pop(step, None)
         at[step] = range(start, end)
-    return Dump(name, lines, at)
+    return Dump(name, lines, at, text.endswith("\n"))
 
 
 def _title(heading: str) -> tuple[str, list[str]]:
