@@ -25,9 +25,9 @@ class _Bodies(NamedTuple):
 def read_blocks(
     source: Source, *, mu: Any, density: Any = None, tolerance: float | None = None
 ) -> Packing:
-    """A Packing of rigid bodies from a file (path or open file), as `blocks` makes it.
+    """A Packing of rigid bodies from a file, as `blocks` makes it.
 
-    CSV: a row for each corner, columns body (any label), x, y; optionally r (above 0: the row is a
+    source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y; optionally r (above 0: the row is a
     disk), and density and fixed (0 or 1), alike in all rows of a body. JSON: an object {"bodies":
     […]} of objects with corners [[x, y], …] or disk [x, y, r], and optionally density and fixed
     (true or false). mu: friction coefficient of all contacts. density: mass per area of the bodies
