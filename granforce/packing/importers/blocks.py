@@ -27,12 +27,12 @@ def read_blocks(
 ) -> Packing:
     """A Packing of rigid bodies from a file, as `blocks` makes it.
 
-    source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y; optionally r (above 0: the row is a
-    disk), and density and fixed (0 or 1), alike in all rows of a body. JSON: an object {"bodies":
-    […]} of objects with corners [[x, y], …] or disk [x, y, r], and optionally density and fixed
-    (true or false). mu: friction coefficient of all contacts. density: mass per area of the bodies
-    that have none in the file, by default 1. tolerance: as for `blocks`. packing.info has notes on
-    pairs in doubt, and lists them.
+    source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y;
+    optionally r (above 0: the row is a disk), and density and fixed (0 or 1), alike in all rows of
+    a body. JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or disk [x, y, r],
+    and optionally density and fixed (true or false). mu: friction coefficient of all contacts.
+    density: mass per area of the bodies that have none in the file, by default 1. tolerance: as for
+    `blocks`. packing.info has notes on pairs in doubt, and lists them.
 
     Raises InputError naming the line or the body, NotJammedError if nothing balances the weights.
     """
