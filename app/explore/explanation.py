@@ -10,6 +10,13 @@ from ..widgets.header import Header
 from ..widgets.hints import term
 
 QUESTION = "What am I seeing? Why more than one force network?"
+FRICTION = (
+    "<p><b>How friction matters.</b> Each μ has its own packing. More friction "
+    "lets each contact carry a wider range of forces, but a packing made with more friction "
+    "comes to rest with fewer contacts, so fewer forces are free. With little friction many "
+    "directions are open, but narrow; with a lot of it few, but wide: the indeterminacy "
+    "rises and then falls, and is largest around μ = 0.2 to 0.3.</p>"
+)
 
 
 def summary_html(replay: Replay) -> str:
@@ -57,22 +64,21 @@ def rest(replay: Replay) -> str:
             f"indeterminacy. {term('s')} is the set of networks in which no contact pulls (fₙ ≥ "
             "0) and none slips (|fₜ| ≤ μ fₙ)."
         )
-    return worded(
-        replay,
+    text = (
         f"<p><b>Why not just one?</b> {why}</p><p><b>How undetermined?</b> {term('eta1')}: how "
         f"much a contact's force varies between networks. {term('eta2')}: how far apart two "
         f"networks are. {term('eta3')}: how long the intervals of possible forces are. All are "
         "relative to typical forces: 0 means determined, 0.1 means uncertain by about a "
-        "tenth.</p><p><b>How friction matters.</b> Each μ has its own packing. More friction "
-        "lets each contact carry a wider range of forces, but a packing made with more friction "
-        "comes to rest with fewer contacts, so fewer forces are free. With little friction many "
-        "directions are open, but narrow; with a lot of it few, but wide: the indeterminacy "
-        "rises and then falls, and is largest around μ = 0.2 to 0.3.</p><p><b>Where the networks "
+        "tenth.</p><p><b>Where the networks "
         f"come from.</b> {term('walk')}: perturb all forces at random, move to the nearest "
         f"network in balance, and repeat. The {term('original')} is the one it came to rest with. "
-        f"All this follows {term('paper')}.</p><p><b>Around the picture.</b> Dashed: the "
-        f"box{_sides(replay)}; disks outside it are periodic copies of those inside.</p>",
+        f"All this follows {term('paper')}.</p>"
     )
+    around = (
+        f"<p><b>Around the picture.</b> Dashed: the box{_sides(replay)}; disks outside it are "
+        "periodic copies of those inside.</p>"
+    )
+    return worded(replay, text) if replay.outlines else text + FRICTION + around
 
 
 def _sides(replay: Replay) -> str:
