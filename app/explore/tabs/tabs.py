@@ -48,6 +48,8 @@ h2 {
 """
 PLOTTED = ("intervals", "plane", "statistics", "perturb")  # what can be saved with the packing
 PLANE = list(TABS).index("plane")
+# At once, however busy the server; `Tabs._place` does the same for changes from there.
+SHOW = f"space.visible = source.active === {PLANE} || matchMedia('(min-width: 1800px)').matches"
 GROWING = ("intervals", "plane")  # views that show a walk during its computation
 
 
@@ -74,6 +76,7 @@ class Tabs:
             sx=LOOK,
             sizing_mode="stretch_width",
         )
+        self.tabs.jscallback(args={"space": space}, active=SHOW)
         self.pages["plane"] = space
         for page in self.pages.values():
             page[:] = [note(OPENING)]
