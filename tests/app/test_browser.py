@@ -11,6 +11,7 @@ from serving import (
     ask,
     at_rest,
     column,
+    frames,
     how_it_is_made,
     more,
     no_more,
@@ -294,12 +295,6 @@ def test_chains_are_coloured_by_what_is_chosen(visit, colour):
 # Playing
 
 
-FRAMES = """count => new Promise((done) => {
-    const next = () => (count-- > 0 ? requestAnimationFrame(next) : done())
-    next()
-})"""
-
-
 def test_play_changes_the_chains_without_the_server(page):
     searched(page, "paused=1", "open=check")
     page.locator("input.speed").fill("2")
@@ -316,7 +311,7 @@ def test_play_changes_the_chains_without_the_server(page):
     page.locator("button.play").click()
     after = scene(page, "[scene.painted, Array.from(scene.style.width)]")
     assert after[1] != before[1]
-    page.evaluate(FRAMES, 20)
+    frames(page, 20)
     assert scene(page, "scene.painted") <= after[0] + 1
 
 

@@ -15,6 +15,7 @@ from serving import (
     PATIENCE,
     bars_drawn,
     column,
+    frames,
     scene,
     searched,
     serve,
@@ -33,19 +34,20 @@ def filled(page, source, least=3):
     page.wait_for_function(f"() => {MODEL}('{source}')?.get_length() >= {least}")
 
 
-def figure_of(page, source):
-    """px per unit along x and y of the plot that shows a source."""
-    return page.evaluate(
+def to_scale(page, source):
+    """Wait until a unit is as long along x as along y in the plot that shows a source."""
+    page.wait_for_function(
         """name => {
             const models = [...Bokeh.documents[0].all_models]
             const source = models.find((model) => model.name === name)
             const fig = models.find((model) => model.type === "Figure" &&
                 model.renderers.some((renderer) => renderer.data_source === source))
             const {inner_width, inner_height, x_range, y_range} = fig
-            return [inner_width / (x_range.end - x_range.start),
-                    inner_height / (y_range.end - y_range.start)]
+            const across = inner_width / (x_range.end - x_range.start)
+            const up = inner_height / (y_range.end - y_range.start)
+            return Math.abs(across - up) <= 1e-3 * up
         }""",
-        source,
+        arg=source,
     )
 
 
@@ -60,7 +62,7 @@ def drawn(page, number=1):
         }""",
         arg=number,
     )
-    page.wait_for_timeout(300)
+    frames(page, 2)
 
 
 def download(page, action, folder):
@@ -76,9 +78,7 @@ def download(page, action, folder):
 def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
     page = visit(f"?tab=plane&axes=principal&dark={dark}", width, 1000 if width > 400 else 2200)
     filled(page, "outer")
-    page.wait_for_timeout(500)
-    across, up = figure_of(page, "path")
-    assert across == pytest.approx(up, rel=1e-3)
+    to_scale(page, "path")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     path = np.stack([column(page, "path", name) for name in "xy"], axis=1)
     assert len(path) == KEPT + 1
@@ -329,7 +329,8 @@ def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
         pages = [visit(at=url) for _ in range(3)]
         for tab in ("Friction", "Force space", "Push", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()
-            pages[0].wait_for_timeout(500)
+        # The last tab is there once all before it have been built.
+        pages[0].get_by_role("button", name="SVG", exact=True).wait_for()
         wait_for([3])
         for page in pages:
             page.close()
