@@ -562,6 +562,11 @@ def test_disks_without_support_are_answered_with_walls_and_gravity(cache, capsys
         assert main(["import", "table", "pile.csv", "--mu", "0.6", *words]) == 2
         error = capsys.readouterr().err
         assert said in error and error.count("\n") == 1
+    rows = "i,j,fn,ft\n0,2,0.9,0.1\n1,2,0.9,-0.1\n"
+    Path("forces.csv").write_text(rows)
+    assert main(["import", "table", "pile.csv", "forces.csv", "--mu", "0.6"]) == 0
+    told = capsys.readouterr().err
+    assert "contacts do not balance 3 of 3 grains" in told and "--walls and --gravity" in told
     with pytest.raises(gf.NotJammedError, match="walls="):
         gf.from_disks([[1, 1], [3, 1]], [1, 1], mu=0.6, gravity=1)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
-from granforce.packing.importers.network import adopt, find
+from granforce.packing.importers.network import LOAD_MISFIT, adopt, find
 from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
 from granforce.records import (
     Contacts,
@@ -98,7 +98,22 @@ def read_table(
         return find(packing, forces="found")
     if walls is not None or gravity:
         raise InputError("walls and gravity apply to tables without forces: leave out fn and ft")
-    return adopt(packing, reverse=reverse, forces="given")
+    found = adopt(packing, reverse=reverse, forces="given")
+    return found if closed or load.any() else _with_edge(found)
+
+
+def _with_edge(packing: Packing) -> Packing:
+    """The open packing with a note on grains that their contacts do not balance."""
+    off = np.abs(packing.load).max(axis=1) > LOAD_MISFIT * packing.forces[:, 0].mean()
+    if not off.any():
+        return packing
+    note = (
+        f"contacts do not balance {off.sum()} of {len(off)} grains: what is left over counts as a "
+        "load on them; for walls and weights instead, leave out the forces and give --walls and "
+        "--gravity (walls=, gravity=)"
+    )
+    notes = [*packing.info.get("notes", []), note]
+    return packing._replace(info=packing.info | {"notes": notes})
 
 
 def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:
