@@ -239,7 +239,7 @@ def pressed(x, wall):
     ("call", "words"),
     [
         (lambda: gf.scene("grove"), "choose one of groove, box"),
-        (lambda: gf.scene("box", disks=3), "no option disks"),
+        (lambda: gf.scene("box", disks=3), "no option 'disks'"),
         (lambda: gf.scene("groove", angle=200), "angle must lie between 10 and 180"),
         (lambda: gf.scene("groove", -1), "friction"),
         (lambda: assembled([[0, 0], [0, 1]], [1, 1], [], np.zeros((2, 3)), 0), "two disks overlap"),
