@@ -78,6 +78,7 @@ _HOME = {
     "Pull": "explore.pull",
     "reach": "explore.pull",
     "Reach": "explore.pull",
+    "admissible_stress": "explore.stress_outline",
     "stress_outline": "explore.stress_outline",
     "StressOutline": "explore.stress_outline",
     "stress_plane": "explore.stress_outline",

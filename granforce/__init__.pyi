@@ -41,6 +41,7 @@ from granforce.explore.random_walk import Found as Found
 from granforce.explore.random_walk import Walk as Walk
 from granforce.explore.random_walk import walk as walk
 from granforce.explore.stress_outline import StressOutline as StressOutline
+from granforce.explore.stress_outline import admissible_stress as admissible_stress
 from granforce.explore.stress_outline import stress_outline as stress_outline
 from granforce.explore.stress_outline import stress_plane as stress_plane
 from granforce.explore.uniform import UniformSample as UniformSample

@@ -89,7 +89,9 @@ TERMS = {
     ),
     "mean_force": Term(
         "mean normal force",
-        "The mean of fₙ over the contacts; the unit of force on the page and in the figures.",
+        "The mean of fₙ over the contacts that can carry force, weighted by the distance of their "
+        "centres. The pressure fixes it: it is the same in all networks, and the unit of force on "
+        "the page and in the figures.",
         "⟨fₙ⟩",
     ),
     "extent": Term(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -16,6 +17,9 @@ from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
 COMPONENTS = ["f_n", "f_t"]
+# The word for a unit of force in the name of a column, and its name in attributes.
+UNITS = {"packing": "force", "mean": "mean normal force"}
+_COLUMN = re.compile(r"(?:(f_n|f_t)(?:_|(?= |$)))?(.*?)(?: \[([^]]*)\])?")
 _SAMPLE = {
     "flat": "state contact component",
     "chain": "state",
@@ -71,7 +75,7 @@ _DIMENSIONS = {
     "Inference": {"forces": "contact component", "deviation": "contact component"},
     "Remeasured": {"forces": "contact component", "deviation": "contact component"},
     "Carrying": {"least": "contact", "carries": "contact"},
-    "Informative": {"expected": "contact", "after": "contact"},
+    "Informative": dict.fromkeys(("expected", "reduction", "after"), "contact"),
     "Loaded": {
         "states": "load contact component",
         **dict.fromkeys(("residual", "violation"), "load"),
@@ -82,10 +86,41 @@ _DIMENSIONS = {
         **dict.fromkeys(("opening", "opened", "slid", "kept"), "contact"),
     },
 }
-_RENAMED = {"flat": "states", "x": "centre", "r": "radius"}
-# In the packing's unit of force; residuals, violations and duality gaps are in ⟨f_n⟩.
-_FORCES = ("states", "forces", "low", "high", "load", "limit_load", "least", "origin")
-_RELATIVE = ("residual", "violation", "gap")
+# Names of variables, as in tables of the command line.
+_RENAMED = {
+    "Packing": {"x": "centre", "r": "radius"},
+    "UniformSample": {"flat": "states"},
+    "Draws": {"flat": "states"},
+    "LimitLoads": {"load": "limit_load"},
+    "_CriticalForces": {"low": "critical_low", "high": "critical_high"},
+    "Carrying": {"least": "f_n_least"},
+    "Informative": {
+        "expected": "part_expected",
+        "reduction": "part_shorter",
+        "after": "mean_interval_after",
+    },
+}
+# Units of variables; forces are in the packing's unit.
+_VARIABLE_UNITS = {
+    **dict.fromkeys(("states", "forces", "low", "high", "load", "limit_load", "origin"), "force"),
+    **dict.fromkeys(("f_n_least", "critical_low", "critical_high"), "force"),
+    **dict.fromkeys(("residual", "violation", "gap", "mean_interval_after"), UNITS["mean"]),
+    **dict.fromkeys(("centre", "radius"), "length"),
+    "deviation": "sigma",
+}
+
+
+def column_name(component: str | None, variable: str, unit: str | None = None) -> str:
+    """The name of a column: f_n_low [packing], from "f_n", "low" and "packing"."""
+    name = "_".join(part for part in (component, variable) if part)
+    return f"{name} [{unit}]" if unit else name
+
+
+def parts(column: str) -> tuple[str | None, str, str | None]:
+    """Component, variable and unit in the name of a column; forces have no variable there."""
+    match = _COLUMN.fullmatch(column)
+    assert match  # any text does
+    return match[1], match[2], match[3]
 
 
 class _CriticalForces(NamedTuple):
@@ -145,10 +180,9 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
-        variable = _RENAMED.get(name, name)
-        unit = "force" if variable in _FORCES else "mean normal force"
-        attrs = {"units": unit} if variable in (*_FORCES, *_RELATIVE) else {}
-        variables[variable] = (words.split(), arrays[name], attrs)
+        variable = _RENAMED.get(type(result).__name__, {}).get(name, name)
+        units = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
+        variables[variable] = (words.split(), arrays[name], units)
     try:
         labels = _labels(result)
         if used & {"contact", "grain"}:
@@ -162,24 +196,28 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
 def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
     """The same as a pandas table: a row for each contact, or for each contact in each state.
 
-    Columns: contact, i, j, x, y, then f_n and f_t for networks, and with a prefix for other arrays:
-    low_f_n, high_f_t; forces in the packing's unit. A Volume has a row for each ladder, an Outline
-    for each corner, a Body for each contact along each direction. Arguments and errors as for
-    `to_dataset`.
+    Columns have the names of the tables of the command line: contact, i, j, x, y, then component,
+    variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
+    `read_known` and ``--known`` read the file that the table's `to_csv` writes. A Volume has a row
+    for each ladder, an Outline for each corner, a Body for each contact along each direction.
+    Arguments and errors as for `to_dataset`.
     """
     dataset = to_dataset(result, ensemble)
     if "contact" not in dataset.sizes:
         return _corners(dataset) if "corner" in dataset.sizes else dataset.to_dataframe()
+    words = {units: word for word, units in UNITS.items()} | {"sigma": "sigma"}
     columns = {}
     for name, values in dataset.data_vars.items():
         if "contact" not in values.dims or "side" in values.dims[1:]:
             continue
+        unit = words.get(values.attrs.get("units", ""))
         if "component" not in values.dims:
-            columns[name] = values
+            columns[column_name(None, str(name), unit)] = values
             continue
+        variable = "" if name in ("states", "forces") else str(name)
         for part in COMPONENTS:
-            label = part if name in ("states", "forces") else f"{name}_{part}"
-            columns[label] = values.sel(component=part, drop=True)
+            one = values.sel(component=part, drop=True)
+            columns[column_name(part, variable, unit)] = one
     order = [
         name
         for name in ("chain", "state", "value", "load", "side", "direction")

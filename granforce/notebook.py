@@ -5,6 +5,10 @@ Plain arrays and numbers in, text out: every package may use this; it needs no p
 
 from __future__ import annotations
 
+import itertools
+import linecache
+import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple, TypeVar
@@ -29,9 +33,42 @@ COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
 
 
 def brief(record: type[T]) -> type[T]:
-    """A decorator: the repr of a record (named tuple or dataclass) fits into a line or two."""
+    """A decorator: the repr of a record (named tuple or dataclass) fits into a line or two.
+
+    `help` shows the comments on its fields, with their shapes and units.
+    """
     record.__repr__ = _short  # type: ignore[method-assign]
+    comments = _comments(record)
+    fields = getattr(record, "_fields", None)
+    if fields is not None:
+        for name in comments.keys() & set(fields):
+            getattr(record, name).__doc__ = comments[name]
+    else:
+        told = (f"    {name}: {comments[name]}" for name in record.__annotations__)
+        record.__doc__ = "\n".join([record.__doc__ or "", "", *told])
     return record
+
+
+_FIELD = re.compile(r"    (\w+): ([^#]*?)(?: = [^#]*)?(?:  # (.*))?\n")
+
+
+def _comments(record: type) -> dict[str, str]:
+    """The comments above and beside the fields of a class in its source; without any, the type."""
+    lines = iter(linecache.getlines(str(sys.modules[record.__module__].__file__)))
+    head = f"class {record.__name__}(", f"class {record.__name__}:"
+    comments: dict[str, str] = {}
+    above: list[str] = []
+    for _ in itertools.dropwhile(lambda line: not line.startswith(head), lines):
+        break
+    for line in itertools.takewhile(lambda line: line.startswith(("    ", "\n")), lines):
+        if line.startswith("    # "):
+            above.append(line.strip("# \n"))
+            continue
+        if field := _FIELD.fullmatch(line):
+            name, kind, beside = field.groups()
+            comments[name] = " ".join([*above, beside] if beside else above) or kind.strip()
+        above = []
+    return comments
 
 
 def _short(record: Any) -> str:
@@ -84,6 +121,9 @@ def _text(value: Any) -> str:
     return str(value)
 
 
+brief(Cell)  # whose file lies below this one
+
+
 class Picture(NamedTuple):
     """The contents of a picture of a packing, as arrays."""
 
@@ -95,6 +135,7 @@ class Picture(NamedTuple):
     forces: Floats  # (N_c, 2) f_n, f_t
     mu: float
     packing_fraction: float  # NaN in an open box
+    grains: int  # whose balance is required: without walls
     polygons: Sequence[Floats]  # (k, 2) corners of each body, empty for a disk; none if all are
 
 
@@ -216,12 +257,9 @@ def _chains(packing: Picture, place: Callable[[Floats], Floats], scale: float) -
 def _words(packing: Picture) -> list[str]:
     """The numbers of a packing in two lines."""
     normal = packing.forces[:, 0]
-    pressing = normal[normal > 0]
+    pressing = np.count_nonzero(normal > 0)
     kind = "bodies" if packing.polygons else "disks"
-    first = [f"{len(packing.r)} {kind}", f"μ = {packing.mu:g}"]
+    first = [f"{packing.grains} {kind}", f"μ = {packing.mu:g}"]
     if np.isfinite(packing.cell.box).all():
         first.append(f"φ = {packing.packing_fraction:.4f}")
-    second = [f"{len(pressing)} of {len(normal)} contacts press"]
-    if len(pressing):
-        second.append(f"⟨fₙ⟩ = {pressing.mean():.4g}")
-    return [", ".join(first), ", ".join(second)]
+    return [", ".join(first), f"{pressing} of {len(normal)} contacts press"]

@@ -178,6 +178,7 @@ class Packing(NamedTuple):
                 forces=self.forces,
                 mu=self.mu,
                 packing_fraction=self.packing_fraction,
+                grains=int(np.isfinite(self.load).all(axis=1).sum()),
                 polygons=() if self.shapes is None else self.shapes.polygons(),
             )
         )

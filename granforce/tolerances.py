@@ -51,6 +51,9 @@ FLAT = 1e-12
 # Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
 INTERVAL_GAP = 1e-8
 
+# Contacts whose normal forces have a correlation this close to ±1 over states determine each other.
+TWINS = 1e-9
+
 # Bounds are in the wrong order if the least value exceeds the largest by more than this part of the
 # largest force: by rounding they may differ by a few INTERVAL_GAP.
 REVERSED = 1e-6

@@ -138,6 +138,7 @@ CALLS = {
     "pull": lambda S, _: gf.pull(S, S.index[0], [S.original[0, 0]]),
     "reach": lambda S, _: gf.reach(S, S.index[0]),
     "stress_outline": lambda S, _: gf.stress_outline(S, 8),
+    "admissible_stress": lambda S, _: gf.admissible_stress(S),
     "stress_plane": lambda S, _: gf.stress_plane(S, S.original),
     "critical_force": lambda S, _: gf.critical_force(S, S.index[0]),
     "critical_forces": lambda S, _: gf.critical_forces(S, S.index[:2]),

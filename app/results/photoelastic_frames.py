@@ -27,7 +27,7 @@ CERTAIN = 2.0  # standard errors above 0 from which a contact certainly carries 
 
 
 class Frame(NamedTuple):
-    """A frame and its likeliest admissible network; forces in ⟨f_n⟩."""
+    """A frame and its likeliest admissible network; forces in the mean measured f_n."""
 
     source: str  # names of its files
     report: dict[str, Any]  # report of read_pegs
@@ -154,10 +154,12 @@ def table(frame: Frame) -> bytes:
     x, y = frame.lines.mean(axis=1).T
     columns = {"contact": np.arange(len(one)), "id1": one, "id2": two, "x": x, "y": y}
     for name, values in (
-        ("measured", frame.measured), ("inferred", frame.inferred), ("error", frame.error),
-        ("sigmas_off", frame.deviation),
-    ):  # fmt: skip
-        columns |= {f"{name}_f_{part}": values[:, k] for k, part in enumerate("nt")}
+        ("measured [mean measured]", frame.measured),
+        ("inferred [mean measured]", frame.inferred),
+        ("error [mean measured]", frame.error),
+        ("deviation [sigma]", frame.deviation),
+    ):
+        columns |= {f"f_{part}_{name}": values[:, k] for k, part in enumerate("nt")}
     columns |= {"added": frame.added.astype(int), "suspect": suspect, "certain": certain}
     columns |= {"region": frame.region}
     unit = frame.report["mean_measured_normal_force"]
@@ -210,10 +212,11 @@ def account(report: dict[str, Any]) -> Iterator[str]:
     yield _left(report)
     yield (
         "The admissible network nearest to the measurement differs from it by "
-        f"{count('mean_change_of_f_n'):.2f} ⟨fₙ⟩ in fₙ and {count('mean_change_of_f_t'):.2f} ⟨fₙ⟩ "
-        f"in fₜ on average; {count('candidates_that_carry')} of the added contacts carry force in "
+        f"{count('mean_change_of_f_n'):.2f} ⟨mₙ⟩ in fₙ and {count('mean_change_of_f_t'):.2f} ⟨mₙ⟩ "
+        f"in fₜ on average, in units of the mean measured normal force ⟨mₙ⟩; "
+        f"{count('candidates_that_carry')} of the added contacts carry force in "
         "it. It is one of many: unmeasured forces may differ. The standard error of "
-        f"{count('error'):.2f} ⟨fₙ⟩ was estimated from how far the measured forces are from "
+        f"{count('error'):.2f} ⟨mₙ⟩ was estimated from how far the measured forces are from "
         "balance."
     )
 
@@ -244,6 +247,6 @@ def _left(report: dict[str, Any]) -> str:
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
         f"With them {len(names)} inner disks still cannot be balanced; the remaining unbalance is "
-        f"{report['unbalance']:.2g} ⟨fₙ⟩ in sum: their balance was left open (disks "
+        f"{report['unbalance']:.2g} ⟨mₙ⟩ in sum: their balance was left open (disks "
         f"{', '.join(map(str, names[:NAMED]))}{more})."
     )

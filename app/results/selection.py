@@ -221,7 +221,7 @@ def of_packing(selection: Selection) -> list[Any]:
     """Words of a command that select a packing and μ."""
     packing = selection.packing
     if selection.imported:
-        words = ["--packing", f"{packing.get('scene', 'PACKING')}.npz"]
+        words = [f"{packing.get('scene', 'PACKING')}.npz"]
     else:
         words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
         for name, value in unusual(packing).items():

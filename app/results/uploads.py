@@ -92,7 +92,7 @@ def _columns(content: bytes) -> set[str]:
 def needs_box(files: Files) -> bool:
     """Whether these are tables without anything that confines the disks: no load, no force."""
     named = [_columns(files[part][1]) for part in ("grains", "joined") if part in files]
-    return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn"}
+    return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn", "f_n"}
 
 
 def _photoelastic(content: bytes) -> str | None:

@@ -366,7 +366,7 @@ def ranking(
         stage = "the best contacts to measure next"
 
         def watch(found: Any) -> None:
-            job.so_far = ranked(*found)
+            job.so_far = ranked(*found[:4])
 
         found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
         names = "backbone", "part_expected", "mean_before", "mean_after"

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, with_units, write_csv
+from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, with_units
+from granforce.cli.tables import write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots
@@ -115,11 +116,12 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
 
 
 def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:
-    """A row for each frame; ⟨f_n⟩ is its mean measured normal force."""
+    """A row for each frame; word: packing, or mean for its mean measured normal force."""
     rows = []
     for k, number in enumerate(dataset["frame"].values.tolist()):
         one = dataset.isel(frame=k)
-        unit = Unit("mean", float(dataset["unit"][k])) if word == "mean" else PACKING_UNIT
+        mean = Unit("mean measured", float(dataset["unit"][k]))
+        unit = mean if word == "mean" else PACKING_UNIT
         account = dict(zip(dataset["kind"].values, one["account"].values, strict=True))
         mended = sum(int(account[kind]) for kind in KINDS if kind != "beyond_friction")
         rows.append(

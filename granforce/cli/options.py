@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
@@ -194,14 +195,27 @@ def add_packing(command: Parser, several: bool = False) -> None:
     )
 
 
-def add_any_packing(command: Parser) -> None:
+def add_packing_file(command: Parser, needed: bool = True) -> None:
     command.add_argument(
-        "--packing", type=Input, metavar="FILE.npz", help="use this packing instead of making one"
+        "packing",
+        type=Input,
+        nargs=None if needed else "?",
+        metavar="FILE.npz",
+        help="the packing" if needed else "use this packing instead of making one",
     )
+
+
+def add_any_packing(command: Parser) -> None:
+    add_packing_file(command, needed=False)
+    add_made_packing(command, lambda arguments: arguments.packing is not None)
+
+
+def add_made_packing(command: Parser, given: Callable[[argparse.Namespace], bool]) -> None:
+    """Add the options of a packing to be made, refused where a file has been given."""
     others = set(command.options)
     add_packing(command)
-    own = command.options.keys() - others
-    command.leaves_out("with --packing", lambda arguments: arguments.packing is not None, own)
+    made = command.options.keys() - others
+    command.leaves_out("with the file of a packing", given, made)
 
 
 def add_conditions(command: Parser, known: bool = True) -> None:
@@ -294,6 +308,16 @@ def add_out(command: argparse._ActionsContainer, what: str) -> None:
     )
 
 
+def add_picture(command: Parser) -> None:
+    command.add_argument(
+        "--out",
+        type=Output,
+        required=True,
+        metavar="FILE.{png,svg,pdf,html}",
+        help="write the picture, or a page to zoom into (.html)",
+    )
+
+
 def add_states_out(command: Parser) -> None:
     add_out(command, "the states")
     add_unit(command)
@@ -347,7 +371,7 @@ def add_reading(group: argparse._ActionsContainer) -> None:
     )
     add_reverse(group)
     add_columns(
-        group, "headers, or numbers from 1, of the columns frame, id, x, y, r, flag, i, j, ft, fn"
+        group, "headers, or numbers from 1, of the columns frame, id, x, y, r, flag, i, j, f_t, f_n"
     )
 
 

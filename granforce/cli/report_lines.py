@@ -29,13 +29,16 @@ MEANINGS = {
     "programs": "linear programs solved",
     "again": "programs solved a second time, with refined steps or by HiGHS",
     "part_expected": "part by which errors of f_n fall once this one is known",
+    "part_shorter": "part by which the mean interval of f_n shortens, by exact bounds",
     "mean_interval_after": "mean interval of f_n once this one is known",
+    "twins": "contacts whose measurement would give the same; the table counts them",
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
     "shear_stress_from_to": "range of σ_xy/P that the contacts can carry",
     "admissible_stress": "a stress well inside, as --stress takes it",
     # of a packing
-    "grains": "disks or bodies, the fixed ones too",
-    "bodies": "bodies, the fixed ones too",
+    "grains": "disks or bodies whose balance is required: backbone and rattlers",
+    "grains_left_open": "all others, such as walls and fixed bodies",
+    "bodies": "bodies whose balance is required",
     "contacts": "number of contacts",
     "backbone_grains": "grains that can carry force",
     "backbone_contacts": "contacts that can carry force",
@@ -44,7 +47,7 @@ MEANINGS = {
     "pressure": "pressure P0; undefined in an open packing",
     "packing_fraction": "packing fraction φ, rattlers included",
     "coordination": "mean coordination number z of the backbone",
-    "mean_normal_force": "mean normal force ⟨f_n⟩",
+    "mean_normal_force": "mean normal force ⟨f_n⟩, weighted with the distance of centres",
     "residual": "largest unbalance of a grain, in ⟨f_n⟩",
     "violation": "largest excess over Coulomb's law, in ⟨f_n⟩",
     "largest_overlap": "of two bodies, in largest radii",
@@ -129,9 +132,10 @@ MEANINGS = {
 _STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
 _CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
 PACKING = (
-    *("grains", "contacts", "backbone_grains", "backbone_contacts", "rattlers", "friction"),
-    *("pressure", "packing_fraction", "coordination", "dimension", "mean_normal_force"),
-    *("residual", "violation", "largest_overlap", "largest_contact_gap", "least_other_gap"),
+    *("grains", "grains_left_open", "contacts", "backbone_grains", "backbone_contacts"),
+    *("rattlers", "friction", "pressure", "packing_fraction", "coordination", "dimension"),
+    *("mean_normal_force", "residual", "violation", "largest_overlap", "largest_contact_gap"),
+    "least_other_gap",
 )
 PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "cached")
 IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
@@ -171,7 +175,8 @@ LOAD_FACTOR = (
     *("critical_factor_high", "residual", "breach", "converged"),
 )
 INFORMATIVE = (
-    *("entry", "mean_interval_now", "part_expected", "mean_interval_after", "seconds", "cached"),
+    *("entry", "mean_interval_now", "part_expected", "part_shorter", "mean_interval_after"),
+    *("twins", "seconds", "cached"),
 )
 STRESS = (
     *("dimension", "largest_shear_over_pressure", "certainly_not_above"),

@@ -3,7 +3,6 @@
 import argparse
 import threading
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,15 +10,16 @@ import xarray as xr
 
 from granforce import measures
 from granforce.glossary import RELAXATIONS
+from granforce.labelled import column_name
 from granforce.packing import importers
 from granforce.records import InputError, Packing, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
-from granforce.study.series import check_folder, save_series
+from granforce.study.series import check_folder
 from granforce.study.store import Store, open_store
-from granforce.system.files import check_file, content_of, written
+from granforce.system.files import check_file, content_of
 from granforce.system.terminal import Bar
 
 
@@ -192,7 +192,10 @@ class Unit(NamedTuple):
 
     def named(self, forces: Mapping[str, Any]) -> dict[str, Any]:
         """Named forces converted from the packing's unit to this one, which is added to names."""
-        return {f"{name} [{self.word}]": values / self.scale for name, values in forces.items()}
+        return {
+            column_name(None, name, self.word): values / self.scale
+            for name, values in forces.items()
+        }
 
     def reported(self, forces: Mapping[str, Any]) -> dict[str, Any]:
         """The same as plain numbers and lists."""
@@ -205,15 +208,16 @@ PACKING_UNIT = Unit("packing", 1.0)
 # Forces in reports on packings, which have one fixed unit.
 _REPORTED = {
     "mean_normal_force": "packing",
-    "mean_change_of_f_n": "mean",
-    "mean_change_of_f_t": "mean",
+    "mean_measured_normal_force": "packing",
+    "mean_change_of_f_n": "mean measured",
+    "mean_change_of_f_t": "mean measured",
 }
 
 
 def with_units(lines: Mapping[str, Any]) -> dict[str, Any]:
     """A report on a packing, with the units of forces in the names."""
     return {
-        f"{name} [{_REPORTED[name]}]" if name in _REPORTED else name: value
+        column_name(None, name, _REPORTED[name]) if name in _REPORTED else name: value
         for name, value in lines.items()
     }
 
@@ -257,9 +261,6 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
     return lines
 
 
-LABELS = ("i", "j", "x", "y")  # of a contact: its grains, and the point of contact
-
-
 def contact_labels(
     arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
 ) -> dict[str, Any]:
@@ -268,59 +269,3 @@ def contact_labels(
     numbers = dataset["backbone"].values
     contacts, at = packing.contacts.picked(numbers), packing.contact_points[numbers]
     return {"contact": numbers, "i": contacts.i, "j": contacts.j, "x": at[:, 0], "y": at[:, 1]}
-
-
-def write_columns(path: str, columns: Mapping[str, Any]) -> None:
-    """Write columns {name: array} in the format given by the suffix."""
-    if path.endswith(".zarr"):
-        rows, *others = columns
-        data = {name: (rows, columns[name]) for name in others if name not in LABELS}
-        labels = {name: (rows, columns[name]) for name in others if name in LABELS}
-        save_series(xr.Dataset(data, {rows: columns[rows], **labels}), path)
-    elif path.endswith(".npz"):
-        write_arrays(path, columns)
-    else:
-        write_csv(path, columns)
-
-
-def write_arrays(path: str, arrays: Mapping[str, Any]) -> None:
-    with written(path) as file:
-        np.savez(file, **arrays)
-
-
-def write_states(
-    arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
-) -> None:
-    """Write the states of a walk or sample with their contacts to the file of --out."""
-    path = arguments.out
-    if path is None:
-        return
-    labels, forces = contact_labels(arguments, parameters, dataset), unit(arguments, dataset)
-    states = dataset["states"].values.astype(np.float64)
-    if path.endswith(".npz"):
-        write_arrays(path, {**forces.named({"states": states}), **labels})
-    elif path.endswith(".zarr"):
-        (name, values), *_ = forces.named({"states": states}).items()
-        coordinates: dict[str, Any] = {k: ("contact", column) for k, column in labels.items()}
-        coordinates["component"] = ["f_n", "f_t"]
-        dims = ("state", "contact", "component")
-        save_series(xr.Dataset({name: (dims, values)}, coordinates), path)
-    else:
-        count = len(states)
-        columns = {"state": np.repeat(np.arange(count), dataset.sizes["contact"])}
-        columns |= {label: np.tile(column, count) for label, column in labels.items()}
-        pair = {"f_n": states[..., 0].ravel(), "f_t": states[..., 1].ravel()}
-        write_csv(path, columns | forces.named(pair))
-
-
-def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns {name: array} as a table; integers stay integers."""
-    with written(path) as file:
-        np.savetxt(
-            file,
-            np.column_stack(list(columns.values())),
-            fmt=["%d" if v.dtype.kind == "i" else "%.17g" for v in columns.values()],
-            delimiter=",",
-            header=",".join(columns),
-            comments="",
-        )

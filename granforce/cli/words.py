@@ -15,8 +15,11 @@ from granforce.cli.options import (
     add_flaws_and_walls,
     add_frame,
     add_known,
+    add_made_packing,
     add_out,
     add_packing,
+    add_packing_file,
+    add_picture,
     add_reading,
     add_reverse,
     add_scheduler,
@@ -143,7 +146,7 @@ def add_infer(commands: Commands) -> None:
         commands,
         "infer",
         "find the most likely admissible network given measured forces, with error bars",
-        "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1\n"
+        "granforce infer frame.npz --measured frame.csv --unmeasured 1\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
         lines=report_lines.INFER,
     )
@@ -151,9 +154,10 @@ def add_infer(commands: Commands) -> None:
         "files",
         type=Input,
         nargs="*",
-        help="with --frames: a folder, *_solved.mat files, or positions and adjacency",
+        help="a packing: FILE.npz; with --frames: a folder, *_solved.mat files, or positions and "
+        "adjacency",
     )
-    add_any_packing(command)
+    add_made_packing(command, lambda given: given.frames is None and bool(given.files))
     group = command.add_argument_group("the inference")
     group.add_argument(
         "--measured",
@@ -214,7 +218,7 @@ def add_infer(commands: Commands) -> None:
     add_reading(series)
     add_flaws_and_walls(command, series)
     add_scheduler(command)
-    many = command.options.keys() - single - {"frames"} | {"files"}
+    many = command.options.keys() - single - {"frames", "files"}
     command.leaves_out("without --frames", lambda arguments: arguments.frames is None, many)
     command.leaves_out(
         "with --frames", lambda arguments: arguments.frames is not None, single - shared
@@ -258,13 +262,11 @@ def add_measure(commands: Commands) -> None:
         commands,
         "measure",
         "measure the indeterminacy of a walk, optionally for each contact",
-        "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --contacts contacts.csv",
+        "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --out contacts.csv",
         lines=report_lines.MEASURE,
     )
     add_source(command)
-    command.add_argument(
-        "--contacts", type=Output, metavar="FILE.csv", help="write f_n and its interval per contact"
-    )
+    add_out(command, "f_n and its interval per contact")
     add_unit(command)
 
 
@@ -299,9 +301,38 @@ def add_figures(commands: Commands) -> None:
         reports=False,
     )
     command.add_argument("scan", type=Input, metavar="STORE", help="as granforce scan makes it")
-    command.add_argument(
-        "--out", type=Output, required=True, metavar="FILE", help="FILE.png, .svg, .pdf or .html"
+    add_picture(command)
+
+
+def add_plot(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "plot",
+        "draw a packing and the forces in its contacts",
+        "granforce plot packing.npz --out packing.png\n"
+        "  granforce plot packing.npz --states states.zarr --colour spread --out spread.pdf",
+        reports=False,
     )
+    add_packing_file(command)
+    add_picture(command)
+    command.add_argument(
+        "--states",
+        type=Input,
+        metavar="FILE.{csv,npz,zarr}",
+        help="draw the mean of these networks, as --out of walk or uniform writes them (default: "
+        "the packing's own network)",
+    )
+    command.add_argument(
+        "--state", type=int, metavar="K", help="draw only this one of the networks, from 0"
+    )
+    command.add_argument(
+        "--colour",
+        choices=["mobilisation", "force", "spread"],
+        default="mobilisation",
+        help="colour of contacts: mobilisation f_t/(μ f_n) (default), force f_n, or spread, the "
+        "standard deviation of f_n over the networks",
+    )
+    command.leaves_out("without --states", lambda arguments: arguments.states is None, {"state"})
 
 
 def add_study(commands: Commands) -> None:
@@ -415,7 +446,7 @@ def add_load_factor(commands: Commands) -> None:
         "  granforce load-factor wall.npz --load horizontal",
         lines=report_lines.LOAD_FACTOR,
     )
-    command.add_argument("file", type=Input, metavar="FILE.npz", help="the packing, with weights")
+    add_packing_file(command)
     command.add_argument(
         "--load",
         choices=["horizontal"],
@@ -592,7 +623,7 @@ def add_import(commands: Commands) -> None:
     add_series(mercury)
     table = import_format(
         *(formats, "table", "read a table of grains and, if there is one, a table of contacts"),
-        *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and fn, ft if known"),
+        *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and f_n, f_t if known"),
         contacts_needed=False,
     )
     add_cell(table)
@@ -616,7 +647,7 @@ def add_import(commands: Commands) -> None:
         type=float,
         help="largest gap of disks that count as touching, in largest radii (default 1e-6)",
     )
-    table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
+    table.add_argument("--forces", action="store_true", default=None, help="require f_n and f_t")
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"
     )
@@ -667,7 +698,7 @@ def add_export(commands: Commands) -> None:
         "  granforce export packing.npz particles.dump contacts.dump",
         reports=False,
     )
-    command.add_argument("packing", type=Input, help="a packing: FILE.npz")
+    add_packing_file(command)
     command.add_argument("grains", type=Output, help="FILE.vtp for ParaView, FILE.dump for LAMMPS")
     command.add_argument("contacts", type=Output, help="the same, for the contacts and forces")
 
@@ -709,6 +740,7 @@ COMMANDS = (
     add_measure,
     add_scan,
     add_figures,
+    add_plot,
     add_intervals,
     add_limit_loads,
     add_load_factor,

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from granforce import notebook
 from granforce.experiment.pegs import open_frames
 from granforce.records import InputError
 from granforce.system.files import expanded
@@ -18,6 +19,7 @@ _TEXT = (".txt", ".csv", ".dat")
 _PACKED = (".gz", ".bz2", ".xz", ".zst")
 
 
+@notebook.brief
 class Frame(NamedTuple):
     """One frame: its files, and its number in them."""
 

@@ -14,18 +14,27 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
 from granforce.records import InputError, takes, whole
 from granforce.system import cancelling
-from granforce.tolerances import INTERVAL_GAP
-from granforce.types import Cancel, Floats, Integers, Progress
+from granforce.tolerances import INTERVAL_GAP, TWINS
+from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 
 @notebook.brief
 class Informative(NamedTuple):
-    """Contacts whose normal force is most worth measuring, the best first."""
+    """Contacts whose normal force is most worth measuring, the best first.
+
+    Of contacts whose normal forces determine each other only one is listed.
+    """
 
     contacts: Integers  # (k,) their numbers in the packing
     expected: Floats  # (k,) fraction by which the mean error of f_n falls, from covariances
     before: float  # exact mean interval of f_n now, in ⟨f_n⟩; NaN if not certified
     after: Floats  # (k,) the same with f_n of that contact known; NaN also if not computed
+    twins: tuple[tuple[int, ...], ...]  # for each: contacts whose measurement gives the same
+
+    @property
+    def reduction(self) -> Floats:
+        """(k,) part by which the mean interval shortens with f_n of that contact known."""
+        return 1 - self.after / self.before
 
     def _repr_html_(self) -> str:
         """The contacts as displayed in notebooks."""
@@ -55,7 +64,8 @@ def informative(
     Based on `states` uniform states: if forces were normally distributed, a known f_n of contact c
     would leave √(1 − ρ²) of the standard deviation of another one, where ρ is their correlation.
     The best `check` contacts are then sorted by exact bounds, with f_n fixed at its mean over the
-    states. sample: a UniformSample of S to use instead of new states. workers: threads;
+    states. Of contacts whose f_n determine each other, one is listed, with the numbers of the
+    others. sample: a UniformSample of S to use instead of new states. workers: threads;
     progress(done, total) counts the checked contacts. watch(Informative) is called before the first
     of them, with the order by covariance.
 
@@ -69,14 +79,21 @@ def informative(
     normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
     if not ensemble.admits(held):  # the states of a very thin S may be unbalanced
         held = some_network(ensemble, held)
-    expected = _expected(normal)
+    expected, alike = _expected(normal)
     if not expected.any():
         raise InputError("nothing to measure: balance determines every force")
-    order = np.argsort(-expected, kind="stable")[: min(k, int(np.sum(expected > 0)))]
+    order = _without_twins(np.argsort(-expected, kind="stable"), expected, alike)[:k]
     before, after = np.nan, np.full(len(order), np.nan)
     best = order[:check]
+
+    def ranked(rows: Integers, after: Floats) -> Informative:
+        named = tuple(
+            tuple(int(ensemble.index[d]) for d in np.flatnonzero(alike[c]) if d != c) for c in rows
+        )
+        return Informative(ensemble.index[rows], expected[rows], before, after, named)
+
     if watch is not None:
-        watch(Informative(ensemble.index[order], expected[order], before, after.copy()))
+        watch(ranked(order, after.copy()))
     if len(best):
         if progress is not None:
             progress(0, len(best))
@@ -86,18 +103,32 @@ def informative(
         if progress is not None:
             progress(done + 1, len(best))
     place = np.argsort(after, kind="stable")  # contacts that were not computed come last
-    order = order[place]
-    return Informative(ensemble.index[order], expected[order], before, after[place])
+    return ranked(order[place], after[place])
 
 
-def _expected(normal: Floats) -> Floats:
-    """(N_c,) fraction by which the mean deviation of f_n (states, N_c) falls if one is known."""
+def _without_twins(order: Integers, expected: Floats, alike: Mask) -> Integers:
+    """The contacts of this order from which something is expected, the first of all twins only."""
+    told = np.zeros(len(alike), dtype=bool)
+    kept = []
+    for c in order[expected[order] > 0].tolist():
+        if not told[c]:
+            kept.append(c)
+            told |= alike[c]
+    return np.array(kept)
+
+
+def _expected(normal: Floats) -> tuple[Floats, Mask]:
+    """Of f_n (states, N_c): the gain by each contact, and which contacts determine each other.
+
+    Gain (N_c,): the fraction by which the mean deviation falls if f_n of this contact is known.
+    """
     off = normal - normal.mean(axis=0)
     spread = off.std(axis=0)
     unit = np.divide(off, spread, out=np.zeros_like(off), where=spread > INTERVAL_GAP)
     correlation = np.clip(unit.T @ unit / len(unit), -1.0, 1.0)
     left = np.sqrt(1 - correlation**2)
-    return np.where(spread > INTERVAL_GAP, 1 - left @ spread / max(spread.sum(), INTERVAL_GAP), 0.0)
+    part = 1 - left @ spread / max(spread.sum(), INTERVAL_GAP)
+    return np.where(spread > INTERVAL_GAP, part, 0.0), np.abs(correlation) > 1 - TWINS
 
 
 def _mean_extent(ensemble: Ensemble, workers: int) -> float:

@@ -179,9 +179,9 @@ def read_frames(
 ) -> TextFrames:
     """The TextFrames in two files, paths or open files; InputError for other files.
 
-    columns: {frame, id, x, y, r, flag, i, j, ft or fn: its header in the files, or its number from
-    1}. If one column of a file is given, the others are recognised by headers only. frame is that
-    of both files; its number applies to files of which other columns are given, too.
+    columns: {frame, id, x, y, r, flag, i, j, f_t or f_n: its header in the files, or its number
+    from 1}. If one column of a file is given, the others are recognised by headers only. frame is
+    that of both files; its number applies to files of which other columns are given, too.
     """
     given = _by_name(columns or {})
     files = [
@@ -204,7 +204,7 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
         name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
         if name is None:
             raise InputError(
-                f"no column is called {word[:40]!r} here: frame, id, x, y, r, flag, i, j, ft, fn"
+                f"no column is called {word[:40]!r} here: frame, id, x, y, r, flag, i, j, f_t, f_n"
             )
         if name in given:
             raise InputError(f"the column {name} is given twice; give each name once")
@@ -375,7 +375,7 @@ def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[s
     ):
         raise InputError(
             f"{name}: the third of five columns is 0 throughout, so the column of "
-            "the second grain is unknown: name the columns (--columns i=…,j=…,ft=…,fn=…)"
+            "the second grain is unknown: name the columns (--columns i=…,j=…,f_t=…,f_n=…)"
         )
     if found is None:
         raise InputError(

@@ -44,7 +44,7 @@ def read_measurement(source: Source) -> Measurement:
 
     Raises InputError naming file and line.
     """
-    table = read_csv(source).in_packing_unit()
+    table = read_csv(source).in_packing_unit(COLUMNS)
     contacts = table.whole("contact")
     table.index("contact")  # each occurs once
     values = np.empty((len(contacts), 4))

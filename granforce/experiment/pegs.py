@@ -115,7 +115,7 @@ def read_pegs(
     freedom; half the difference between two measurements of a contact is added in quadrature.
     reverse: change the sign of f_t (programs differ). repair: repair errors in up to a tenth of the
     data (or in the given fraction); False: the first error raises. most_grains: largest number of
-    grains. columns: {name here: header or number in the files}, such as {"r": "diameter", "fn":
+    grains. columns: {name here: header or number in the files}, such as {"r": "diameter", "f_n":
     "5"}, for columns that are not recognised.
 
     walls: "open" (the balance of grains at walls is not required), "box", "annulus", "circle" or

@@ -61,6 +61,7 @@ class Intervals(NamedTuple):
         return notebook.table("Exact intervals over S", lines)
 
 
+@notebook.brief
 class Bound(NamedTuple):
     """One exact bound, as soon as it is computed."""
 

@@ -102,6 +102,33 @@ def stress_plane(ensemble: Ensemble, states: Floats) -> Floats:
     return plane_of(stress_of(ensemble.packing, ensemble.expand(states)))
 
 
+@takes(Ensemble)
+@cancelling.cancellable
+def admissible_stress(
+    ensemble: Ensemble,
+    *,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Floats:
+    """A stress (3,) that the contacts can carry at the packing's pressure, well inside the outline.
+
+    σ_xx, σ_yy and σ_xy, force per length, as ``ensemble(packing, prescribed="stress", stress=…)``
+    takes them. workers, progress, cancel: as for `outline`.
+
+    Raises InputError as `stress_outline`.
+    """
+    axes = stress_axes(ensemble)
+    found = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
+    return stress_inside(found.inner, ensemble.packing.pressure)
+
+
+def stress_inside(corners: Floats, pressure: float) -> Floats:
+    """σ_xx, σ_yy and σ_xy (3,) at the mean of corners (n, 2) of an outline of stresses."""
+    difference, shear = corners.mean(axis=0)
+    return pressure * np.array([1 + difference, 1 - difference, shear])
+
+
 def plane_of(stresses: Floats) -> Floats:
     """Points (…, 2) of stresses (…, 3), σ_xx, σ_yy and σ_xy; NaN if nothing presses."""
     xx, yy, xy = np.moveaxis(stresses, -1, 0)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
+from granforce.forces.build import ensemble
 from granforce.records import InputError, Packing, brief, float_array, takes
 from granforce.types import Floats
 
@@ -58,7 +59,7 @@ def plot(
         )
     several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
-    unit = mean[:, 0].mean() or 1.0
+    unit, told = _unit(packing, mean)
     values, label, look = _coloured(packing, several, mean, colour, unit)
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
     elements += _walls(packing, numbers, backend)
@@ -69,8 +70,17 @@ def plot(
     count = int((~left_open_in(packing)).sum())
     one, several_of = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     kind = one if count == 1 else several_of
-    title = f"{count} {kind}, μ = {packing.mu:g}, ⟨f_n⟩ = {unit:.4g}"
+    title = f"{count} {kind}, μ = {packing.mu:g}{told}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
+
+
+def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:
+    """⟨f_n⟩ of the packing's ensemble, and its value for the title, if it has one."""
+    try:
+        unit = ensemble(packing).force_scale
+    except InputError:  # forces that do not balance are drawn all the same
+        return mean[:, 0].mean() or 1.0, ""
+    return unit, f", ⟨f_n⟩ = {unit:.4g}"
 
 
 def _coloured(

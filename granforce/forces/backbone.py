@@ -186,8 +186,8 @@ def _unbalanced_message(full: Ensemble) -> str:
     carries = ""
     if full.prescribed == "stress":
         carries = (
-            "the contacts cannot carry this stress (`granforce stress` and gf.stress_outline say "
-            "which they can), or "
+            "the contacts cannot carry this stress (`granforce stress`, gf.stress_outline and "
+            "gf.admissible_stress say which they can), or "
         )
     named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
     return (

@@ -184,7 +184,6 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
     loaded = np.any(packing.load != 0, axis=1)
     grains = np.union1d(np.union1d(contacts.i, contacts.j), np.flatnonzero(loaded))
     left_open = np.flatnonzero(balance.left_open_in(packing))
-    touched = np.intersect1d(grains, left_open)
     grains = np.setdiff1d(grains, left_open)
     original = packing.forces[free]
     A, b, scale = balance.equations(packing, free, grains, held, mu, conditions.stress)
@@ -203,7 +202,7 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
         original=original,
         frozen=np.flatnonzero(held),
         skipped={
-            "rattlers": len(packing.r) - len(grains) - len(touched),
+            "rattlers": len(packing.r) - len(left_open) - len(grains),
             "unloaded_contacts": len(held) - len(free) - int(held.sum()),
             "tangential_unknowns": len(free) if mu == 0 else 0,
         },

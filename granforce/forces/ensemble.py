@@ -59,7 +59,9 @@ class Ensemble:
     grains: Integers  # (M,) grains of the backbone, as positions in packing.x
     A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then stress
     b: Floats  # (rows,) force
-    force_scale: float  # ⟨f_n⟩ weighted with ℓ: 2 P0 V / Σ ℓ where the pressure is prescribed
+    # ⟨f_n⟩ = Σ f_n ℓ / Σ ℓ, force: 2 P0 V / Σ ℓ in every network where the pressure is prescribed,
+    # otherwise the mean |f_n| of the packing's own network
+    force_scale: float
     original: Floats  # (N_c, 2) the packing's own network on these contacts
     frozen: Integers  # contacts held at their original forces, as positions in packing.contacts
     skipped: dict[str, int]  # counts left out: rattlers, unloaded contacts, tangential unknowns

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from granforce import notebook
 from granforce.cell import Cell
 from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
@@ -54,6 +55,7 @@ def prescribed_of(motion: Motion) -> dict[str, Any]:
     return {"prescribed": "stress", "stress": (1.0, 1.0, 0.0)}
 
 
+@notebook.brief
 class Margin(NamedTuple):
     """How clearly contacts differ from other pairs; gaps in largest radii."""
 

@@ -105,6 +105,7 @@ T = TypeVar("T")
 Asking = Generator[Push, Outcome, T]
 
 
+@notebook.brief
 class Protocol(NamedTuple):
     """How the load on a contact is raised."""
 

@@ -53,8 +53,11 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
 def informative_dataset(
     S: Ensemble, informative: Informative, *, seconds: float = 0.0
 ) -> xr.Dataset:
-    """An Informative as a dataset; its backbone lists its contacts, the best first."""
-    return labelled(
+    """An Informative as a dataset; its backbone lists its contacts, the best first.
+
+    The attribute twins lists, for each of them, contacts whose measurement gives the same.
+    """
+    dataset = labelled(
         {
             "backbone": informative.contacts,
             "part_expected": informative.expected,
@@ -65,6 +68,7 @@ def informative_dataset(
             "seconds": seconds,
         }
     )
+    return dataset.assign_attrs(twins=json.dumps(informative.twins))
 
 
 def limit_loads_dataset(S: Ensemble, loads: LimitLoads, *, seconds: float = 0.0) -> xr.Dataset:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from granforce.forces.balance import left_open_in
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.records import InputError, Packing, takes
@@ -29,7 +30,7 @@ def _of_schema(*names: str) -> dict[str, tuple[str, str]]:
 # Numbers of a snapshot with units and meaning; those in the schema take them from there.
 SCALARS = {
     "time": ("", "timestep, or time"),
-    "grains": ("1", "number of grains"),
+    "grains": ("1", "number of grains whose balance is required"),
     "contacts": ("1", "number of contacts that carry force"),
     **_of_schema("rattlers", "packing_fraction", "pressure"),
     "mean_normal_force": ("force", "mean normal force of the backbone"),
@@ -122,15 +123,19 @@ def _scalars(
     number: int, packing: Packing, bounds: xr.Dataset, walk: xr.Dataset | None = None
 ) -> dict[str, float]:
     """The SCALARS of one snapshot."""
-    closed, verdict = bool(np.isfinite(packing.volume)), judged(packing)
+    closed, balanced = bool(np.isfinite(packing.volume)), ~left_open_in(packing)
+    carrying = packing.contacts.picked(bounds["backbone"].values)
+    rattlers = balanced.copy()
+    rattlers[np.union1d(carrying.i, carrying.j)] = False
     return {
         "time": float(packing.info.get("time", number)),
-        "grains": len(packing.r),
+        "grains": int(balanced.sum()),
         "contacts": len(packing.contacts.i),
         "packing_fraction": float(packing.packing_fraction) if closed else np.nan,
         "pressure": float(packing.pressure),
         "mean_normal_force": bounds["force_scale"].item(),
         **{name: bounds[name].item() for name in ("coordination", "dimension", "eta3")},
         **{name: np.nan if walk is None else walk[name].item() for name in ("eta1", "eta2")},
-        **{name: verdict[name] for name in ("residual", "rattlers")},
+        "rattlers": int(rattlers.sum()),
+        "residual": judged(packing)["residual"],
     }

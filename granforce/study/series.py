@@ -229,22 +229,25 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     change = np.full(shape, np.nan)
     change[1:] = np.diff(arrays["inferred"], axis=0)
     accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]
+    counted = [[one[kind] for kind in _COUNTS] for one in accounts]
     notes = [
         f"frame {number:g}: {note}"
         for (number, _), one in zip(done, accounts, strict=True)
         for note in one.get("notes", [])
     ]
     forces, single = ("frame", "contact", "component"), ("frame",)
+    unit = {"units": "force", "long_name": "mean measured normal force"}
+    counts = {"units": "1", "long_name": "grains, contacts and repairs, by kind"}
     variables: dict[str, Any] = {
         name: (forces, values, {"units": "force"}) for name, values in arrays.items()
     }
     variables |= {
-        "added": (forces[:2], added, {"long_name": "contact was not listed"}),
+        "added": (forces[:2], added, {"units": "1", "long_name": "contact was not listed"}),
         "change": (forces, change, {"units": "force", "long_name": "since the frame before"}),
-        "chi_square": (single, [float(one["chi_square"]) for _, one in done]),
-        "freedom": (single, [int(one["freedom"]) for _, one in done]),
-        "unit": (single, [one["mean_measured_normal_force"] for one in accounts]),
-        "account": (("frame", "kind"), [[one[kind] for kind in _COUNTS] for one in accounts]),
+        "chi_square": (single, [float(one["chi_square"]) for _, one in done], {"units": "1"}),
+        "freedom": (single, [int(one["freedom"]) for _, one in done], {"units": "1"}),
+        "unit": (single, [one["mean_measured_normal_force"] for one in accounts], unit),
+        "account": (("frame", "kind"), counted, counts),
     }
     if "standard_error" in arrays:
         change_error, error = np.full(shape, np.nan), arrays["standard_error"]

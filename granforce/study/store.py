@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import platformdirs
 import xarray as xr
 
+from granforce import notebook
 from granforce.records import InputError
 from granforce.study import entries, keys
 from granforce.study.keys import Parameters
@@ -38,6 +39,7 @@ class NotKeptError(InputError):
     """A result could not be written to the store, for example because the disk is full."""
 
 
+@notebook.brief
 class Entry(NamedTuple):
     """Metadata of one entry, without its arrays."""
 
@@ -49,6 +51,7 @@ class Entry(NamedTuple):
     created: str  # UTC, ISO 8601
 
 
+@notebook.brief
 class Verdict(NamedTuple):
     """Whether one entry is intact; if not, the reason in words."""
 

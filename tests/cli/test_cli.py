@@ -48,11 +48,11 @@ def test_a_packing_in_a_file_needs_no_store_that_lasts(away, run, monkeypatch):
         open_store(store.path).clear()
 
     save_packing(packed(8, 0.3), "p.npz")
-    wanted = run("intervals", "--packing", "p.npz", "--out", "x.csv")
+    wanted = run("intervals", "p.npz", "--out", "x.csv")
     monkeypatch.setattr(commands.exact.kinds, "keep_packing", overtaken)
     for words in (
-        ("intervals", "--packing", "p.npz", "--out", "y.csv"),
-        ("walk", "--packing", "p.npz", "--states", "3", "--out", "states.csv"),
+        ("intervals", "p.npz", "--out", "y.csv"),
+        ("walk", "p.npz", "--states", "3", "--out", "states.csv"),
     ):
         code, out, err = run(*words)
         assert code == 0 and "cached" in out and "granforce:" not in err
@@ -100,7 +100,7 @@ def test_pack_reports_and_saves(run, tmp_path):
     assert report["cached"] is False
     assert "step" in err
     assert json.loads(run("pack", "-n", 20, "--mu", 0.3, "--json")[1])["cached"] is True
-    code, out, _ = run("walk", "--packing", file, "--states", 4, "--relax", "nearest", "--json")
+    code, out, _ = run("walk", file, "--states", 4, "--relax", "nearest", "--json")
     assert json.loads(out)["accepted"] == 4
 
 
@@ -130,7 +130,7 @@ def test_a_scene_is_packed_without_a_store(run, tmp_path):
 def test_walk_and_measure_agree(run, tmp_path):
     file = tmp_path / "contacts.csv"
     walked = json.loads(run("walk", *SMALL, "--json")[1])
-    measured = json.loads(run("measure", *SMALL, "--contacts", file, "--json")[1])
+    measured = json.loads(run("measure", *SMALL, "--out", file, "--json")[1])
     assert walked["eta2"] == measured["eta2"] > 0
     lines = file.read_text().splitlines()
     assert (
@@ -159,7 +159,7 @@ def test_intervals_hold_the_walk(run, tmp_path):
     report = json.loads(run("intervals", *words, "--out", exact, "--json")[1])
     assert report["largest_duality_gap"] <= 1e-8
     assert report["exact_eta3"] > json.loads(run("measure", *SMALL, "--json")[1])["eta3"]
-    run("measure", *SMALL, "--contacts", seen)
+    run("measure", *SMALL, "--out", seen)
     bounds, walked = pd.read_csv(exact), pd.read_csv(seen)
     assert np.array_equal(bounds["contact"], walked["contact"])
     for name in ("f_n", "f_n_seen_low", "f_n_seen_high"):
@@ -283,7 +283,7 @@ def test_import_keeps_what_was_read(run, tmp_path):
     assert report["grains"] == 400
     assert report["residual"] < 1e-9
     assert report["violation"] < 1e-9
-    words = ["intervals", "--packing", file, "--contacts", "0,1,2", "--json"]
+    words = ["intervals", file, "--contacts", "0,1,2", "--json"]
     found = json.loads(run(*words)[1])
     assert found["contacts"] == 3
     # The elastic network is one point of S: inside every exact interval.
@@ -339,7 +339,7 @@ def test_a_file_in_the_place_of_a_result_is_told_before_anything_is_computed(run
         (["pack", "--mu", "0.1", "--radii", "no-such-file"], "no-such-file"),
         (["pack", "--mu", "0.1", "--radii", "uniform:2,1"], "radii"),
         (["pack", "-n", "40", "--mu", "0.3", "--max-steps", "100"], "not jammed"),
-        (["walk", "--packing", "no-such-file.npz"], "no-such-file.npz"),
+        (["walk", "no-such-file.npz"], "no-such-file.npz"),
         (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "0,999"], "contact 999"),
         (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "a"], "--contacts"),
         (["intervals", "-n", "20", "--mu", "0.3", "--slice", "0.5,0.2,0,1"], "slice"),

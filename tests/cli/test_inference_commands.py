@@ -31,15 +31,15 @@ def test_a_frame_becomes_a_packing_and_its_forces_are_inferred(folder, capsys):
     )
     packing = load_packing(folder / "frame.npz")
     assert frame["contacts_listed"] + frame["candidates"] == len(packing.contacts.i)
-    infer = "infer --packing frame.npz --measured frame.csv --unmeasured 1 --states 40 --certain"
+    infer = "infer frame.npz --measured frame.csv --unmeasured 1 --states 40 --certain"
     found = told(f"{infer} --csv inferred.csv", capsys)
     assert not found["cached"] and found["states"] == 40
     assert found["measured_components"] == 2 * frame["contacts_listed"]
     assert found["measured_where_nothing_can_carry"] == 0
     columns = pd.read_csv(folder / "inferred.csv")
-    normal, least = columns["f_n [packing]"], columns["least_f_n [packing]"]
+    normal, least = columns["f_n [packing]"], columns["f_n_least [packing]"]
     assert len(columns) == found["contacts"]
-    assert np.all(normal >= 0) and np.all(columns["error_f_n [packing]"] > 0)
+    assert np.all(normal >= 0) and np.all(columns["f_n_error [packing]"] > 0)
     sure = columns["contact"][least > 1e-6 * normal.mean()].astype(int)
     assert set(found["carry_for_certain"]) == set(sure.tolist())
     assert told(infer, capsys)["cached"]
@@ -82,7 +82,7 @@ def test_error_bars_by_measuring_again(folder, capsys):
         "--measured frame.csv",
         capsys,
     )
-    words = "infer --packing frame.npz --measured frame.csv --unmeasured 1 --states 40"
+    words = "infer frame.npz --measured frame.csv --unmeasured 1 --states 40"
     flat, again = told(words, capsys), told(f"{words} --again", capsys)
     assert again["states"] == 40 and not again["cached"]
     assert again["chi_square"] == flat["chi_square"]

@@ -13,6 +13,7 @@ import pytest
 from packings import packed
 
 from granforce.cli import commands, parser, parsing
+from granforce.forces.build import ensemble
 from granforce.packing.importers import load_packing, save_packing
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.scenes import scene
@@ -24,31 +25,32 @@ FRAMES = "positions.txt adjacency.txt"
 # Command lines, one at least for each way of calling a command, as its parser knows them.
 LINES = {
     "pack": [MU, "--scene groove --mu 0.5"],
-    "walk": [f"{MU} --states 3", "--packing p.npz --states 3 --out walk.csv"],
-    "measure": [f"{MU} --states 3", "--packing p.npz --states 3"],
-    "uniform": [f"{MU} --states 8", "--packing p.npz --states 8 --out states.csv"],
-    "volume": [f"{MU} --accuracy 0.5", "--packing p.npz --accuracy 0.5"],
+    "walk": [f"{MU} --states 3", "p.npz --states 3 --out walk.csv"],
+    "measure": [f"{MU} --states 3", "p.npz --states 3"],
+    "uniform": [f"{MU} --states 8", "p.npz --states 8 --out states.csv"],
+    "volume": [f"{MU} --accuracy 0.5", "p.npz --accuracy 0.5"],
     "infer": [
         f"{MU} --measured m.csv --states 8",
         f"{MU} --measured m.csv --states 0",
-        "--packing p.npz --measured m.csv --states 8",
+        "p.npz --measured m.csv --states 8",
         f"{FRAMES} --frames all --mu 0.3 --states 4 --workers 1 --strict",
     ],
-    "informative": [f"{MU} --states 8", "--packing p.npz --states 8"],
+    "informative": [f"{MU} --states 8", "p.npz --states 8"],
     "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
-    "intervals": [MU, "--packing p.npz"],
-    "limit-loads": [MU, "--packing p.npz"],
+    "intervals": [MU, "p.npz"],
+    "limit-loads": [MU, "p.npz"],
     "load-factor": [
         "blocks.npz --load horizontal",
         "blocks.npz --load horizontal --critical",
     ],
-    "stress": [f"{MU} --angles 4", "--packing p.npz --angles 4"],
+    "stress": [f"{MU} --angles 4", "p.npz --angles 4"],
     "perturb": [
         f"{MU} --random 1",
-        "--packing p.npz --random 1",
+        "p.npz --random 1",
         f"{MU} --all",
         f"{MU} --contacts 1",
     ],
+    "plot": ["p.npz --out p.png", "p.npz --out p.png --states states.npz --state 0"],
     "figures": ["done/cells.zarr --out figure1.pdf"],
     "study": [
         "--quick",
@@ -114,6 +116,9 @@ def place(tmp_path_factory):
     (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     (folder / "bodies.csv").write_text("body,x,y\n")
+    S = ensemble(packed(8, 0.3))
+    ends = {"i": S.contacts.i, "j": S.contacts.j, "contact": S.index}
+    np.savez(folder / "states.npz", **ends, **{"states [packing]": S.original[None]})
     (folder / "r.txt").write_text("1\n" * 8)
     (folder / "known.csv").write_text("contact,f_n_low\n0,0\n")
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
@@ -210,16 +215,15 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
             assert "no effect" in told.err or "not allowed with" in told.err
 
 
-def test_a_positional_argument_that_is_not_used_is_refused(capsys):
-    with pytest.raises(SystemExit) as stop:
-        parser.main(["infer", "positions.txt", "--packing", "p.npz", "--measured", "m.csv"])
-    assert stop.value.code == 2 and "files has no effect" in capsys.readouterr().err
+def test_a_second_packing_is_refused(here, capsys):
+    assert parser.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
+    assert "give the file of one packing" in capsys.readouterr().err
 
 
 def test_a_default_that_is_typed_counts_as_given(capsys):
     with pytest.raises(SystemExit):
-        parser.main(["walk", "--packing", "p.npz", "--seed", "1"])
-    assert "--seed has no effect with --packing" in capsys.readouterr().err
+        parser.main(["walk", "p.npz", "--seed", "1"])
+    assert "--seed has no effect with the file of a packing" in capsys.readouterr().err
 
 
 def test_every_option_says_what_its_words_are():
@@ -359,7 +363,7 @@ def test_frames_replace_no_store(here, capsys):
     "line",
     [
         "scan --mu 0.3 --mu 0.5 --seeds 1",
-        "walk --packing p.npz --states 3 --states 4",
+        "walk p.npz --states 3 --states 4",
         "pack -n 8 --mu 0.3 -n 8",
         "import lammps p.dump c.dump --mu 0.3 --frame 1 --frame=2",
         "cache list --cache a --cache b",
@@ -384,6 +388,6 @@ def test_a_working_folder_that_was_removed_is_one_line(here, monkeypatch, capsys
     (here / "gone").mkdir()
     monkeypatch.chdir(here / "gone")
     (here / "gone").rmdir()
-    words = ["intervals", "--packing", str(here / "p.npz"), "--out", "x.csv"]
+    words = ["intervals", str(here / "p.npz"), "--out", "x.csv"]
     assert parser.main(words) == 2
     assert "x.csv: the working folder was removed" in capsys.readouterr().err

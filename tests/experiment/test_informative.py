@@ -54,6 +54,22 @@ def test_expectation_alone_takes_no_program(S):
     assert np.array_equal(twice.contacts, found.contacts)
 
 
+def test_of_contacts_that_determine_each_other_one_is_listed():
+    """A disk with two contacts passes its force on: both have the same normal force."""
+    S = ensemble(packed(30, 0.3))
+    passing = [np.flatnonzero((S.contacts.i == g) | (S.contacts.j == g)) for g in S.grains]
+    pairs = [set(S.index[c].tolist()) for c in passing if len(c) == 2]
+    found = informative(S, len(S.index), check=0)
+    groups = [{int(c), *others} for c, others in zip(found.contacts, found.twins, strict=True)]
+    assert pairs and all(any(pair <= group for group in groups) for pair in pairs)
+    assert sum(map(len, groups)) == len(set().union(*groups)) <= len(S.index)
+    normal = sample_uniform(S, 40, seed=5).flat[..., 0]
+    for group in groups:
+        one, *others = S.positions(np.array(sorted(group)))
+        for other in others:
+            assert abs(np.corrcoef(normal[:, one], normal[:, other])[0, 1]) > 1 - 1e-8
+
+
 def test_nothing_is_left_to_measure_where_all_is_determined():
     with pytest.raises(InputError, match="nothing to measure"):
         informative(ensemble(two_disks()))

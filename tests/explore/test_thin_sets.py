@@ -149,7 +149,7 @@ def test_commands_say_what_is_pinned(tmp_path, capsys):
             "contact,f_n_low,f_n_high\n{},{!r},{!r}\n".format(c, *bounds)
         )
         for command in ("uniform", "volume", "intervals", "walk"):
-            arguments = [command, "--packing", str(tmp_path / "p.npz"), "--json"]
+            arguments = [command, str(tmp_path / "p.npz"), "--json"]
             arguments += ["--known", str(tmp_path / "k.csv"), "--cache", str(tmp_path / "cache")]
             assert main(arguments) == 0
             told[width, command] = json.loads(capsys.readouterr().out)

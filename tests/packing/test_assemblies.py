@@ -334,7 +334,7 @@ def test_pairs_of_bodies_in_doubt_are_noted():
 
 
 @pytest.mark.parametrize(
-    "options, bodies", [("courses=2,blocks=3", 8), ("courses=3,blocks=2,height=0.1", 9)]
+    "options, bodies", [("courses=2,blocks=3", 7), ("courses=3,blocks=2,height=0.1", 8)]
 )
 def test_scenes_take_their_options_on_the_command_line(options, bodies, capsys):
     assert main(["pack", "--scene", "wall", "--scene-options", options, "--json"]) == 0

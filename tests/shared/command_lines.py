@@ -40,7 +40,7 @@ PACKING = {
     "--sweeps": [*WHOLE, LONG],
 }
 ONE_PACKING = PACKING | {"--mu": FRICTION, "--seed": SEEDS}
-ANY_PACKING = ONE_PACKING | {"--packing": FILES, "--cache": CACHES, "--workers": WHOLE}
+ANY_PACKING = ONE_PACKING | {"packing": FILES, "--cache": CACHES, "--workers": WHOLE}
 WALK = {
     "--states": [*WHOLE, *MEMORY],
     "--walk-seed": SEEDS,
@@ -73,7 +73,7 @@ COMMANDS = {
     "walk": (["-n", "8", "--mu", "0.3", "--states", "3"], ANY_PACKING | WALK),
     "measure": (
         ["-n", "8", "--mu", "0.3", "--states", "3"],
-        ANY_PACKING | WALK | {"--contacts": OUTPUTS},
+        ANY_PACKING | WALK | {"--out": OUTPUTS},
     ),
     "uniform": (
         ["-n", "8", "--mu", "0.3", "--states", "8"],
@@ -116,6 +116,15 @@ COMMANDS = {
     ),
     "intervals": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
     "limit-loads": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
+    "plot": (
+        ["p.npz", "--out", "p.png"],
+        {
+            "--out": OUTPUTS,
+            "--states": [*FILES, "grains.csv"],
+            "--state": ["0"],
+            "--colour": ["", "spread"],
+        },
+    ),
     "load-factor": (["p.npz", "--load", "horizontal"], {"--load": ["", "vertical"]}),
     "stress": (
         ["-n", "8", "--mu", "0.3"],
@@ -267,12 +276,16 @@ def lines():
     for command, (right, options) in COMMANDS.items():
         for option, wrong in options.items():
             others = _without(right, option)
-            found += [
-                [command, *others, *([f"{option}={word}"] if option != "-n" else [option, word])]
-                for word in wrong
-            ]
+            found += [[command, *others, *_given(option, word)] for word in wrong]
         found += [[command, *right, "--colour"], [command, *right, "extra", "words"]]
     return [*found, [], ["fly"], ["--", "pack"], ["pack", "walk"], ["\0"]]
+
+
+def _given(option, word):
+    """An option with a word, or the word as a positional argument."""
+    if option == "-n":
+        return [option, word]
+    return [f"{option}={word}"] if option.startswith("-") else [word]
 
 
 def _without(words, option):

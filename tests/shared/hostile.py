@@ -109,6 +109,7 @@ def functions():
         "limit_load_bounds": (gf.limit_load_bounds, ensembled | {"contacts": [c], "workers": 1}),
         "outline": (gf.outline, ensembled | {"axes": axes, "tolerance": 0.01, "workers": 1}),
         "stress_outline": (gf.stress_outline, ensembled | {"angles": 4, "workers": 1}),
+        "admissible_stress": (gf.admissible_stress, ensembled | {"workers": 1}),
         "stress_plane": (gf.stress_plane, ensembled | {"states": walk.states}),
         "pull": (gf.pull, ensembled | {"contact": c, "values": forces[:1, 0], "state": forces,
                                        "workers": 1}),

@@ -67,7 +67,7 @@ def line(command, parser, rng):
     """One command line of this command."""
     words = list(command)
     given = any(a.dest == "packing" for a in parser._actions) and rng.random() < 0.3
-    words += ["--packing", "p.npz"] if given else []
+    words += ["p.npz"] if given else []
     for action in parser._actions:
         if action.dest in ("help", "scheduler", "packing" if given else ""):
             continue

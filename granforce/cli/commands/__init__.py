@@ -3,8 +3,9 @@
 from granforce.cli.commands.exact import intervals, limit_loads, load_factor, perturb, stress
 from granforce.cli.commands.inference import infer, informative
 from granforce.cli.commands.packings import export, import_, pack
+from granforce.cli.commands.pictures import figures, plot
 from granforce.cli.commands.service import app, bench, cache, completion, docs, study_
-from granforce.cli.commands.states import figures, measure, scan, uniform, volume, walk
+from granforce.cli.commands.states import measure, scan, uniform, volume, walk
 
 __all__ = [
     "app",
@@ -23,6 +24,7 @@ __all__ = [
     "measure",
     "pack",
     "perturb",
+    "plot",
     "scan",
     "stress",
     "study_",

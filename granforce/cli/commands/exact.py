@@ -18,8 +18,10 @@ from granforce.cli.results import (
     known_forces,
     numbers,
     unit,
-    write_columns,
 )
+from granforce.cli.tables import write_columns
+from granforce.explore.stress_outline import stress_inside
+from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
 from granforce.packing import importers
 from granforce.perturb import grain_loads
@@ -142,9 +144,10 @@ def limit_loads(arguments: argparse.Namespace) -> None:
 
 def load_factor(arguments: argparse.Namespace) -> None:
     """Compute the load factor of a load on all bodies, and its critical one on request."""
-    S = ensemble(importers.load_packing(arguments.file))
+    S = ensemble(importers.load_packing(arguments.packing))
     limit = grain_loads.load_factor(S, arguments.load)
-    lines: dict[str, Any] = {"bodies": len(S.packing.r), "contacts": len(S.packing.contacts.i)}
+    bodies = int((~left_open_in(S.packing)).sum())
+    lines: dict[str, Any] = {"bodies": bodies, "contacts": len(S.packing.contacts.i)}
     lines |= {"load_factor": limit.factor, "certified_error": limit.gap}
     if arguments.critical:
         critical = grain_loads.critical_load(S, arguments.load)
@@ -164,8 +167,7 @@ def stress(arguments: argparse.Namespace) -> None:
     _, parameters, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **chosen)
     own, carried = dataset["stress_own"].values, dataset["stress_inner"].values
     packing, _ = get_packing(arguments.store, parameters["packing"])
-    difference, shear = carried.mean(axis=0)
-    middle = packing.pressure * np.array([1 + difference, 1 - difference, shear])
+    middle = stress_inside(carried, packing.pressure)
     lines = {
         **extension(dataset),
         "largest_shear_over_pressure": dataset["friction"].item(),

@@ -1,6 +1,7 @@
 """Commands for measured forces."""
 
 import argparse
+import json
 
 import numpy as np
 
@@ -11,9 +12,8 @@ from granforce.cli.results import (
     contact_labels,
     found,
     unit,
-    write_columns,
-    write_csv,
 )
+from granforce.cli.tables import write_columns, write_csv
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
@@ -37,16 +37,21 @@ def informative(arguments: argparse.Namespace) -> None:
         seed=arguments.sample_seed,
         **conditions(arguments),
     )
+    now, after = dataset["mean_before"].item(), dataset["mean_after"].values
+    twins = [[int(c) for c in others] for others in json.loads(dataset.attrs["twins"])]
     columns = contact_labels(arguments, parameters, dataset) | {
         "part_expected": dataset["part_expected"].values,
-        "mean_interval_after [mean]": dataset["mean_after"].values,
+        "part_shorter": 1 - after / now,
+        "mean_interval_after [mean]": after,
+        "twins": np.array([len(others) for others in twins]),
     }
-    lines = {"entry": entry, "mean_interval_now [mean]": dataset["mean_before"].item(), **ends}
-    ranked = {name: values.tolist() for name, values in columns.items()}
+    lines = {"entry": entry, "mean_interval_now [mean]": now, **ends}
+    ranked = {name: values.tolist() for name, values in columns.items()} | {"twins": twins}
     with report_after(lines | ranked if arguments.json else lines, arguments.json):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
     if not arguments.json:
+        ranked["twins"] = [" ".join(map(str, others)) or "none" for others in twins]
         rows = [dict(zip(ranked, row, strict=True)) for row in zip(*ranked.values(), strict=True)]
         table(rows, list(ranked), {name: spaced(name) for name in ranked})
 
@@ -60,6 +65,9 @@ def infer(arguments: argparse.Namespace) -> int | None:
         raise InputError(
             "give --measured FILE.csv and a packing, or files of frames with --frames all"
         )
+    if len(arguments.files) > 1:
+        raise InputError("give the file of one packing; files of frames need --frames all")
+    arguments.packing = arguments.files[0] if arguments.files else None
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
     entry, parameters, dataset, ends = found(
@@ -92,14 +100,14 @@ def infer(arguments: argparse.Namespace) -> int | None:
     columns = contact_labels(arguments, parameters, dataset)
     for k, part in enumerate(("f_n", "f_t")):
         columns |= forces.named({part: dataset["inferred"].values[:, k]})
-        columns |= {f"deviation_{part} [sigma]": dataset["deviation"].values[:, k]}
+        columns |= {f"{part}_deviation [sigma]": dataset["deviation"].values[:, k]}
     if arguments.certain:
         least = dataset["least_normal"].values
         certain = np.flatnonzero(least > CARRYING * scale)
         order = certain[np.argsort(-least[certain], kind="stable")]
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
-        columns |= forces.named({"least_f_n": least})
+        columns |= forces.named({"f_n_least": least})
     if states:
         error = dataset["standard_error"].values
         lines |= {"states": dataset.sizes["state"]}
@@ -108,7 +116,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         lines |= {"reached": bool(dataset["reached"].item())}
         for k, part in enumerate(("f_n", "f_t")):
             expected = dataset["expected"].values[:, k]
-            columns |= forces.named({f"mean_{part}": expected, f"error_{part}": error[:, k]})
+            columns |= forces.named({f"{part}_mean": expected, f"{part}_error": error[:, k]})
     with report_after(lines | ends, arguments.json):
         if arguments.csv is not None:
             write_csv(arguments.csv, columns)

@@ -16,8 +16,8 @@ from granforce.cli.results import (
     required_mu,
     store_of,
     with_units,
-    write_csv,
 )
+from granforce.cli.tables import write_csv
 from granforce.experiment.measurements import COLUMNS as MEASURED_COLUMNS
 from granforce.experiment.pegs import read_pegs
 from granforce.experiment.walls import read_wall_force
@@ -110,8 +110,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
     if "disks" in packing.info:  # behind each contact with a wall is a grain of its own
-        disks = packing.info["disks"]
-        lines |= {"grains": disks, "contacts_with_walls": len(packing.r) - disks}
+        lines |= {"contacts_with_walls": len(packing.r) - packing.info["disks"]}
     if arguments.json and "nearly_touching" in packing.info:
         lines |= {"nearly_touching": packing.info["nearly_touching"]}
     _report(lines, packing, arguments)

@@ -15,9 +15,8 @@ from granforce.cli.results import (
     packing_options,
     unit,
     walked,
-    write_csv,
-    write_states,
 )
+from granforce.cli.tables import write_columns, write_states
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -110,7 +109,7 @@ def volume(arguments: argparse.Namespace) -> int:
 
 def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or loaded."""
-    _, parameters, dataset, _ = walked(arguments, arguments.contacts)
+    _, parameters, dataset, _ = walked(arguments, arguments.out)
     forces = unit(arguments, dataset)
     names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
     lines = {
@@ -126,11 +125,11 @@ def measure(arguments: argparse.Namespace) -> None:
         "original_distance": dataset["original_distance"].item(),
     }
     with report_after(lines, arguments.json):
-        if arguments.contacts is not None:
+        if arguments.out is not None:
             sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
             columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
             labels = contact_labels(arguments, parameters, dataset)
-            write_csv(arguments.contacts, labels | forces.named(columns))
+            write_columns(arguments.out, labels | forces.named(columns))
 
 
 def scan(arguments: argparse.Namespace) -> int:
@@ -159,15 +158,6 @@ def scan(arguments: argparse.Namespace) -> int:
         )
     _report_scan(rows, failed, arguments.json)
     return 1 if failed else 0
-
-
-def figures(arguments: argparse.Namespace) -> None:
-    """Draw Figure 1 from the store of a scan."""
-    from granforce.figures import indeterminacy, save
-
-    backend = "bokeh" if arguments.out.endswith(".html") else "matplotlib"
-    store = open_store(arguments.scan, readonly=True)
-    save(indeterminacy(store, backend=backend), arguments.out)
 
 
 def _report_scan(rows: Rows, failed: Sequence[tuple[Parameters, str]], as_json: bool) -> None:

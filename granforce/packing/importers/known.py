@@ -10,7 +10,12 @@ from granforce.records import InputError
 from granforce.types import Floats
 
 _COMPONENTS = "f_n", "f_t"
-_EARLIER = {"_min": "_low", "_max": "_high"}
+_COLUMNS = [f"{name}{side}" for name in _COMPONENTS for side in ("", "_low", "_high")]
+_EARLIER = {
+    f"{name}_{old}": f"{name}_{new}"
+    for name in _COMPONENTS
+    for old, new in (("min", "low"), ("max", "high"))
+}
 
 
 def read_known(source: Source) -> Known:
@@ -22,7 +27,7 @@ def read_known(source: Source) -> Known:
     ignored. source: a path or an open file. Raises InputError naming the offending line, and for a
     column in another unit.
     """
-    table = _renamed(read_csv(source).in_packing_unit())
+    table = _renamed(read_csv(source).in_packing_unit([*_COLUMNS, *_EARLIER]))
     contacts = table.whole("contact")
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
@@ -39,20 +44,13 @@ def read_known(source: Source) -> Known:
                 for side in sides:
                     side[given, k] = values
     if not any_bounds:
-        raise InputError(
-            f"{table.name}: no column f_n, f_t, f_n_low, f_n_high, f_t_low or f_t_high"
-        )
+        raise InputError(f"{table.name}: none of the columns {', '.join(_COLUMNS)}")
     return Known(contacts, low, high)
 
 
 def _renamed(table: Table) -> Table:
     """The table with earlier names of bounds replaced; InputError if both names are present."""
-    header = [
-        f"{name[:3]}{_EARLIER[name[3:]]}"
-        if name[:3] in _COMPONENTS and name[3:] in _EARLIER
-        else name
-        for name in table.header
-    ]
+    header = [_EARLIER.get(name, name) for name in table.header]
     return make_table(table.name, header, table.rows, table.lines)
 
 

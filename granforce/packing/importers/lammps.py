@@ -112,7 +112,7 @@ def read_lammps(
     frame: the timestep, by default the last that is complete in both files. reverse: change the
     sign of tangential forces. Grains are sorted by id. The box may be tilted in the plane (xy).
     Directions that are not periodic are open; unbalanced forces of grains become their load there.
-    packing.info contains timestep, residual and violation (in ⟨f_n⟩), rattlers, contacts_skipped
+    packing.info contains timestep, residual and violation (in ⟨f_n⟩), contacts_skipped
     and notes. most_grains: largest number of grains.
 
     Raises InputError naming file and line.

@@ -28,7 +28,7 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     """The packing with the pressure (or, in an open box, the boundary loads) of its forces.
 
     P = Σ f_n ℓ / (2V); a grain's load balances its contact forces, unless loads were given.
-    reverse: change the sign of tangential forces. Residual, violation and rattlers are added to
+    reverse: change the sign of tangential forces. Residual and violation are added to
     packing.info with the given entries, and a note if the other sign balances better. Raises
     InputError if the forces do not press.
     """
@@ -112,18 +112,23 @@ def find(packing: Packing, **info: Any) -> Packing:
 def report(packing: Packing) -> dict[str, Any]:
     """Properties of a packing, as a dict of plain numbers (None if a quantity is undefined).
 
-    Lengths are in largest radii, residual and violation of the packing's own network in ⟨f_n⟩, mean
-    normal force (over the backbone) and pressure in the packing's units. largest_contact_gap and
+    grains: those whose balance is required; grains_left_open: all others, such as walls.
+    backbone_grains: grains that can carry force; rattlers: grains that cannot. Lengths are in
+    largest radii, residual and violation of the packing's own network in ⟨f_n⟩. mean_normal_force:
+    ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure. largest_contact_gap,
     least_other_gap: the `margin` of its contacts, undefined for soft disks (overlaps beyond
-    RIGID_OVERLAP) and for bodies of other shapes. Raises NotJammedError if no admissible network
-    exists.
+    RIGID_OVERLAP) and for bodies of other shapes.
+
+    Raises NotJammedError if no admissible network exists.
     """
     ens = ensemble(packing)
     loaded = bool(packing.forces.any())
     verdict = judged(packing) if loaded else {"residual": None, "violation": None}
     closed = np.isfinite(packing.volume)
+    left_open = int(left_open_in(packing).sum())
     return {
-        "grains": len(packing.r),
+        "grains": len(packing.r) - left_open,
+        "grains_left_open": left_open,
         "contacts": len(packing.contacts.i),
         "backbone_grains": len(ens.grains),
         "backbone_contacts": len(ens.index),
@@ -133,7 +138,7 @@ def report(packing: Packing) -> dict[str, Any]:
         "packing_fraction": packing.packing_fraction if closed else None,
         "coordination": float(ens.coordination),
         "dimension": int(ens.dimension),
-        "mean_normal_force": float(ens.original[:, 0].mean()) if loaded else None,
+        "mean_normal_force": float(ens.force_scale) if loaded else None,
         "residual": verdict["residual"],
         "violation": verdict["violation"],
         "largest_overlap": _largest_overlap(packing),
@@ -142,7 +147,7 @@ def report(packing: Packing) -> dict[str, Any]:
 
 
 def judged(packing: Packing) -> dict[str, Any]:
-    """Residual and violation of the packing's own forces, and the grains without force.
+    """Residual and violation of the packing's own forces.
 
     Without pruning, so that they exist for any network, even if S is empty.
     """
@@ -150,7 +155,6 @@ def judged(packing: Packing) -> dict[str, Any]:
     return {
         "residual": whole.residual(packing.forces),
         "violation": whole.violation(packing.forces),
-        "rattlers": len(packing.r) - len(_held(whole)),
     }
 
 
@@ -201,9 +205,9 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     """
     if not packing.load.any():
         raise InputError(
-            "an open set needs loads (columns fx, fy, torque of the grains) or forces (columns fn, "
-            "ft of the contacts), or walls and gravity (--walls floor --gravity 1, or walls=, "
-            "gravity=); a periodic one its box"
+            "an open set needs loads (columns fx, fy, torque of the grains) or forces (columns "
+            "f_n, f_t of the contacts), or walls and gravity (--walls floor --gravity 1, or "
+            "walls=, gravity=); a periodic one its box"
         )
     contacts, r = packing.contacts, packing.r
     contacts = contacts._replace(

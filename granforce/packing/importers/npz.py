@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -111,6 +112,23 @@ def _arrays(
 ) -> dict[str, npt.NDArray[Any]]:
     """The archive's arrays except those that loading ignores, {name: array}."""
     ignored = {"lo", "hi", "fcrit"}
+    with _opened(source, name, unpacked) as archive:
+        if "r" in archive.files:
+            check_grains(archive["r"].size, most_grains, name)
+        if "levers" not in archive.files:  # the gaps of disks follow from their radii
+            ignored.add("gap")
+        return {key: archive[key] for key in archive.files if key not in ignored}
+
+
+def read_arrays(path: str) -> dict[str, npt.NDArray[Any]]:
+    """All arrays of an NPZ file, {name: array}; InputError for any other file."""
+    with _opened(path, path, np.inf) as archive:
+        return {key: archive[key] for key in archive.files}
+
+
+@contextmanager
+def _opened(source: Source, name: str, unpacked: float) -> Iterator[Any]:
+    """An archive of plain arrays, of at most `unpacked` bytes; InputError for anything else."""
     try:
         # Opened here: numpy would leave the file open if it cannot read the archive.
         with (
@@ -118,14 +136,8 @@ def _arrays(
             np.load(cast("IO[bytes]", file), allow_pickle=False) as archive,
         ):
             if sum(member.file_size for member in archive.zip.infolist()) > unpacked:
-                raise InputError(
-                    f"{name}: more than {unpacked / 1e6:g} MB unpacked; too large for a packing"
-                )
-            if "r" in archive.files:
-                check_grains(archive["r"].size, most_grains, name)
-            if "levers" not in archive.files:  # the gaps of disks follow from their radii
-                ignored.add("gap")
-            return {key: archive[key] for key in archive.files if key not in ignored}
+                raise InputError(f"{name}: more than {unpacked / 1e6:g} MB unpacked; too large")
+            yield archive
     except InputError:
         raise
     except OSError as error:

@@ -12,7 +12,14 @@ from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
 from granforce.packing.importers.network import LOAD_MISFIT, adopt, find
-from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
+from granforce.packing.importers.text import (
+    Source,
+    Table,
+    check_grains,
+    make_table,
+    read_csv,
+    renamed,
+)
 from granforce.records import (
     Contacts,
     InputError,
@@ -27,7 +34,8 @@ from granforce.types import Floats
 
 # Columns of grains.
 NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open")
-NAMES += ("i", "j", "nx", "ny", "length", "fn", "ft")
+NAMES += ("i", "j", "nx", "ny", "length", "f_n", "f_t")
+_SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
 
 
 def read_table(
@@ -51,28 +59,31 @@ def read_table(
     grains: columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and open,
     1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
     numbers from 0 without an id column); optionally nx, ny, length (otherwise nearest images are
-    joined) and fn, ft. Without contacts, grains closer than tolerance (in largest radii) touch.
+    joined) and f_n, f_t (or fn, ft). Without contacts, grains closer than tolerance (in largest
+    radii) touch.
     box: (L_x, L_y), inf for an open direction; None: open. tilt: of the cell, whose upper side
     begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
-    forces: whether to read fn, ft, by default if present; they then determine the pressure (in an
-    open set: the loads). reverse: change the sign of ft. Without forces, the network nearest to
-    equal normal forces at the given pressure (or loads) is computed; pressure is not used with fn,
-    ft. walls ("floor", "box" or segments) and gravity, for tables without forces: see `from_disks`.
-    most_grains: largest number of grains. packing.info has notes on overlaps and on pairs in doubt,
-    which nearly_touching lists [i, j, gap]: no contacts, but less than 100 tolerances apart.
+    forces: whether to read f_n, f_t, by default if present; they then determine the pressure (in an
+    open set: the loads). reverse: change the sign of f_t. Without forces, the network nearest to
+    equal normal forces at the given pressure (or loads) is computed; pressure is not used with f_n,
+    f_t. walls ("floor", "box" or segments) and gravity are for tables without forces, as in
+    `from_disks`. most_grains: largest number of grains. packing.info has notes on
+    overlaps and on pairs in doubt, which nearly_touching lists [i, j, gap]: no contacts, but less
+    than 100 tolerances apart.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     pressure = positive(pressure, "pressure")
     found = [read_csv(source) for source in (grains, contacts) if source is not None]
-    table, *pairs = renamed(columns or {}, NAMES, *found)
+    table, *pairs = renamed(_full(columns or {}), NAMES, *found)
+    pairs = [_with_full_names(one) for one in pairs]
     check_grains(len(table.rows), most_grains, table.name)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
     if not pairs:
         if forces:
-            raise InputError("forces need a table of contacts with columns i, j, fn, ft")
+            raise InputError("forces need a table of contacts with columns i, j, f_n, f_t")
         joined, given = touching(x, r, cell, tolerance), None
     else:
         joined, given = _joined(pairs[0], table, x, r, cell, forces, mu)
@@ -94,10 +105,10 @@ def read_table(
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
-            raise InputError("reverse applies to tables with forces (fn, ft): leave it out")
+            raise InputError("reverse applies to tables with forces (f_n, f_t): leave it out")
         return find(packing, forces="found")
     if walls is not None or gravity:
-        raise InputError("walls and gravity apply to tables without forces: leave out fn and ft")
+        raise InputError("walls and gravity apply to tables without forces: leave out f_n and f_t")
     found = adopt(packing, reverse=reverse, forces="given")
     return found if closed or load.any() else _with_edge(found)
 
@@ -114,6 +125,20 @@ def _with_edge(packing: Packing) -> Packing:
     )
     notes = [*packing.info.get("notes", []), note]
     return packing._replace(info=packing.info | {"notes": notes})
+
+
+def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
+    """The same with the names f_n and f_t for fn and ft."""
+    if not isinstance(columns, Mapping) or not _SHORT.keys() & columns.keys():
+        return columns
+    return {_SHORT.get(name, name): theirs for name, theirs in columns.items()}
+
+
+def _with_full_names(table: Table) -> Table:
+    """The table with forces called f_n and f_t, without their unit."""
+    header = [_SHORT.get(name, name) for name in table.header]
+    named = make_table(table.name, header, table.rows, table.lines)
+    return named.in_packing_unit(_SHORT.values())
 
 
 def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:
@@ -152,12 +177,12 @@ def _joined(
     i, j = table.lookup("i", index), table.lookup("j", index)
     joined = listed(x, r, cell, i, j, table.place, _given_branches(table))
     if forces is None:
-        forces = "fn" in table.header or "ft" in table.header
+        forces = "f_n" in table.header or "f_t" in table.header
     if not forces:
         return joined, None
-    normal = table.numbers("fn")
-    without_friction = mu == 0 and "ft" not in table.header
-    tangential = np.zeros(len(normal)) if without_friction else table.numbers("ft")
+    normal = table.numbers("f_n")
+    without_friction = mu == 0 and "f_t" not in table.header
+    tangential = np.zeros(len(normal)) if without_friction else table.numbers("f_t")
     return joined, np.column_stack([normal, tangential])
 
 

@@ -12,7 +12,7 @@ import os
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import IO, Any, NamedTuple
 
@@ -59,10 +59,14 @@ class Table(NamedTuple):
             rows=[self.rows[k] for k in chosen], lines=[self.lines[k] for k in chosen]
         )
 
-    def in_packing_unit(self) -> Table:
-        """The table without the suffix ``[packing]`` of names; InputError for another unit."""
+    def in_packing_unit(self, forces: Collection[str]) -> Table:
+        """The table without the suffix ``[packing]`` of names.
+
+        forces: columns that must be in this unit. Raises InputError for one in another.
+        """
         for name in self.header:
-            if name.endswith("]") and not name.endswith(PACKING):
+            column, bracket, _ = name.partition(" [")
+            if bracket and column in forces and not name.endswith(PACKING):
                 raise InputError(
                     f"{self.name}: column {_quoted(name)} is not in the packing's unit; write the "
                     "table with --unit packing, or multiply it and leave out the brackets"

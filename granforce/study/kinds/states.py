@@ -384,7 +384,7 @@ VOLUME = Kind(
 )
 INFORMATIVE = Kind(
     name="informative",
-    version=2,
+    version=3,
     title="which measurement next",
     unit="contact",
     parameters=_informative_parameters,

@@ -190,12 +190,12 @@ def test_all_that_was_found_is_one_table():
     head = [line for line in lines if line.startswith("#")]
     rows = lines[len(head) :]
     assert sum("region" in line and "±" in line and "xx" in line for line in head) == 9
-    assert rows[0].startswith("contact,id1,id2,x,y,measured_f_n")
+    assert rows[0].startswith("contact,id1,id2,x,y,f_n_measured")
     assert len(rows) == 1 + len(frame.ends)
     values = np.genfromtxt(rows, delimiter=",", names=True)
     assert set(values["region"]) == set(range(9))
     assert np.array_equal(values["added"], frame.added)
-    assert np.allclose(values["inferred_f_n"], frame.inferred[:, 0], atol=1e-8)
+    assert np.allclose(values["f_n_inferred [mean measured]"], frame.inferred[:, 0], atol=1e-8)
     assert set(np.flatnonzero(values["suspect"])) == set(frame.suspects.tolist())
     # Error bars of the stress, and of the forces.
     assert frame.stress.shape == frame.stress_error.shape == (9, 3)

@@ -62,7 +62,7 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     path = tmp_path / download.value.suggested_filename
     download.value.save_as(path)
     assert path.name == "frame1.svg" and path.stat().st_size > 20_000
-    assert "unit of the file" in path.read_text() and "⟨fₙ⟩" in path.read_text()
+    assert "unit of the file" in path.read_text() and "⟨mₙ⟩" in path.read_text()
 
 
 def test_a_series_is_played_to_frames_that_are_inferred_on_the_way(visit, tmp_path):

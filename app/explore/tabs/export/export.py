@@ -129,8 +129,8 @@ Contacts: one row each, with disks, forces as packed and on screen, the range ov
 if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
 columns. States: the packing and <b>all</b> states with their measures, units and parameters; states
 that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above it. The
-address of the page reopens this view; <code>granforce walk --packing
-packing.npz</code> continues with the packing.
+address of the page reopens this view; <code>granforce walk packing.npz</code> continues
+with the packing.
 """
 
 

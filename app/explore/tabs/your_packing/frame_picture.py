@@ -159,9 +159,9 @@ def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
         at + 0.04 * across, np.full(3, y), np.full(3, 0.08 * across), wide * np.array(SAMPLES),
         color=QUIET, name="width_scale",
     )  # fmt: skip
-    labels = [f"{force:g}" for force in SAMPLES[:-1]] + [f"{SAMPLES[-1]:g} ⟨fₙ⟩"]
+    labels = [f"{force:g}" for force in SAMPLES[:-1]] + [f"{SAMPLES[-1]:g} ⟨mₙ⟩"]
     fig.text(at + 0.1 * across, np.full(3, y), labels, **words)
     y -= STRIP * across
-    fig.text([left], [y], [f"⟨fₙ⟩ = {unit:.3g} (unit of the file)"], **words)
+    fig.text([left], [y], [f"⟨mₙ⟩ = {unit:.3g} (unit of the file)"], **words)
     for one in fig.renderers[before:]:
         one.tags = [SCALE]

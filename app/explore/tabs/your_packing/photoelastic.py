@@ -155,7 +155,7 @@ def found(report: dict[str, Any]) -> str:
 
 def compared(frame: Frame) -> Figure:
     """Figure of inferred against measured forces, for measured contacts."""
-    fig = figure("photoelastic_forces", None, "measured / ⟨fₙ⟩", "inferred / ⟨fₙ⟩", height=340)
+    fig = figure("photoelastic_forces", None, "measured / ⟨mₙ⟩", "inferred / ⟨mₙ⟩", height=340)
     seen = np.isfinite(frame.measured).all(axis=1)
     drawn, ends = [], [0.0]
     for part, (label, colour) in enumerate(COMPONENTS):
@@ -192,7 +192,7 @@ def listed(frame: Frame) -> str:
         f"{named(c)} ({np.nanmax(np.abs(frame.deviation[c])):.1f} σ)" for c in frame.suspects[:TOLD]
     ]
     certain = [
-        f"{named(c)} ({frame.inferred[c, 0]:.2f} ± {frame.error[c, 0]:.2f} ⟨fₙ⟩)"
+        f"{named(c)} ({frame.inferred[c, 0]:.2f} ± {frame.error[c, 0]:.2f} ⟨mₙ⟩)"
         for c in frame.certain[:TOLD]
     ]
     sentences = []

@@ -23,7 +23,7 @@ HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
-j and fn, ft; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
+j and f_n, f_t; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
 for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
 (frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
 <code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Files are

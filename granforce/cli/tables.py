@@ -1,0 +1,174 @@
+"""Files of results: a table (.csv), arrays (.npz) or an xarray dataset (.zarr), by their suffix."""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.cli.results import contact_labels, unit
+from granforce.labelled import COMPONENTS, UNITS, column_name, parts
+from granforce.packing.importers.npz import read_arrays
+from granforce.packing.importers.text import PACKING, read_csv
+from granforce.records import InputError, Packing, are_whole, float_array
+from granforce.study.keys import Parameters
+from granforce.study.schema import VARIABLES
+from granforce.study.series import save_series
+from granforce.system.files import expanded, written
+from granforce.types import Floats, Integers
+
+# Coordinates of contacts: their grains, and the point of contact.
+_LABELS: dict[str, dict[str, str]] = {
+    "i": {"long_name": "first grain"},
+    "j": {"long_name": "second grain"},
+    "x": {"units": "length", "long_name": "point of contact"},
+    "y": {"units": "length", "long_name": "point of contact"},
+}
+
+
+def write_columns(path: str, columns: Mapping[str, Any]) -> None:
+    """Write columns {name: array} in the format given by the suffix."""
+    if path.endswith(".zarr"):
+        save_series(_dataset(columns), path)
+    elif path.endswith(".npz"):
+        _write_arrays(path, columns)
+    else:
+        write_csv(path, columns)
+
+
+def _dataset(columns: Mapping[str, Any]) -> xr.Dataset:
+    """Columns as variables of `to_dataset`: f_n_low and f_t_low become low, by component."""
+    rows, *others = columns
+    coordinates: dict[str, Any] = {rows: columns[rows]}
+    variables: dict[str, Any] = {}
+    for name in others:
+        if name in _LABELS:
+            coordinates[name] = rows, columns[name], _LABELS[name]
+            continue
+        component, variable, word = parts(name)
+        both = [column_name(one, variable, word) for one in COMPONENTS]
+        if component is None or not columns.keys() >= set(both):
+            variable = column_name(component, variable)
+            variables[variable] = rows, columns[name], _attributes(variable, word)
+        elif component == COMPONENTS[0]:
+            values = np.stack([columns[one] for one in both], axis=-1)
+            variables[variable] = (rows, "component"), values, _attributes(variable, word)
+            coordinates["component"] = COMPONENTS
+    return xr.Dataset(variables, coordinates)
+
+
+def _attributes(variable: str, word: str | None) -> dict[str, str]:
+    """Unit and meaning of a variable; word: the unit in the name of its column."""
+    stored = VARIABLES.get(variable)
+    units = UNITS.get(word, word) if word else stored.units if stored else "1"
+    return {"units": units} | ({"long_name": stored.long_name} if stored else {})
+
+
+def _write_arrays(path: str, arrays: Mapping[str, Any]) -> None:
+    with written(path) as file:
+        np.savez(file, **arrays)
+
+
+def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
+    """Write columns {name: array} as a table; integers stay integers."""
+    with written(path) as file:
+        np.savetxt(
+            file,
+            np.column_stack(list(columns.values())),
+            fmt=["%d" if v.dtype.kind == "i" else "%.17g" for v in columns.values()],
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+        )
+
+
+def write_states(
+    arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
+) -> None:
+    """Write the states of a walk or sample with their contacts to the file of --out."""
+    path = arguments.out
+    if path is None:
+        return
+    labels, forces = contact_labels(arguments, parameters, dataset), unit(arguments, dataset)
+    states = dataset["states"].values.astype(np.float64) / forces.scale
+    if path.endswith(".npz"):
+        _write_arrays(path, {column_name(None, "states", forces.word): states, **labels})
+    elif path.endswith(".zarr"):
+        coordinates: dict[str, Any] = {
+            name: ("contact", column, _LABELS.get(name)) for name, column in labels.items()
+        }
+        coordinates["component"] = COMPONENTS
+        dims, attributes = ("state", "contact", "component"), _attributes("states", forces.word)
+        save_series(xr.Dataset({"states": (dims, states, attributes)}, coordinates), path)
+    else:
+        count = len(states)
+        columns = {"state": np.repeat(np.arange(count), dataset.sizes["contact"])}
+        columns |= {label: np.tile(column, count) for label, column in labels.items()}
+        pair = {
+            column_name(component, "", forces.word): states[..., k].ravel()
+            for k, component in enumerate(COMPONENTS)
+        }
+        write_csv(path, columns | pair)
+
+
+def read_states(path: str, packing: Packing) -> tuple[Integers, Floats]:
+    """Contacts (k,) of a packing and states (S, k, 2) on them, from a file of `write_states`.
+
+    Raises InputError for files of another kind or unit, and for states of another packing.
+    """
+    readers = {".csv": _states_of_table, ".npz": _states_of_arrays, ".zarr": _states_of_dataset}
+    reader = readers.get(Path(path).suffix)
+    if reader is None:
+        raise InputError(f"{path}: the name must end with .csv, .npz or .zarr")
+    contact, i, j, states = reader(path)
+    count, grains = len(packing.contacts.i), packing.contacts
+    if contact.ndim != 1 or not contact.size or not are_whole(contact, count - 1).all():
+        raise InputError(f"{path}: contacts must be numbered 0 … {count - 1} as in the packing")
+    contact = contact.astype(np.int64)
+    if not (np.array_equal(grains.i[contact], i) and np.array_equal(grains.j[contact], j)):
+        raise InputError(f"{path}: its contacts join other grains; is it of another packing?")
+    return contact, float_array(states, (-1, len(contact), 2), f"{path}: states")
+
+
+_States = tuple[Any, Any, Any, Any]  # numbers of contacts, their grains i and j, and states
+
+
+def _states_of_table(path: str) -> _States:
+    table = read_csv(path).in_packing_unit(COMPONENTS)
+    state, contact = table.whole("state"), table.whole("contact")
+    forces = np.column_stack([table.numbers(component) for component in COMPONENTS])
+    first = int(np.sum(state == state[0]))
+    if not np.array_equal(contact, np.resize(contact[:first], len(contact))):
+        raise InputError(f"{path}: every state must have the same contacts in the same order")
+    i, j = (table.some(range(first)).whole(name) for name in ("i", "j"))
+    if len(forces) % first:
+        raise InputError(f"{path}: the last state is not complete")
+    return contact[:first], i, j, forces.reshape(-1, first, 2)
+
+
+def _states_of_arrays(path: str) -> _States:
+    arrays = read_arrays(path)
+    return _picked(path, arrays, f"states{PACKING}", arrays)
+
+
+def _states_of_dataset(path: str) -> _States:
+    try:
+        dataset = xr.open_zarr(expanded(path), consolidated=False).load()
+    except Exception as error:  # of many kinds, by zarr and xarray
+        raise InputError(f"{path}: not a Zarr dataset ({type(error).__name__})") from None
+    units = dataset["states"].attrs.get("units") if "states" in dataset else None
+    given = {name: values.values for name, values in dataset.variables.items()}
+    return _picked(path, given, "states", {"states"} if units == UNITS["packing"] else set())
+
+
+def _picked(path: str, arrays: Mapping[Any, Any], states: str, there: Any) -> _States:
+    names = ("contact", "i", "j", states)
+    if states not in there or any(name not in arrays for name in names):
+        raise InputError(
+            f"{path}: no states in the packing's unit; write them by granforce walk or uniform "
+            "--out with --unit packing"
+        )
+    contact, i, j, values = (arrays[name] for name in names)
+    return contact, i, j, values
