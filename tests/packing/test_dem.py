@@ -67,7 +67,7 @@ def mercury(flat=False, steps=2, both=True, turned=False, tilted=False):
                 row = [time, i, j, 0, 0, 0, 0, 0, f_n, abs(f_t), *sign * c.normal[k], 0]
                 fstat.append(" ".join(f"{v:.15g}" for v in [*row, *sign * t, 0]))
         fstat.append(f"{time:g} 0 -1 0 0 0 0 0 1 0 1 0 0 0 1 0")
-    return ["\n".join(text).encode() for text in (data, fstat)]
+    return ["\n".join([*text, ""]).encode() for text in (data, fstat)]
 
 
 def given(*contents):
