@@ -147,6 +147,7 @@ class _Around:
         player.hears["tab"] = tabs.choose
         pale_when_old([*tabs.pages.items(), ("results", self.results)])
         self.panels[:] = [tabs.tabs]
+        tabs.drawn()
         self.results[:] = [Results(state, **WIDE)]
         yield
         yield from tabs.filling(state.looks.tab)

@@ -15,7 +15,7 @@ from small_store import ROOT
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as older links have it; an address without a view says the same.
 MANY = "?scene=many"
-PATIENCE = 180_000
+PATIENCE = 180_000  # ms, on a busy machine
 # What makes a browser one that was here before, for the small scenes.
 SEEN = "['tour', 'guess', 'hand', 'network']"
 KNOW = f"for (const what of {SEEN}) localStorage.setItem(`granforce.${{what}}`, 'seen')"

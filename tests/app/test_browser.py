@@ -179,18 +179,18 @@ def test_the_forces_on_a_disk_are_shown_and_balance(page):
 
 def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page = visit(MANY + "&frame=5&full=0.2&stretch=5")
-    c, width, bin_, colours, change, force = scene(
+    c, width, bin_, colours, change, force, radius = scene(
         page,
         """(() => {
             const {style, mixed: {normal}} = scene, first = scene.hand.player.replay.walk.normal
             const c = normal.findIndex((n, c) => n > 0.1 && Math.abs(n - first[c]) < 0.15)
             return [
                 c, style.width[c], style.bin[c], style.colours.length,
-                normal[c] - first[c], normal[c],
+                normal[c] - first[c], normal[c], Math.max(...scene.geometry.r),
             ]
         })()""",
     )
-    assert c >= 0 and width == pytest.approx(5 * 0.23 * force, rel=1e-5)
+    assert c >= 0 and width == pytest.approx(5 * 0.23 * radius * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
     page.get_by_text("+0.2 ⟨fₙ⟩").wait_for()
     page.get_by_text("1.74 ⟨fₙ⟩").wait_for()

@@ -76,7 +76,7 @@ class Tabs:
             sx=LOOK,
             sizing_mode="stretch_width",
         )
-        self.tabs.jscallback(args={"space": space}, active=SHOW)
+        self._shown = self.tabs.jscallback(args={"space": space}, active=SHOW)
         self.pages["plane"] = space
         for page in self.pages.values():
             page[:] = [note(OPENING)]
@@ -84,6 +84,10 @@ class Tabs:
         self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
         self.looks.param.watch(self._place, ["tab", "wide"])
         self._place()
+
+    def drawn(self) -> None:
+        """Let go of what the browser has: Panel keeps callbacks, and pages with them, for ever."""
+        self._shown.unwatch()
 
     def choose(self, number: int) -> None:
         """Show tab 1, 2, …; other numbers, and force space where it has no tab, have no effect."""

@@ -194,9 +194,9 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     )
     corners = page.locator(".scene").evaluate(
         """({scene}) => {
-            const corners = [], context = {
+            const corners = [], through = (x, y) => corners.push([x, y]), context = {
                 beginPath() {}, closePath() {}, setLineDash() {}, stroke() {},
-                lineTo(x, y) { corners.push([x, y]) },
+                moveTo: through, lineTo: through,
             }
             scene.drawBox(context)
             return corners

@@ -192,7 +192,7 @@ def test_all_that_was_found_is_one_table():
     assert sum("region" in line and "±" in line and "xx" in line for line in head) == 9
     assert rows[0].startswith("contact,id1,id2,x,y,f_n_measured")
     assert len(rows) == 1 + len(frame.ends)
-    values = np.genfromtxt(rows, delimiter=",", names=True)
+    values = np.genfromtxt(rows, delimiter=",", names=True, deletechars="", replace_space=" ")
     assert set(values["region"]) == set(range(9))
     assert np.array_equal(values["added"], frame.added)
     assert np.allclose(values["f_n_inferred [mean measured]"], frame.inferred[:, 0], atol=1e-8)

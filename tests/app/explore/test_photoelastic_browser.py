@@ -17,8 +17,8 @@ PICTURES = """() => {
 
 # The toolbar is hidden until the pointer is on the picture; its button works all the same.
 SAVE = """() => {
-  const models = [...Bokeh.documents[0].all_models]
-  const {toolbar} = models.findLast(model => model.name === "photoelastic_network")
+  const page = Bokeh.documents[0], {toolbar} = [...page.all_models].find(model =>
+    model.name === "photoelastic_network" && page.views_manager.find_one(model))
   const tool = toolbar.tools.find(({description}) => description === "Save as SVG")
   return tool.callback.execute(tool)
 }"""
@@ -46,13 +46,13 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     page = visit("?scene=many&tab=upload", width, 900)
     dropped(page, tmp_path, (1,))
     for name, count in (("Both", 2), ("Difference in σ", 1), ("Measured", 1), ("Inferred", 1)):
-        page.get_by_label("Forces").select_option(name)
+        page.get_by_label("Forces", exact=True).select_option(name)
         page.wait_for_function(
             f"count => {{const all = ({PICTURES})(); "
             "return all.length === count && all.every(w => w > 100)}",
             arg=count,
         )
-        page.get_by_label("Forces").evaluate("e => e.scrollIntoView()")
+        page.get_by_label("Forces", exact=True).evaluate("e => e.scrollIntoView()")
         picture(page, f"photoelastic/{width}_{name.split()[0]}")
     # Nothing is wider than the page.
     wide = page.evaluate("() => document.scrollingElement.scrollWidth")
