@@ -52,7 +52,7 @@ MEANINGS = {
     "violation": "largest excess over Coulomb's law, in ⟨f_n⟩",
     "largest_overlap": "of two bodies, in largest radii",
     "largest_contact_gap": "largest gap of a contact, in largest radii",
-    "least_other_gap": "smallest gap of a pair that is no contact, likewise",
+    "least_other_gap": "smallest gap of a pair that is no contact, likewise; 0.1 if none is below",
     "steps": "time steps of the compaction",
     "sweeps_done": "sweeps over all contacts in these steps",
     "distance_to_rest": "change of the forces in one exact step of dynamics, in ⟨f_n⟩",

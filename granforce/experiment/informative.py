@@ -82,15 +82,17 @@ def informative(
     expected, alike = _expected(normal)
     if not expected.any():
         raise InputError("nothing to measure: balance determines every force")
-    order = _without_twins(np.argsort(-expected, kind="stable"), expected, alike)[:k]
+    order = _without_twins(np.argsort(-expected, kind="stable"), expected, alike)
+    order = order[: max(k, check)]
     before, after = np.nan, np.full(len(order), np.nan)
     best = order[:check]
 
     def ranked(rows: Integers, after: Floats) -> Informative:
+        rows = rows[:k]
         named = tuple(
             tuple(int(ensemble.index[d]) for d in np.flatnonzero(alike[c]) if d != c) for c in rows
         )
-        return Informative(ensemble.index[rows], expected[rows], before, after, named)
+        return Informative(ensemble.index[rows], expected[rows], before, after[:k], named)
 
     if watch is not None:
         watch(ranked(order, after.copy()))

@@ -191,6 +191,7 @@ def _unbalanced_message(full: Ensemble) -> str:
         )
     named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
     return (
-        f"no admissible force network exists: {carries}the packing is not jammed, or contacts are "
-        f"missing; grains with the largest unbalanced load: {named or 'none'}"
+        f"no admissible force network exists: {carries}the packing is not jammed, friction is "
+        "too small, or contacts are missing; grains with the largest unbalanced load: "
+        f"{named or 'none'}"
     )

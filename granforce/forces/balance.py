@@ -79,9 +79,11 @@ def prescribed_stress(
             raise InputError(
                 "the packing has no forces from which to compute the stress: give the stress"
             )
-    stress = float_array(stress, (3,), "stress")
+    stress = float_array(stress, (3,), "stress (σ_xx, σ_yy, σ_xy)")
     if not stress[0] + stress[1] > 0:
-        raise InputError("the stress must be compressive: σ_xx + σ_yy must be above 0")
+        raise InputError(
+            "the stress must be compressive, which is positive: σ_xx + σ_yy must be above 0"
+        )
     return stress
 
 

@@ -156,8 +156,14 @@ class Ensemble:
 
     @property
     def coordination(self) -> float:
-        """Mean coordination number z = 2 N_c / M of the backbone; NaN without grains to balance."""
-        return 2 * len(self.index) / len(self.grains) if len(self.grains) else np.nan
+        """Mean number z of contacts of a grain of the backbone; NaN without grains to balance.
+
+        2 N_c / M, except that contacts with walls and other grains left open count once.
+        """
+        if not len(self.grains):
+            return np.nan
+        ends = np.isin([self.contacts.i, self.contacts.j], self.grains)
+        return float(ends.sum() / len(self.grains))
 
     @cached_property
     def cone_form(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:

@@ -73,8 +73,10 @@ def bounds_of(known: Known | None, count: int) -> Floats:
             "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
             "f_n and f_t"
         ) from None
-    if not are_whole(contacts, count - 1).all():
-        raise InputError(f"a known contact is none of the packing's 0 … {count - 1}")
+    there = are_whole(contacts, count - 1)
+    if not there.all():
+        first = contacts[~there][0]
+        raise InputError(f"known contact {first:g} is none of the packing's 0 … {count - 1}")
     contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
         raise InputError("a bound is NaN; use −inf and inf for unknown bounds")

@@ -45,6 +45,12 @@ def test_the_best_measurement_shortens_the_exact_intervals_most(S):
     assert np.mean(np.array(after) < found.after[0]) < 0.1
 
 
+def test_a_shorter_list_is_the_head_of_a_longer_one(S):
+    """Candidates are compared by exact bounds before the list is cut."""
+    assert np.array_equal(informative(S, 2).contacts, informative(S, 10).contacts[:2])
+    assert len(informative(S, 10, check=3).contacts) == 10
+
+
 def test_expectation_alone_takes_no_program(S):
     found = informative(S, 8, check=0)
     assert np.isnan(found.before) and np.isnan(found.after).all()

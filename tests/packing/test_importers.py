@@ -780,6 +780,12 @@ LINKS = "i,j,fn,ft\n7,8,1,0\n8,9,1,0\n"
         ("x,y,r,fx\n0,0,1,1\n2,0,1,-1\n", None, {"box": (9, 9)}, "line 2: a load in a periodic"),
         ("x,y,r,fx\n0,0,1,-1\n2,0,1,1\n", None, {}, "no forces balance .* at grains 0, 1"),
         ("x,y,r,fx\n0,0,1,1\n3,0,1,-1\n", None, {}, "no grains touch"),
+        (
+            "x,y,r\n0,1,1\n2,1,1\n1,2.7322,1\n",
+            None,
+            {"walls": "floor", "gravity": 1},
+            "2 pairs nearly touch, with gaps from 0.00013 .*: a larger --tolerance",
+        ),
     ],
 )
 def test_wrong_tables_are_refused_with_a_reason(grains, contacts, options, message):

@@ -39,6 +39,7 @@ def test_the_groove_has_both_ends_of_the_textbook(angle, mu):
     # Torque: f_t is the same at both walls; f_n too. Vertical: 2 (f_n sin α ± f_t cos α) = 1.
     half = np.radians(angle / 2)
     S = gf.ensemble(gf.scene("groove", mu, angle=angle))
+    assert S.coordination == 2
     least = 0.5 / (np.sin(half) + mu * np.cos(half))
     largest = 0.5 / (np.sin(half) - mu * np.cos(half))
     for contact in (0, 1):

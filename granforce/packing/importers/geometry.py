@@ -65,14 +65,26 @@ def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, F
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
+def apart(packing: Packing, near: float) -> tuple[Integers, Integers, Floats]:
+    """Grains i, j (P,) of pairs that are no contacts, and their gaps (P,) below `near`.
+
+    near is in largest radii, gaps are in the unit of x.
+    """
+    x, r, c = packing.x, packing.r, packing.contacts
+    i, j, shift = find_pairs(x, r, packing.cell, near * r.max())
+    joined = np.minimum(c.i, c.j) * len(r) + np.maximum(c.i, c.j)
+    free = ~np.isin(i * len(r) + j, joined)
+    i, j, shift = i[free], j[free], shift[free]
+    return i, j, np.hypot(*(x[j] - x[i] + shift @ packing.cell.vectors).T) - r[i] - r[j]
+
+
 def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
     """The packing with notes in info on large overlaps, and on pairs near the tolerance.
 
     info["nearly_touching"] lists [i, j, gap] of pairs that are no contacts though their gap is
     below NEARLY tolerances (in largest radii); the gap is in the unit of x.
     """
-    x, r, c = packing.x, packing.r, packing.contacts
-    largest, notes = r.max(), []
+    c, largest, notes = packing.contacts, packing.r.max(), []
     overlap = -c.gap.min(initial=0.0) / largest
     if overlap > RIGID_OVERLAP:
         mean = -c.gap[c.gap < 0].mean() / largest
@@ -81,11 +93,7 @@ def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
             "count as soft, each contact at the middle of its overlap"
         )
     near = min(NEARLY * tolerance, 1.0)
-    i, j, shift = find_pairs(x, r, packing.cell, near * largest)
-    joined = np.minimum(c.i, c.j) * len(r) + np.maximum(c.i, c.j)
-    apart = ~np.isin(i * len(r) + j, joined)
-    i, j, shift = i[apart], j[apart], shift[apart]
-    gap = np.hypot(*(x[j] - x[i] + shift @ packing.cell.vectors).T) - r[i] - r[j]
+    i, j, gap = apart(packing, near)
     if len(i):
         pairs = "1 pair is" if len(i) == 1 else f"{len(i)} pairs are"
         notes.append(

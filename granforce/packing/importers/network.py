@@ -12,7 +12,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin
-from granforce.packing.importers.geometry import gain_by_reversing, overlapping
+from granforce.packing.importers.geometry import apart, gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 from granforce.types import Floats, Integers
@@ -20,6 +20,8 @@ from granforce.types import Floats, Integers
 # Unbalance of the loads of an open set, in ⟨f_n⟩, that is attributed to digits lost in the file and
 # removed, since S would be empty otherwise.
 LOAD_MISFIT = 1e-3
+# Gap in largest radii below which pairs that are no contacts are named if nothing balances.
+MISSED = 0.01
 # Fraction of the unbalance that reversing f_t must remove for a note.
 WORTH_REVERSING = 0.5
 
@@ -224,6 +226,18 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
         return settled, ensemble(settled)
 
 
+def _missed(packing: Packing) -> str:
+    """Words on pairs that may be contacts: their number and smallest gap."""
+    gap = apart(packing, MISSED)[2] / packing.r.max()
+    if not len(gap):
+        return ""
+    pairs = "1 pair nearly touches" if len(gap) == 1 else f"{len(gap)} pairs nearly touch"
+    return (
+        f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius: a larger --tolerance "
+        "(tolerance=) makes them contacts"
+    )
+
+
 def _settled(packing: Packing) -> Packing:
     """The packing with the loads nearest to its own that contact forces can balance.
 
@@ -242,8 +256,9 @@ def _settled(packing: Packing) -> Packing:
             else ("; if walls hold the grains, give them (--walls floor, or walls=)")
         )
         raise NotJammedError(
-            f"no forces balance the loads, whose sum is ({total}); correct loads or contacts: "
-            f"most is left over at grains {named} (counted from 0){walls}"
+            f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
+            f"friction: most is left over at grains {named} (counted from 0){walls}"
+            f"{_missed(packing)}"
         )
     load = packing.load.copy()
     unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])
