@@ -79,3 +79,6 @@ MEASURED, ERRORS = 1e6, 1e9
 # Digits to which friction coefficients, and all numbers in the keys of results, are compared and
 # stored (0.1 + 0.2 is 0.3).
 MU_DIGITS = 15
+# Largest error of the ends of a line of thrust at a joint, as a part of the joint's length, for
+# networks in which the joint carries at least LOADED_JOINT ⟨f_n⟩.
+JOINT_GAP, LOADED_JOINT = 1e-6, 0.01

@@ -16,10 +16,9 @@ from granforce.explore.outline import solved
 from granforce.forces.contact_problem import cone_costs, known_part, make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
+from granforce.tolerances import JOINT_GAP, LOADED_JOINT
 from granforce.types import Floats, Integers
 
-_LOADED = 0.01  # ⟨f_n⟩, least force of a joint for which its ends are certified
-_FOUND = 1e-6  # largest error of the ends
 _ROUNDS = 30
 
 
@@ -29,7 +28,7 @@ class Thrust(NamedTuple):
     contacts: Integers  # (k, 2) a, b: positions in the backbone
     low: Floats  # (k,) attained by networks; NaN if not certified
     high: Floats  # (k,)
-    gap: Floats  # (k,) no network in which the joint carries _LOADED ⟨f_n⟩ goes farther beyond
+    gap: Floats  # (k,) no network in which the joint carries LOADED_JOINT ⟨f_n⟩ goes farther beyond
 
 
 def thrust(ensemble: Ensemble) -> Thrust:
@@ -57,14 +56,14 @@ def thrust(ensemble: Ensemble) -> Thrust:
         directions[rows, a], directions[rows, b] = -part[active], 1 - part[active]
         found = solved(solver, plane, directions, keys)[1]
         keys += len(active)
-        gap[active] = np.maximum(found.bound, 0.0) / _LOADED
+        gap[active] = np.maximum(found.bound, 0.0) / LOADED_JOINT
         force = np.maximum(found.point, 0.0)
         total = force[rows, a] + force[rows, b]
         farther = force[rows, b] / np.where(total > 0, total, 1.0)
-        going = (gap[active] > _FOUND) & (farther > part[active])
+        going = (gap[active] > JOINT_GAP) & (farther > part[active])
         part[active] = np.where(going, farther, part[active])
         active = active[going]
         if not len(active):
             break
-    part = np.where(gap <= _FOUND, part, np.nan)
+    part = np.where(gap <= JOINT_GAP, part, np.nan)
     return Thrust(joints, 1 - part[size:], part[:size], np.maximum(gap[:size], gap[size:]))

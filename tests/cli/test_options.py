@@ -134,6 +134,7 @@ def here(place, monkeypatch):
     # What opens a page, and what computes for minutes; what they are given is read before.
     monkeypatch.setattr(commands.service.runpy, "run_module", lambda *args, **kwargs: None)
     monkeypatch.setattr("granforce.bench.main", lambda *args: None)
+    monkeypatch.setattr(commands.service, "_build_docs", lambda folder: None)
     monkeypatch.setattr(commands.states.scans, "scan", lambda *args, **kwargs: ([], []))
     monkeypatch.setattr("granforce.figures.indeterminacy", lambda *args, **kwargs: None)
     monkeypatch.setattr("granforce.figures.save", lambda *args: None)
