@@ -55,7 +55,7 @@ MEANINGS = {
     "least_other_gap": "smallest gap of a pair that is no contact, likewise; 0.1 if none is below",
     "steps": "time steps of the compaction",
     "sweeps_done": "sweeps over all contacts in these steps",
-    "distance_to_rest": "change of the forces in one exact step of dynamics, in ⟨f_n⟩",
+    "distance_to_rest": "largest change of a force until exact dynamics is at rest, in ⟨f_n⟩",
     "scene": "name of the scene",
     "timestep": "of the snapshot",
     "time": "of the snapshot",

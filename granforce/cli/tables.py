@@ -123,11 +123,12 @@ def read_states(path: str, packing: Packing) -> tuple[Integers, Floats]:
     if reader is None:
         raise InputError(f"{path}: the name must end with .csv, .npz or .zarr")
     contact, i, j, states = reader(path)
-    count, grains = len(packing.contacts.i), packing.contacts
+    own = packing.contacts
+    count = len(own.i)
     if contact.ndim != 1 or not contact.size or not are_whole(contact, count - 1).all():
         raise InputError(f"{path}: contacts must be numbered 0 … {count - 1} as in the packing")
     contact = contact.astype(np.int64)
-    if not (np.array_equal(grains.i[contact], i) and np.array_equal(grains.j[contact], j)):
+    if not (np.array_equal(own.i[contact], i) and np.array_equal(own.j[contact], j)):
         raise InputError(f"{path}: its contacts join other grains; is it of another packing?")
     return contact, float_array(states, (-1, len(contact), 2), f"{path}: states")
 

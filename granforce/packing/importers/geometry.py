@@ -62,7 +62,7 @@ def largest_gap(tolerance: float) -> float:
 def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, Floats]:
     """Grains i, j (P,) of all overlapping pairs, and their gaps (P,) < 0; centres may coincide."""
     i, j, shift = find_pairs(x, r, cell, 0.0)
-    return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
+    return i, j, _gaps(x, r, cell, i, j, shift)
 
 
 def apart(packing: Packing, near: float) -> tuple[Integers, Integers, Floats]:
@@ -75,7 +75,12 @@ def apart(packing: Packing, near: float) -> tuple[Integers, Integers, Floats]:
     joined = np.minimum(c.i, c.j) * len(r) + np.maximum(c.i, c.j)
     free = ~np.isin(i * len(r) + j, joined)
     i, j, shift = i[free], j[free], shift[free]
-    return i, j, np.hypot(*(x[j] - x[i] + shift @ packing.cell.vectors).T) - r[i] - r[j]
+    return i, j, _gaps(x, r, packing.cell, i, j, shift)
+
+
+def _gaps(x: Floats, r: Floats, cell: Cell, i: Integers, j: Integers, shift: Integers) -> Floats:
+    """Gaps (P,) of pairs, whose centres may coincide: `separations` needs a direction."""
+    return np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
 def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
