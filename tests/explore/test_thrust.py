@@ -40,3 +40,25 @@ def test_every_line_of_thrust_lies_within(S):
     part = b / (a + b)
     assert np.all((part >= found.low - 1e-6) & (part <= found.high + 1e-6))
     assert np.all(np.ptp(part, axis=0) > 0.2 * (found.high - found.low))
+
+
+def test_the_thinnest_arch_that_stands_touches_its_faces_at_five_places():
+    """Outer, inner, outer, inner, outer, as Heyman's semicircular arch; 24 voussoirs."""
+    thinnest = 0.107096436
+    with pytest.raises(gf.NotJammedError):
+        gf.scene("arch", 0.8, voussoirs=24, thickness=thinnest - 1e-6)
+    S = gf.ensemble(gf.scene("arch", 0.8, voussoirs=24, thickness=1.0005 * thinnest))
+    found = thrust(S)
+    a, b = (S.packing.contact_points[S.index[found.contacts[:, k]]] for k in (0, 1))
+    outward = np.hypot(*b.T) > np.hypot(*a.T)
+    depth = (
+        np.where(outward, found.low, 1 - found.high),
+        np.where(outward, found.high, 1 - found.low),
+    )
+    angle = np.degrees(np.arctan2(a[:, 0], a[:, 1]))
+    touching = {
+        "inner": sorted(angle[depth[0] < 1e-6].round(1)),
+        "outer": sorted(angle[depth[1] > 1 - 1e-6].round(1)),
+    }
+    assert touching == {"inner": [-52.5, 52.5], "outer": [-90.0, 0.0, 90.0]}
+    assert np.max(depth[1] - depth[0]) < 2e-3  # one line, almost
