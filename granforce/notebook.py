@@ -133,7 +133,8 @@ class Picture(NamedTuple):
     begin: Floats  # (N_c, 2) one end of each line of force
     branch: Floats  # (N_c, 2) from there to the other
     forces: Floats  # (N_c, 2) f_n, f_t
-    mu: float
+    friction: Floats  # (N_c,) friction coefficients
+    mu: float  # the largest
     packing_fraction: float  # NaN in an open box
     grains: int  # whose balance is required: without walls
     polygons: Sequence[Floats]  # (k, 2) corners of each body, empty for a disk; none if all are
@@ -231,7 +232,7 @@ def _chains(packing: Picture, place: Callable[[Floats], Floats], scale: float) -
     pressing = pressing[np.argsort(-normal[pressing], kind="stable")][:MOST_DRAWN]
     force = normal[pressing] / normal[pressing].mean()
     width = np.ceil(np.minimum(force / WIDE, 1) * WIDTHS).astype(int)
-    friction = packing.mu * normal[pressing]
+    friction = packing.friction[pressing] * normal[pressing]
     mobilised = np.divide(tangential[pressing], friction, np.zeros_like(force), where=friction > 0)
     colour = ((np.clip(mobilised, -1, 1) + 1) / 2 * len(COLOURS)).astype(int)
     colour = np.minimum(colour, len(COLOURS) - 1)

@@ -72,6 +72,7 @@ class Contacts(NamedTuple):
     # (N_c, 2) b_i, b_j: the contact point lies at x_i + a_i n + b_i t and at x_j − a_j n + b_j t.
     # None: 0 everywhere, as for disks.
     levers: Floats | None = None
+    friction_ratio: Floats | None = None  # (N_c,) friction over the packing's μ; None: 1 everywhere
 
     def picked(self, rows: Integers | Mask) -> Contacts:
         """The contacts of these rows: a mask (N_c,), or positions (k,)."""
@@ -82,8 +83,14 @@ class Contacts(NamedTuple):
         both = [self, others]
         if (self.levers is None) != (others.levers is None):
             both = [one._replace(levers=one.offsets) for one in both]
+        if (self.friction_ratio is None) != (others.friction_ratio is None):
+            both = [one._replace(friction_ratio=one.friction(1.0)) for one in both]
         pairs = zip(*both, strict=True)
         return Contacts._make(None if a is None else np.concatenate([a, b]) for a, b in pairs)
+
+    def friction(self, mu: float) -> Floats:
+        """Friction coefficients (N_c,), the largest of the packing being μ."""
+        return np.full(len(self.i), mu) if self.friction_ratio is None else mu * self.friction_ratio
 
     @property
     def tangent(self) -> Floats:
@@ -119,7 +126,7 @@ class Packing(NamedTuple):
     box: Floats  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
     contacts: Contacts
     forces: Floats  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
-    mu: float  # friction coefficient μ
+    mu: float  # friction coefficient μ, the largest if `contacts.friction_ratio` is given
     pressure: float  # P0, force per length; nan if no pressure is prescribed
     load: Floats  # (N, 3) external force and torque on each grain; NaN: its balance is left open
     info: dict[str, Any]  # origin: seed, steps, skipped work, … (plain values)
@@ -176,6 +183,7 @@ class Packing(NamedTuple):
                 begin=begin,
                 branch=branch,
                 forces=self.forces,
+                friction=contacts.friction(self.mu),
                 mu=self.mu,
                 packing_fraction=self.packing_fraction,
                 grains=int(np.isfinite(self.load).all(axis=1).sum()),
@@ -333,6 +341,22 @@ def friction(mu: Any) -> float:
             f"friction coefficient {value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
         )
     return float(f"{abs(value):.{MU_DIGITS}g}")  # also for −0
+
+
+def with_friction(contacts: Contacts, mu: Any) -> tuple[Contacts, float]:
+    """The contacts with friction coefficients μ (N_c,), and the largest of these.
+
+    One number is that of the roughest contacts; the ratio of others to it stays as it is.
+    """
+    several = np.iterable(mu) and not isinstance(mu, str)
+    if not several:
+        return contacts, friction(mu)
+    values = float_array(mu, contacts.i.shape, "friction coefficients")
+    each, place = np.unique(values, return_inverse=True)
+    each = np.array([friction(value) for value in each])
+    most = float(each.max(initial=0.0))
+    ratio = (each / most)[place] if len(each) > 1 else None
+    return contacts._replace(friction_ratio=ratio), most
 
 
 def positive(
@@ -493,10 +517,10 @@ def make_packing(
     x (N, 2): centres. r (N,): radii. box: sides (L_x, L_y) of the cell, inf in an open direction;
     tilt: x component of its second vector. contacts: from `make_contacts`. forces (N_c, 2): f_n,
     f_t of the packing's network, zeros if there is none. pressure: P0, force per length, NaN if
-    none is prescribed. load (N, 3): external force and torque on each grain, by default none; a row
-    of NaN leaves its balance open. info: plain values to store with the packing. A tilt beyond
-    ±L_x/2 is replaced by the one in this range that spans the same lattice. shapes: of bodies other
-    than disks.
+    none is prescribed. mu: friction coefficient, or those (N_c,) of all contacts. load (N, 3):
+    external force and torque on each grain, by default none; a row of NaN leaves its balance open.
+    info: plain values to store with the packing. A tilt beyond ±L_x/2 is replaced by the one in
+    this range that spans the same lattice. shapes: of bodies other than disks.
 
     Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains
     that touch their own images, and shapes that do not match.
@@ -521,7 +545,8 @@ def make_packing(
     shapes = None if shapes is None else _shapes(shapes, len(r))
     info = dict(info or {})
     pressure = float(pressure)
-    return Packing(x, r, box, contacts, forces, friction(mu), pressure, load, info, tilt, shapes)
+    contacts, mu = with_friction(contacts, mu)
+    return Packing(x, r, box, contacts, forces, mu, pressure, load, info, tilt, shapes)
 
 
 def _shapes(shapes: Shapes, bodies: int) -> Shapes:

@@ -83,6 +83,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "high": np.ascontiguousarray(replay.high[:, 0]),
         "backbone": replay.backbone.astype(np.int32),
         "mu": replay.summary["mu"],
+        "friction": replay.friction,
         "free": replay.summary["dimension"],
         "states": replay.summary["states"],
         "box": [float(side) if np.isfinite(side) else -1.0 for side in replay.box],

@@ -28,6 +28,7 @@ class Replay(NamedTuple):
     inviting: int  # row of links suggested for dragging, or -1
     typical: int  # the contact whose f_n scatters most like the average, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
+    friction: Floats  # (N_c,) friction coefficients
     force_scale: float  # ⟨f_n⟩, force
     normal: Any  # (F, N_c) float32 f_n: the original network, then the stored states
     tangential: Any  # (F, N_c) float32 f_t
@@ -141,6 +142,7 @@ def _replay(
         inviting=geometry.inviting(links, frames[0, :, 0], window),
         typical=_typical(frames[:, :, 0]),
         backbone=backbone,
+        friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
         force_scale=scale,
         normal=np.ascontiguousarray(frames[..., 0]),
         tangential=np.ascontiguousarray(frames[..., 1]),

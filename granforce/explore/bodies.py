@@ -94,14 +94,15 @@ def body(S: Ensemble) -> Body:
 
     Raises InputError if S has more dimensions, or if forces are known.
     """
-    if S.known is not None:
+    if S.informed.any():
         raise InputError("gf.body does not accept known forces: leave them out")
     h = S.dimension
     if h > MOST_DIMENSIONS:
         raise InputError(f"S has {h} dimensions; gf.body accepts at most {MOST_DIMENSIONS}")
     # By forces, not cone coordinates: their f_t, μ times a difference, is rounded μ times as much.
     origin = _inner(S)
-    axes = null_space(hull.constraints(S, S.hull.held).toarray(), h)
+    axes = np.zeros((S.A.shape[1], h))
+    axes[S.free] = null_space(hull.constraints(S, S.hull.held).toarray(), h)
     walls, moving = hull.distances(S), np.flatnonzero(~S.hull.held)
     slopes = (walls @ axes)[moving]
     shape = _shape(slopes, (walls @ origin)[moving])
@@ -126,7 +127,7 @@ def fall(packing: Packing, mu: float | None = None) -> Floats | None:
     rows, _ = whole.cone_form
     largest = abs(rows).max(axis=1).toarray().ravel()
     size = whole.per_grain
-    moved = -(ray / np.where(largest > 0, largest, 1.0))[: size * len(whole.grains)]
+    moved = -(ray[: len(largest)] / np.where(largest > 0, largest, 1.0))[: size * len(whole.grains)]
     motion = np.zeros((len(packing.r), 3))
     motion[whole.grains, :size] = moved.reshape(-1, size)
     return motion / (np.abs(motion).max() or 1.0)

@@ -285,7 +285,7 @@ def _positions(ensemble: Ensemble, contacts: npt.ArrayLike | None) -> Integers:
 def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Program:
     """The program of one bound: minimise f, or −f for the upper side."""
     half = -0.5 if side else 0.5
-    columns, unit = [2 * contact, 2 * contact + 1], ensemble.mu if component else 1.0
+    columns, unit = [2 * contact, 2 * contact + 1], ensemble.slopes[contact] if component else 1.0
     return Program(columns, [half * unit, (-half if component else half) * unit], -1)
 
 

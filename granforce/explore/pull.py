@@ -133,7 +133,7 @@ def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) ->
     search = Search(independent_problem_of(ensemble)._replace(w=w), targets, start)
     search.run(BALANCED / 4, _MOST_STEPS, count)
     states = ensemble.pin(search.forces()[:count] * scale)
-    limit = ensemble.mu * np.maximum(values, 0.0)
+    limit = ensemble.friction[position] * np.maximum(values, 0.0)
     states[:, position, 0] = values
     states[:, position, 1] = np.clip(states[:, position, 1], -limit, limit)
     return states
@@ -227,5 +227,6 @@ def _at_walls(ensemble: Ensemble, states: Floats) -> tuple[Mask, Integers]:
     normal, tangential = states[..., 0], states[..., 1]
     least = _AT_WALL * ensemble.force_scale
     opened = normal <= least
-    slides = ~opened & (np.abs(tangential) >= ensemble.mu * (normal - least)) & (ensemble.mu > 0)
+    limit = ensemble.friction * (normal - least)
+    slides = ~opened & (np.abs(tangential) >= limit) & (ensemble.friction > 0)
     return opened, np.where(slides, np.sign(tangential), 0).astype(np.int64)

@@ -15,7 +15,7 @@ import numpy as np
 from granforce.explore import thin
 from granforce.explore.billiard import BLOCK
 from granforce.explore.thin import ThinMatrix
-from granforce.forces import hull, knowledge
+from granforce.forces import hull
 from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
@@ -148,7 +148,7 @@ class _Setup(NamedTuple):
 
 
 def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float) -> _Setup:
-    contacts, unit = len(ensemble.index), knowledge.units(ensemble.mu)
+    contacts, unit = len(ensemble.index), ensemble.units
     stiff, target = np.empty((2, contacts, 2))
     stiff[:], target[:] = weight * unit**2, measured / unit
     stiff = np.maximum(stiff, hull.pinned_stiffness(ensemble))
@@ -193,7 +193,7 @@ def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
 def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:
     """Unbalance b − A f of y, in the rows of the problem and the global rows."""
     S, problem = setup.ensemble, setup.problem
-    forces = setup.forces(y) * knowledge.units(S.mu)
+    forces = setup.forces(y) * S.units
     rest = np.zeros(len(problem.b) + len(problem.b_border))
     rest[problem.place] = S.b / S.force_scale - S.A @ S.to_vector(forces)
     rest[: len(problem.b)] *= problem.diagonal == 0
@@ -315,7 +315,7 @@ def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
         known = setup.known
         h, shape = _shape(setup, _barrier(setup, y), known)
         # f_t is in units of μ: its own length is μ times that.
-        plain = np.maximum(known, knowledge.units(ensemble.mu) ** 2)
+        plain = np.maximum(known, ensemble.units**2)
         units = _shape(setup, np.zeros_like(y), plain)[1] - shape
         matrix, moving = _matrix(setup, y)
         # A copy, or changes to a sample's matrix would change the ensemble's.

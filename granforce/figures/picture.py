@@ -60,7 +60,8 @@ def plot(
     several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
     unit, told = _unit(packing, mean)
-    values, label, look = _coloured(packing, several, mean, colour, unit)
+    friction = packing.contacts.friction(packing.mu)[numbers]
+    values, label, look = _coloured(friction, several, mean, colour, unit)
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
     elements += _walls(packing, numbers, backend)
     elements.append(_lines(packing, numbers, mean / unit, values, label, look, backend))
@@ -84,7 +85,7 @@ def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:
 
 
 def _coloured(
-    packing: Packing, several: Floats, mean: Floats, colour: str | npt.ArrayLike, unit: float
+    friction: Floats, several: Floats, mean: Floats, colour: str | npt.ArrayLike, unit: float
 ) -> tuple[Floats, str, dict[str, Any]]:
     """Numbers (k,) for the colour, their name, and the colour scale."""
     if not isinstance(colour, str):
@@ -94,8 +95,8 @@ def _coloured(
         raise InputError(f"colour must be {', '.join(COLOURS)} or numbers, got {brief(colour)}")
     look: dict[str, Any] = {"cmap": _MAPS[colour]}
     if colour == "mobilisation":
-        friction = packing.mu * mean[:, 0]
-        values = np.divide(mean[:, 1], friction, np.zeros(len(mean)), where=friction > 0)
+        limit = friction * mean[:, 0]
+        values = np.divide(mean[:, 1], limit, np.zeros(len(mean)), where=limit > 0)
         return values, _WORDS[colour], look | {"clim": (-1, 1)}
     values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
     return values / unit, _WORDS[colour], look

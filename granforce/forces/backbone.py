@@ -73,7 +73,7 @@ def _raise_contradiction(full: Ensemble) -> None:
     assert full.known is not None
     A, b, T = full.scaled_balance
     message = knowledge.contradiction(
-        A, b, T, full.known, full.mu, full.index, full.force_scale, full.slack
+        A, b, T, full.known, full.slopes, full.index, full.force_scale, full.slack
     )
     if message is not None:
         raise NotJammedError(message)

@@ -17,7 +17,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.hull import hull_of
 from granforce.forces.knowledge import Known
 from granforce.forces.nearest import nearest, starting_network
-from granforce.records import InputError, NotJammedError, Packing, friction, takes
+from granforce.records import InputError, NotJammedError, Packing, takes, with_friction
 from granforce.tolerances import ADMISSIBLE, BALANCED
 from granforce.types import Floats, Integers, Mask
 
@@ -28,7 +28,7 @@ _NAMES = {1: "pressure", 3: "stress"}
 @takes(Packing)
 def ensemble(
     packing: Packing,
-    mu: float | None = None,
+    mu: npt.ArrayLike | None = None,
     *,
     prescribed: str = "pressure",
     stress: npt.ArrayLike | None = None,
@@ -38,7 +38,9 @@ def ensemble(
 ) -> Ensemble:
     """The set S of admissible force networks of a packing.
 
-    mu: friction coefficient of the cones, by default the packing's. prescribed: "pressure", the
+    mu: friction coefficient of the cones, by default the packing's; or those (N_c,) of all
+    contacts. One number for a packing with several: of the roughest, the others in proportion.
+    prescribed: "pressure", the
     whole "stress", or "none" (nothing but loads, or forces outside). stress (3,): σ_xx, σ_yy and
     σ_xy, force per length, by default those of the packing's own network. known: a Known, bounds on
     single forces. frozen: mask (N_c,) or positions of contacts held at their original forces, which
@@ -48,8 +50,9 @@ def ensemble(
     Raises NotJammedError where S is empty, naming the grains with the largest unbalanced load, or
     the known forces that conflict; InputError for conditions that exclude each other.
     """
-    mu = packing.mu if mu is None else friction(mu)
     count = len(packing.contacts.i)
+    contacts, mu = with_friction(packing.contacts, packing.mu if mu is None else mu)
+    packing = packing._replace(contacts=contacts)
     held = np.zeros(count, dtype=bool)
     if frozen is not None:
         held[balance.frozen_positions(frozen, count)] = True
@@ -187,9 +190,11 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
     grains = np.setdiff1d(grains, left_open)
     original = packing.forces[free]
     A, b, scale = balance.equations(packing, free, grains, held, mu, conditions.stress)
-    known = None
-    if conditions.bounds is not None:
-        known = knowledge.polygons(conditions.bounds[free], mu, scale, free)
+    bounds = None if conditions.bounds is None else conditions.bounds[free]
+    friction = contacts.friction(mu)
+    slopes = np.where(friction > 0, friction, mu)
+    bounds = _without_friction(bounds, slopes > friction, free)
+    known = None if bounds is None else knowledge.polygons(bounds, slopes, scale, free)
     return Ensemble(
         packing=packing,
         mu=mu,
@@ -210,3 +215,16 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
         known=known,
         find_hull=hull_of,
     )
+
+
+def _without_friction(bounds: Floats | None, smooth: Mask, index: Integers) -> Floats | None:
+    """The bounds (N_c, 2, 2) with f_t = 0 on smooth contacts among others that have friction."""
+    if not smooth.any():
+        return bounds
+    if bounds is None:
+        bounds = np.tile([-np.inf, np.inf], (len(smooth), 2, 1))
+    wrong = smooth & ((bounds[:, 1, 0] > 0) | (bounds[:, 1, 1] < 0))
+    for c in index[wrong][:1]:
+        raise NotJammedError(f"contact {c} has no friction, so that its f_t is 0, not as known")
+    bounds[smooth, 1] = 0.0
+    return bounds

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 from scipy import linalg, sparse
 
 from granforce.forces import knowledge
@@ -39,15 +40,16 @@ _RESTORED = 3
 
 
 def balance_of(
-    ensemble: Ensemble, unit: float = 1.0
+    ensemble: Ensemble, unit: npt.ArrayLike = 1.0
 ) -> tuple[Network, Floats, Floats, Floats, Integers]:
     """(Network, b, b of the global rows, idle, place) of an ensemble, forces in ⟨f_n⟩.
 
-    unit: of the tangential forces. place: where the ensemble's rows are among those of the network
-    and the global ones; idle (rows,): 1 for rows that the ensemble lacks: torques at μ = 0, and all
-    rows of grains that need not balance.
+    unit (N_c,): of the tangential forces. place: where the ensemble's rows are among those of the
+    network and the global ones; idle (rows,): 1 for rows that the ensemble lacks: torques at μ = 0,
+    and all rows of grains that need not balance.
     """
     contacts, size = ensemble.contacts, ensemble.per_grain
+    unit = np.broadcast_to(unit, len(contacts.i))
     grains = np.union1d(ensemble.grains, np.union1d(contacts.i, contacts.j))
     i, j = (np.searchsorted(grains, which) for which in (contacts.i, contacts.j))
     balanced = np.searchsorted(grains, ensemble.grains)
@@ -56,7 +58,7 @@ def balance_of(
     border = np.zeros((len(i), A.shape[0] - last, 2))
     for part in range(ensemble.per_contact):
         columns = A[:, part :: ensemble.per_contact].tocoo()
-        value = columns.data * (unit if part else 1.0)
+        value = columns.data * (unit[columns.col] if part else 1.0)
         whole = columns.row >= last
         border[columns.col[whole], columns.row[whole] - last, part] = value[whole]
         grain, row = np.divmod(columns.row, size)
@@ -78,8 +80,10 @@ def balance_of(
 
 def make_problem(ensemble: Ensemble) -> tuple[Problem, Floats]:
     """The Problem of an ensemble, tangential forces in μ ⟨f_n⟩, and its idle rows (rows,)."""
-    network, b, b_border, idle, place = balance_of(ensemble, ensemble.mu)
-    problem = contact_program.make_problem(network, b, b_border, idle, place, ensemble.mu, SHIFT)
+    network, b, b_border, idle, place = balance_of(ensemble, ensemble.slopes)
+    problem = contact_program.make_problem(
+        network, b, b_border, idle, place, ensemble.slopes, SHIFT
+    )
     if ensemble.known is not None:
         problem = _with_known(problem, ensemble, ensemble.known)
     return problem, idle
@@ -87,12 +91,11 @@ def make_problem(ensemble: Ensemble) -> tuple[Problem, Floats]:
 
 def _with_known(problem: Problem, ensemble: Ensemble, known: Polygons) -> Problem:
     """The Problem with known forces; fully known contacts stay at y = (1, 1) in it."""
-    mu = ensemble.mu
-    first = knowledge.first_forces(known, mu)
+    first = knowledge.first_forces(known, ensemble.slopes)
     rows = np.zeros(len(problem.b) + len(problem.b_border))
     rows[problem.place] = _instead(ensemble, known)
     sides = known.contact, known.component, known.sign
-    slack = known.limit / knowledge.units(mu)[known.component]
+    slack = known.limit / ensemble.units[known.contact, known.component]
     rest = slack - known.sign * first[known.contact, known.component]
     pairs = np.stack([first.sum(axis=1), first[:, 0] - first[:, 1]], axis=1)
     return problem._replace(
@@ -116,7 +119,7 @@ def _instead(ensemble: Ensemble, known: Polygons) -> Floats:
 def forces_of(ensemble: Ensemble, y: Floats) -> Floats:
     """Forces (…, N_c, 2) of cone coordinates (…, n)."""
     pairs = y[..., : 2 * len(ensemble.index)].reshape(*y.shape[:-1], -1, 2)
-    normal, tangential = pairs.sum(axis=-1), ensemble.mu * (pairs[..., 0] - pairs[..., 1])
+    normal, tangential = pairs.sum(axis=-1), ensemble.slopes * (pairs[..., 0] - pairs[..., 1])
     forces = 0.5 * ensemble.force_scale * np.stack([normal, tangential], axis=-1)
     return ensemble.pin(forces)
 
@@ -201,16 +204,19 @@ def make_system(ensemble: Ensemble) -> certified_values.System:
 
 
 def _new_system(ensemble: Ensemble) -> certified_values.System:
-    count, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
-    block = np.array([[0.5, 0.5], [0.5 * mu, -0.5 * mu]])[: ensemble.per_contact]
+    count, known, size = len(ensemble.index), ensemble.known, ensemble.per_contact
+    block = np.array([[0.5, 0.5], [0.5, -0.5]])[:size]
     T = sparse.kron(sparse.identity(count), block, format="csc")
+    T.data *= ensemble.units[:, :size].ravel()[T.indices]
     A, b = (ensemble.A @ T).tocsr(), ensemble.b / ensemble.force_scale
     loads = ensemble.A.tocsc()[:, :: ensemble.per_contact]
     sides = slice(len(b), len(b) + (0 if known is None else len(known.contact)))
     bounding = ensemble.pressure_row if ensemble.has_pressure_row else None
     if known is not None:
         value = np.where(known.wholly[:, None], [1.0, 0.0], known.value)
-        A, b, _ = knowledge.extended(A, b + _instead(ensemble, known), T, known, mu, value)
+        A, b, _ = knowledge.extended(
+            A, b + _instead(ensemble, known), T, known, ensemble.slopes, value
+        )
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
     problem = independent_problem_of(ensemble)
@@ -243,7 +249,7 @@ def cone_costs(ensemble: Ensemble, forces: Floats) -> Floats:
     """Costs (…, 2 N_c) of y for costs (…, N_c, 2) of the unknown forces f_n, f_t."""
     if ensemble.known is not None:
         forces = np.where(ensemble.known.wholly[:, None], 0.0, forces)
-    normal, tangential = forces[..., 0], ensemble.mu * forces[..., 1]
+    normal, tangential = forces[..., 0], ensemble.slopes * forces[..., 1]
     pairs = np.stack([0.5 * (normal + tangential), 0.5 * (normal - tangential)], axis=-1)
     return pairs.reshape(*forces.shape[:-2], -1)
 

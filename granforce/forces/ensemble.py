@@ -53,7 +53,7 @@ class Ensemble:
     """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `build`."""
 
     packing: Packing
-    mu: float  # friction coefficient of the cones (not necessarily the packing's)
+    mu: float  # the largest friction coefficient of the cones (not necessarily the packing's)
     index: Integers  # (N_c,) the unknown contacts, as positions in packing.contacts
     contacts: Contacts  # their geometry
     grains: Integers  # (M,) grains of the backbone, as positions in packing.x
@@ -79,6 +79,33 @@ class Ensemble:
     def per_grain(self) -> int:
         """Rows of A per grain: 3, or 2 if no force can turn it."""
         return balance.rows_per_grain(self.contacts, self.mu)
+
+    @cached_property
+    def friction(self) -> Floats:
+        """Friction coefficient (N_c,) of each contact."""
+        return self.contacts.friction(self.mu)
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """Slopes (N_c,) of the cones of programs: μ of each contact.
+
+        Contacts without friction among others have cones like the roughest, and pinned f_t = 0.
+        """
+        return np.where(self.friction > 0, self.friction, self.mu)
+
+    @cached_property
+    def units(self) -> Floats:
+        """Units (N_c, 2) of f_n and f_t in programs, in ⟨f_n⟩."""
+        return knowledge.units(self.slopes)
+
+    @property
+    def informed(self) -> Mask:
+        """Mask (N_c,) of contacts with a known force, besides f_t = 0 for want of friction."""
+        if self.known is None:
+            return np.zeros(len(self.index), dtype=bool)
+        finite = np.isfinite(self.known.low) | np.isfinite(self.known.high)
+        finite[:, 1] &= self.slopes == self.friction
+        return np.asarray(finite.any(axis=1))
 
     @property
     def has_pressure_row(self) -> bool:
@@ -171,8 +198,9 @@ class Ensemble:
         if self.mu == 0:
             T = sparse.identity(self.A.shape[1], format="csc")
         else:
-            block = np.array([[0.5, 0.5], [0.5 * self.mu, -0.5 * self.mu]])
+            block = np.array([[0.5, 0.5], [0.5, -0.5]])
             T = sparse.kron(sparse.identity(len(self.index)), block, format="csc")
+            T.data *= self.units.ravel()[T.indices]
         return sparse.csc_matrix(self.A @ T), T
 
     @cached_property
@@ -211,7 +239,7 @@ class Ensemble:
         """
         A, b, T = self.scaled_balance
         if self.known is not None:
-            A, b, T = knowledge.extended(A, b, T, self.known, self.mu, self.known.value)
+            A, b, T = knowledge.extended(A, b, T, self.known, self.slopes, self.known.value)
         y = None if self.reference is None else self.coordinates(self.reference)
         if y is not None and self.residual(self.to_forces(T @ y * self.force_scale)) <= BALANCED:
             b = A @ y
@@ -223,23 +251,24 @@ class Ensemble:
         scale = self._row_scale
         if self.known is None:
             return BALANCED * scale
-        unit = knowledge.units(self.mu)
-        parts = self.known.component, knowledge.pins(self.known, self.mu)[1]
-        return np.append(BALANCED * scale, ADMISSIBLE / unit[np.concatenate(parts)])
+        sides = self.known.contact, self.known.component
+        parts = np.concatenate([sides, knowledge.pins(self.known, self.slopes)], axis=1)
+        return np.append(BALANCED * scale, ADMISSIBLE / self.units[tuple(parts)])
 
     def coordinates(self, forces: Floats) -> Floats:
         """y (n,) ≥ 0 of `scaled_form` nearest to forces (N_c, 2)."""
         normal, tangential = forces.T / self.force_scale
         y = normal[:, None]
         if self.mu > 0:
-            y = np.column_stack([normal + tangential / self.mu, normal - tangential / self.mu])
+            across = tangential / self.slopes
+            y = np.column_stack([normal + across, normal - across])
         y = y.ravel()
         if self.known is not None:
             known = self.known
             rest = (
                 known.limit - known.sign * forces[known.contact, known.component] / self.force_scale
             )
-            y = np.append(y, rest / knowledge.units(self.mu)[known.component])
+            y = np.append(y, rest / self.units[known.contact, known.component])
         return np.maximum(y, 0.0)
 
     @cached_property
@@ -269,8 +298,8 @@ class Ensemble:
         }
         if len(self.frozen):
             lines["frozen contacts"] = len(self.frozen)
-        if self.known is not None:
-            lines["contacts with a known force"] = int(self.known.informed.sum())
+        if self.informed.any():
+            lines["contacts with a known force"] = int(self.informed.sum())
         left_out = {name.replace("_", " "): n for name, n in self.skipped.items() if n}
         return notebook.table("Admissible force networks S", lines | left_out)
 
@@ -283,7 +312,7 @@ class Ensemble:
 
     def with_bounds(self, bounds: Floats, network: Floats) -> Ensemble:
         """The same with other `bounds`; network (N_c, 2): a network of S, force."""
-        known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
+        known = knowledge.polygons(bounds, self.slopes, self.force_scale, self.index)
         return replace(self, known=known, found=network)
 
     def with_normal(self, position: int, network: Floats) -> Ensemble:
@@ -395,7 +424,7 @@ class Ensemble:
         """Largest violation of f_n ≥ 0, |f_t| ≤ μ f_n and what is known, in ⟨f_n⟩, (…,)."""
         forces = self.networks(forces)
         normal, tangential = forces[..., 0], forces[..., 1]
-        excess = np.maximum(-normal, np.abs(tangential) - self.mu * np.maximum(normal, 0.0))
+        excess = np.maximum(-normal, np.abs(tangential) - self.friction * np.maximum(normal, 0.0))
         worst = np.maximum(excess.max(axis=-1, initial=0.0), 0.0) / self.force_scale
         if self.known is not None:
             scaled = forces / self.force_scale

@@ -10,7 +10,6 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import norm
 
-from granforce.forces import knowledge
 from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.forces.contact_problem import (
     MOST_DENSE,
@@ -63,7 +62,7 @@ def _with_own_limits(ensemble: Ensemble) -> Floats:
     if known is None:
         return b
     b, first = b.copy(), ensemble.A.shape[0]
-    limit = known.limit / knowledge.units(ensemble.mu)[known.component]
+    limit = known.limit / ensemble.units[known.contact, known.component]
     b[first : first + len(limit)] = limit
     return b
 
@@ -89,8 +88,8 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     if not middle.reached or not middle.y.min(initial=1.0) > _WELL_INSIDE:
         return None
     if ensemble.known is not None:
-        forces, unit = ensemble.known.value, knowledge.units(ensemble.mu)
-        own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
+        normal, tangential = (ensemble.known.value / ensemble.units).T
+        own = np.stack([normal + tangential, normal - tangential], axis=1)
         y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
     inner = np.append(inner, middle.y[y.size :])
@@ -164,9 +163,9 @@ def constraints(ensemble: Ensemble, held: Mask) -> sparse.csr_matrix:
 def distances(ensemble: Ensemble) -> sparse.csr_matrix:
     """(n, unknowns) the contribution of each unknown to the distance y of each wall."""
     contact, normal = normals(ensemble)
-    size, unit = ensemble.per_contact, knowledge.units(ensemble.mu)
+    size = ensemble.per_contact
     rows, columns = np.arange(len(contact))[:, None], size * contact[:, None] + np.arange(size)
     rows = np.broadcast_to(rows, columns.shape)
-    values = (normal[:, :size] / unit[:size]).ravel()
+    values = (normal[:, :size] / ensemble.units[contact, :size]).ravel()
     shape = len(contact), size * len(ensemble.index)
     return sparse.csr_matrix((values, (rows.ravel(), columns.ravel())), shape=shape)

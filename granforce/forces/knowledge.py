@@ -45,11 +45,6 @@ class Polygons(NamedTuple):
     limit: Floats  # (sides,) sign · f ≤ limit
 
     @property
-    def informed(self) -> Mask:
-        """(N_c,) bool: contacts with a known bound."""
-        return np.any(np.isfinite(self.low) | np.isfinite(self.high), axis=1)
-
-    @property
     def wholly(self) -> Mask:
         """(N_c,) bool: contacts with both components pinned."""
         return np.all(self.pinned, axis=1)
@@ -95,11 +90,11 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     return bounds
 
 
-def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygons | None:
+def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polygons | None:
     """The Polygons of bounds (N_c, 2, 2), force; None if there are no bounds.
 
-    scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for messages. Raises NotJammedError if the
-    bounds on one contact conflict with Coulomb's law.
+    mu (N_c,): slopes of the cones. scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for
+    messages. Raises NotJammedError if the bounds on one contact conflict with Coulomb's law.
     """
     if not np.isfinite(bounds).any():
         return None
@@ -108,27 +103,32 @@ def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygo
     least[:, 0] = np.maximum(least[:, 0], 0.0)
     # Coulomb's law tightens a contact's bounds: the smallest |f_t| requires its f_n.
     smallest = np.maximum(0.0, np.maximum(least[:, 1], -most[:, 1]))
-    needed = np.where(smallest > 0, smallest / mu if mu > 0 else np.inf, 0.0)
+    rough = mu > 0
+    needed = np.where(smallest > 0, np.inf, 0.0)
+    needed[rough] = smallest[rough] / mu[rough]
     least[:, 0] = np.maximum(least[:, 0], needed)
     short = least[:, 0] - most[:, 0]
     if np.any(short > ADMISSIBLE):
         c = int(np.argmax(short))
-        raise NotJammedError(_beyond_coulomb(index[c], bounds[c], mu, needed[c], short[c] * scale))
+        raise NotJammedError(
+            _beyond_coulomb(index[c], bounds[c], mu[c], needed[c], short[c] * scale)
+        )
     pinned, value = np.zeros(low.shape, dtype=bool), np.zeros(low.shape)
     pinned[:, 0] = most[:, 0] - least[:, 0] <= FLAT
     value[pinned[:, 0], 0] = np.maximum(most[pinned[:, 0], 0], 0.0)
-    cone = mu * np.where(pinned[:, 0], value[:, 0], most[:, 0]) if mu > 0 else np.zeros(len(low))
+    cone = np.zeros(len(low))
+    cone[rough] = mu[rough] * np.where(pinned[:, 0], value[:, 0], most[:, 0])[rough]
     least[:, 1], most[:, 1] = np.maximum(least[:, 1], -cone), np.minimum(most[:, 1], cone)
     pinned[:, 1] = most[:, 1] - least[:, 1] <= FLAT * mu
-    pinned[:, 1] &= (mu > 0) | pinned[:, 0]
+    pinned[:, 1] &= rough | pinned[:, 0]
     fixed = pinned[:, 1]
     value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])
-    slid = np.abs(value[:, 1]) / mu if mu > 0 else np.zeros(len(low))
+    slid = np.abs(value[:, 1]) / np.where(rough, mu, np.inf)
     there = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
     there[:, 0, 0] = low[:, 0] > np.where(pinned[:, 1], slid, 0.0)
     there[:, 0, 1] = np.isfinite(high[:, 0])
     there[:, 1, 0], there[:, 1, 1] = low[:, 1] > -cone, high[:, 1] < cone
-    there[:, 1] &= mu > 0
+    there[:, 1] &= rough[:, None]
     there &= ~pinned[..., None]
     contact, component, above = np.nonzero(there)
     sign = np.where(above, 1.0, -1.0)
@@ -150,7 +150,7 @@ def _beyond_coulomb(contact: int, bounds: Floats, mu: float, needed: float, shor
     )
 
 
-def first_forces(known: Polygons, mu: float) -> Floats:
+def first_forces(known: Polygons, mu: Floats) -> Floats:
     """Forces (N_c, 2) to start programs from, f_t in units of μ ⟨f_n⟩.
 
     Pinned components are at their values, inside the cone; fully known contacts stay at (1, 0)
@@ -172,13 +172,18 @@ def first_forces(known: Polygons, mu: float) -> Floats:
     return first
 
 
-def units(mu: float) -> Floats:
-    """Units (2,) of f_n and f_t in programs, in ⟨f_n⟩."""
-    return np.array([1.0, mu if mu > 0 else 1.0])
+def units(mu: Floats) -> Floats:
+    """Units (N_c, 2) of f_n and f_t in programs, in ⟨f_n⟩, of cones of slopes (N_c,)."""
+    return np.column_stack([np.ones(len(mu)), np.where(mu > 0, mu, 1.0)])
 
 
 def extended(
-    A: sparse.csr_matrix, b: Floats, T: sparse.csc_matrix, known: Polygons, mu: float, value: Floats
+    A: sparse.csr_matrix,
+    b: Floats,
+    T: sparse.csc_matrix,
+    known: Polygons,
+    mu: Floats,
+    value: Floats,
 ) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
     """A y = b with rows and slacks of known bounds: (A, b, T) in y and the slacks of the sides.
 
@@ -186,10 +191,10 @@ def extended(
     2): pinned components. Rows of sides and then of pinned components, in units of the programs.
     """
     parts, T, unit = T.shape[0] // len(known.pinned), sparse.csr_matrix(T), units(mu)
-    at, size = parts * known.contact + known.component, unit[known.component]
+    at, size = parts * known.contact + known.component, unit[known.contact, known.component]
     beside = sparse.diags(known.sign / size) @ T[at]
     contact, component = pins(known, mu)
-    held = sparse.diags(1 / unit[component]) @ T[parts * contact + component]
+    held = sparse.diags(1 / unit[contact, component]) @ T[parts * contact + component]
     sides = len(at)
     empty = sparse.csr_matrix((A.shape[0], sides)), sparse.csr_matrix((len(contact), sides))
     whole = sparse.vstack(
@@ -200,14 +205,14 @@ def extended(
         ],
         format="csc",
     )
-    right = [b, known.limit / size, value[contact, component] / unit[component]]
+    right = [b, known.limit / size, value[contact, component] / unit[contact, component]]
     T = sparse.hstack([T, sparse.csr_matrix((T.shape[0], sides))], format="csc")
     return whole, np.concatenate(right), T
 
 
-def pins(known: Polygons, mu: float) -> tuple[Integers, Integers]:
+def pins(known: Polygons, mu: Floats) -> tuple[Integers, Integers]:
     """Contact and component of each pinned unknown; without friction, f_t is not an unknown."""
-    contact, component = np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+    contact, component = np.nonzero(known.pinned[:, : 2 if mu.any() else 1])
     return contact, component
 
 
@@ -216,7 +221,7 @@ def contradiction(
     b: Floats,
     T: sparse.csc_matrix,
     known: Polygons,
-    mu: float,
+    mu: Floats,
     index: Integers,
     scale: float,
     slack: Floats,
@@ -250,7 +255,7 @@ def contradiction(
 
 
 def _statements(
-    known: Polygons, mu: float, index: Integers, scale: float, multiplier: Floats, given: Floats
+    known: Polygons, mu: Floats, index: Integers, scale: float, multiplier: Floats, given: Floats
 ) -> str:
     """The conditions with a multiplier, largest first, and the necessary relaxation."""
     contact, component = pins(known, mu)
@@ -260,7 +265,7 @@ def _statements(
     relation = ["≤" if sign > 0 else "≥" for sign in known.sign]
     relation += ["="] * (len(contact) - len(relation))
     size = np.abs(multiplier) / np.abs(multiplier).max()
-    given = given * units(mu)[component] * scale
+    given = given * units(mu)[contact, component] * scale
     texts = []
     for k in np.argsort(-size, kind="stable"):
         if size[k] > _WEIGHTY:

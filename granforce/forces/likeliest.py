@@ -128,13 +128,14 @@ def fitted_many(
     problem, unit = problem_of(ensemble), ensemble.force_scale
     m, width = many[0], 1 if len(many) == 1 else LANES
     # Tangential forces are kept as f_t/μ.
-    w = np.where(np.isnan(m), unmeasured, s / unit) ** -2.0 * [1.0, ensemble.mu**2]
+    weight = np.column_stack([np.ones(len(s)), ensemble.slopes**2])
+    w = np.where(np.isnan(m), unmeasured, s / unit) ** -2.0 * weight
     scale = w.max(initial=0.0)
     problem = problem._replace(w=np.where(problem.w < PINNED, w.ravel() / scale, PINNED))
     at = contact_program.make_iterate(problem, width)
     work = contact_program.make_workspace(problem, width)
     for lane, values in enumerate(many):
-        target = np.nan_to_num(values / unit) / [1.0, ensemble.mu or 1.0]
+        target = np.nan_to_num(values / unit) / ensemble.units
         pulls = np.where(problem.w.reshape(w.shape) < PINNED, w / scale * target, 0.0)
         at.c[: w.size : 2, lane] = -0.5 * (pulls[:, 0] + pulls[:, 1])
         at.c[1 : w.size : 2, lane] = -0.5 * (pulls[:, 0] - pulls[:, 1])

@@ -206,7 +206,7 @@ class Search:
 
     def _begin(self, targets: Floats, start: Floats | None) -> None:
         """y and z of each contact's own projection, moved inside; pinned ones stay."""
-        problem, mu, at = self.problem, self.problem.mu, self.at
+        problem, mu, at = self.problem, self.problem.mu[:, None], self.at
         first, second = slice(0, len(problem.w), 2), slice(1, len(problem.w), 2)
         pinned = np.flatnonzero(np.repeat((problem.w >= PINNED).reshape(-1, 2).any(axis=1), 2))
         if start is not None:
@@ -262,7 +262,7 @@ class Search:
         """Forces (W, N_c, 2) found, in ⟨f_n⟩."""
         pairs = self.found[: len(self.problem.w)].reshape(-1, 2, self.found.shape[1])
         normal, tangential = 0.5 * (pairs[:, 0] + pairs[:, 1]), 0.5 * (pairs[:, 0] - pairs[:, 1])
-        return np.moveaxis(np.stack([normal, self.problem.mu * tangential], axis=1), -1, 0)
+        return np.moveaxis(np.stack([normal, self.problem.mu[:, None] * tangential], axis=1), -1, 0)
 
     def _look(self) -> tuple[list[float], list[float], list[float]]:
         """Products, unbalance and slackness by lane."""

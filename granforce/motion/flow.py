@@ -378,7 +378,7 @@ def _factor(step, flows, stop, lanes):
         state = load(flows.before, c, lanes)
         normal = pace * step.stiffness[c, 0]
         tangential = pace * step.stiffness[c, 1]
-        across = 0.5 * state * step.mu * normal
+        across = 0.5 * state * step.mu[c] * normal
         slides = size(state)
         normal = pick(slides, closed, normal, 0.0)
         across = pick(slides, sliding, across, 0.0)
@@ -421,7 +421,7 @@ def _next_forces(step, flows, c, lanes):
     f_n = f_n - pace * step.stiffness[c, 0] * (w_n + step.closing[c])
     f_t = load(flows.forces, 2 * c + 1, lanes) - pace * step.stiffness[c, 1] * w_t
     f_n = larger(f_n, 0.0)
-    limit = step.mu * f_n
+    limit = step.mu[c] * f_n
     state = pick(f_t, limit, SLIDING, pick(-limit, f_t, -SLIDING, STICKING))
     f_t = pick(f_t, limit, limit, pick(-limit, f_t, -limit, f_t))
     state, f_t = pick(f_n, 0.0, state, 0.0), pick(f_n, 0.0, f_t, 0.0)

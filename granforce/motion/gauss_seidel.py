@@ -155,6 +155,8 @@ def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     contacts, grains = ensemble.contacts, ensemble.grains
     if contacts.levers is not None or ensemble.packing.shapes is not None:
         raise InputError("sweeps of contact dynamics support disks only: use the nearest network")
+    if contacts.friction_ratio is not None:
+        raise InputError("sweeps of contact dynamics support one μ only: use the nearest network")
     longest = float(ensemble.packing.r.max())
     r = ensemble.packing.r[grains] / longest
     row_of = np.full(len(ensemble.packing.r), len(grains))

@@ -15,7 +15,7 @@ def make_step(ensemble: Ensemble) -> Step:
 
     Raises InputError if forces are known, because contact dynamics cannot keep them.
     """
-    if ensemble.known is not None:
+    if ensemble.informed.any():
         raise InputError(
             "moving grains change their forces, so known forces cannot hold: perturb the packing "
             "without them (limit loads accept known forces)"
@@ -27,7 +27,9 @@ def make_step(ensemble: Ensemble) -> Step:
     mass, mass_border = inertia[: len(b)], inertia[len(b) :]
     stiffness = effective_masses(network, mass, mass_border)
     closing = np.zeros(len(stiffness))
-    return Step(network, b, b_border, mass, mass_border, stiffness, closing, ensemble.mu, place)
+    return Step(
+        network, b, b_border, mass, mass_border, stiffness, closing, ensemble.friction, place
+    )
 
 
 def _inertia(ensemble: Ensemble) -> Floats:

@@ -40,7 +40,7 @@ class Step(NamedTuple):
     mass_border: Floats  # (m,)
     stiffness: Floats  # (N_c, 2) D: effective masses of the contacts
     closing: Floats  # (N_c,) approach velocity that just closes the gap
-    mu: float
+    mu: Floats  # (N_c,)
     place: Integers  # (rows of the ensemble,) their place among rows and border
 
 

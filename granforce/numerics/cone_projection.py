@@ -24,9 +24,9 @@ def project(problem, at, work, lanes):
 
     For w = 1 and no sides: once balanced, these forces are the optimum, exactly in their cones.
     """
-    mu2 = problem.mu * problem.mu
-    flat, soft = 1.0 / (1.0 + mu2), 1.0 / max(mu2, 1e-300)
     for k in range(0, len(problem.w), 2):
+        mu2 = problem.mu[k // 2] * problem.mu[k // 2]
+        flat, soft = 1.0 / (1.0 + mu2), 1.0 / max(mu2, 1e-300)
         normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
         # f_n and μ f_t of target + Aᵀ v.
         normal = normal - load(at.c, k, lanes) - load(at.c, k + 1, lanes)
@@ -40,7 +40,7 @@ def project(problem, at, work, lanes):
         nn = pick(across, inside, flat, 1.0)
         nt, tt = pick(across, inside, sign * flat, 0.0), pick(across, inside, flat, soft)
         if problem.w[k] >= PINNED or problem.w[k + 1] >= PINNED:
-            _project_pinned(problem, k, normal, soft * tangential, at, work, lanes)
+            _project_pinned(problem, k, normal, soft * tangential, soft, at, work, lanes)
             continue
         # The tip last: without friction a purely normal tension would count as inside.
         tip = pick(across, -normal, 1.0, 0.0)
@@ -55,7 +55,7 @@ def project(problem, at, work, lanes):
 
 
 @within
-def _project_pinned(problem, k, normal, tangential, at, work, lanes):
+def _project_pinned(problem, k, normal, tangential, soft, at, work, lanes):
     """The same for a contact with f_n, f_t or both pinned: the nearest point of a line."""
     y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
     f_n, f_t = 0.5 * (y0 + y1), 0.5 * (y0 - y1)
@@ -64,7 +64,7 @@ def _project_pinned(problem, k, normal, tangential, at, work, lanes):
         least = size(f_t)
         f_n, nn = larger(normal, least), pick(normal, least, 1.0, 0.0)
     elif problem.w[k + 1] < PINNED:
-        tt = pick(f_n, size(tangential), 1.0 / max(problem.mu * problem.mu, 1e-300), 0.0)
+        tt = pick(f_n, size(tangential), soft, 0.0)
         f_t = -larger(-f_n, -larger(-f_n, tangential))
         f_t = pick(f_n, size(tangential), tangential, f_t)
     store(work.K, 3 * (k // 2), lanes, nn)

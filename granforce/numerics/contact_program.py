@@ -49,7 +49,7 @@ class Problem(NamedTuple):
     b: Floats  # (rows,) in order of elimination
     b_border: Floats  # (m,)
     diagonal: Floats  # (rows,) added to that of A K Aᵀ: 1 for rows that are not there
-    mu: float
+    mu: Floats  # (N_c,) slopes of the cones
     place: Integers  # (rows of A,) where they are among the rows, then the border
     w: Floats  # (2 N_c,) weights of f_n, f_t/μ in ½ Σ w f²; PINNED for those that stay
     start: Floats  # (n,) first y; contains the values of pinned components
@@ -145,7 +145,7 @@ def make_problem(
     b_border: Floats,
     idle: Floats,
     place: Integers,
-    mu: float,
+    mu: Floats,
     shift: float,
 ) -> Problem:
     """The Problem with `shift`, relative to the diagonal of A Aᵀ, added to that of A K Aᵀ.
@@ -156,7 +156,7 @@ def make_problem(
     typical = diagonal[idle == 0].mean() if (idle == 0).any() else 0.0
     diagonal = np.where(idle > 0, 1.0, shift * np.maximum(diagonal, typical))
     count, none = len(network.high), np.zeros(0)
-    w = np.tile([1.0, mu * mu], count)
+    w = np.column_stack([np.ones(count), mu * mu]).ravel()
     start, side = np.ones(2 * count), np.zeros(0, dtype=np.int64)
     return Problem(
         network=network,

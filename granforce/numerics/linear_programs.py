@@ -210,7 +210,7 @@ def multipliers(
     left = (cost - z - A[: len(known)].T @ known)[:pairs].reshape(-1, 2)
     reaction = np.column_stack([left.sum(axis=1), left[:, 0] - left[:, 1]]).ravel()
     pinned = np.flatnonzero(problem.w >= contact_program.PINNED)
-    if problem.mu == 0:
+    if not problem.mu.any():
         pinned = pinned[::2]  # f_t is not a variable
     return np.concatenate([known, reaction[pinned]])
 

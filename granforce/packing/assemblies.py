@@ -7,7 +7,7 @@ them. Each other body carries its weight downwards.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,11 +19,13 @@ from granforce.packing import polygons
 from granforce.packing.neighbours import find_pairs
 from granforce.packing.polygons import Meeting, Touch
 from granforce.records import (
+    Contacts,
     InputError,
     Packing,
     Shapes,
     UndecidedError,
     are_whole,
+    brief,
     float_array,
     make_cell,
     make_contacts_at,
@@ -44,37 +46,33 @@ def blocks(
     *,
     fixed: npt.ArrayLike = (),
     weights: npt.ArrayLike | None = None,
+    materials: Sequence[Any] | None = None,
+    friction: Mapping[Any, Any] | None = None,
     tolerance: float | None = None,
+    balanced: bool = True,
 ) -> Packing:
     """A Packing of rigid bodies, with the admissible network nearest to equal normal forces.
 
     bodies: corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for
-    each. mu: friction coefficient of all contacts. fixed: numbers of the bodies that cannot move.
-    weights (N,): by default the areas; masses are in proportion, and gravity points along −y.
-    tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
-    default TOUCHING times the largest body. An edge on an edge touches at both ends of the shared
-    part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
-    contact, and nearly_touching [i, j, gap], up to 100 tolerances apart.
+    each. mu: friction coefficient, or those (N_c,) of all contacts. fixed: numbers of the bodies
+    that cannot move. weights (N,): by default the areas; masses are in proportion, and gravity
+    points along −y. materials (N,): labels of the materials of the bodies, and friction: μ of pairs
+    of them if it is not mu, {("stone", "wood"): 0.4, …}. tolerance: distance up to which surfaces
+    touch or may overlap, in the unit of the bodies; by default TOUCHING times the largest body.
+    balanced: whether to look for a network; otherwise forces are 0, even if nothing balances. An
+    edge on an edge touches at both ends of the shared part. Doubtful pairs are listed in info:
+    corner_on_corner [i, j], which have no normal and no contact, and nearly_touching [i, j, gap],
+    up to 100 tolerances apart.
 
     Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights.
     """
-    return with_network(assembly(bodies, mu, fixed=fixed, weights=weights, tolerance=tolerance))
-
-
-def assembly(
-    bodies: Sequence[npt.ArrayLike],
-    mu: Any,
-    *,
-    fixed: npt.ArrayLike = (),
-    weights: npt.ArrayLike | None = None,
-    tolerance: float | None = None,
-) -> Packing:
-    """The same Packing without a network, even if nothing balances."""
     outlines = [_outline(body, k) for k, body in enumerate(bodies)]
     if not outlines:
         raise InputError("there is no body; give at least one")
     held = _fixed(fixed, len(outlines))
     area, x, polar, r = (np.array(part) for part in zip(*map(_measured, outlines), strict=True))
+    if materials is not None and len(materials) != len(outlines):
+        raise InputError(f"give the material of each of the {len(outlines)} bodies")
     weights = area if weights is None else float_array(weights, area.shape, "weights")
     for k in np.flatnonzero((weights <= 0) & ~held)[:1]:
         raise InputError(f"body {k} has a weight ≤ 0: every body that can move needs a mass")
@@ -92,13 +90,13 @@ def assembly(
     load[:, 1] = -weights
     load[held] = np.nan
     polygonal = [body if body.ndim == 2 else np.empty((0, 2)) for body in outlines]
-    return make_packing(
+    packing = make_packing(
         x,
         r,
         [np.inf, np.inf],
         contacts,
         np.zeros((len(gap), 2)),
-        mu,
+        _frictions(mu, materials, friction or {}, contacts),
         load=load,
         info={"bodies": len(x), "tolerance": float(tolerance), **doubts},
         shapes=Shapes(
@@ -108,6 +106,7 @@ def assembly(
             inertia=weights * polar / area,
         ),
     )
+    return with_network(packing) if balanced else packing
 
 
 def with_network(packing: Packing) -> Packing:
@@ -128,6 +127,20 @@ def with_network(packing: Packing) -> Packing:
             f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
         )
     return packing._replace(forces=S.expand(found.forces))
+
+
+def _frictions(
+    mu: Any, materials: Sequence[Any] | None, pairs: Mapping[Any, Any], contacts: Contacts
+) -> Any:
+    """μ, or the friction coefficients (N_c,) of pairs of materials, and μ of all other pairs."""
+    if materials is None and not pairs:
+        return mu
+    named = [] if materials is None else list(materials)
+    given = {frozenset(pair): value for pair, value in pairs.items()}
+    for material in sorted(frozenset().union(*given) - set(named), key=str)[:1]:
+        raise InputError(f"friction is given for {brief(material)}, but no body has this material")
+    ends = zip(contacts.i.tolist(), contacts.j.tolist(), strict=True)
+    return [given.get(frozenset((named[i], named[j])), mu) for i, j in ends]
 
 
 def _outline(body: npt.ArrayLike, number: int) -> Floats:

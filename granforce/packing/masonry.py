@@ -1,7 +1,6 @@
 """Scenes of rigid blocks: a ladder, a block on a slope, books, an arch, a dry-stone wall.
 
-Each function returns bodies and the keyword arguments of `assemblies.assembly`. Fixed bodies come
-last.
+Each function returns a Packing with zero forces. Fixed bodies come last.
 """
 
 import itertools
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.packing.assemblies import assembly
+from granforce.packing import assemblies
 from granforce.records import InputError, Packing, positive, whole
 from granforce.types import Floats
 
@@ -38,7 +37,9 @@ def ladder(mu: float, angle: float = 60.0) -> Packing:
     rod = np.array([foot, top / 2 - across, top, top / 2 + across])
     floor = rectangle(-_THICK, -_THICK, top[0], 0)
     wall = rectangle(top[0], 0, top[0] + _THICK, top[1] + _THICK)
-    return assembly([rod, floor, wall], mu, fixed=[1, 2], weights=[1, 1, 1])
+    return assemblies.blocks(
+        [rod, floor, wall], mu, fixed=[1, 2], weights=[1, 1, 1], balanced=False
+    )
 
 
 def slope(mu: float, angle: float = 20.0, width: float = 1.0, height: float = 1.0) -> Packing:
@@ -48,7 +49,7 @@ def slope(mu: float, angle: float = 20.0, width: float = 1.0, height: float = 1.
     along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     ground = rectangle(-width, -_THICK * width, 2 * width, 0)
     bodies = [rectangle(0, 0, width, height), ground]
-    return assembly([body @ along for body in bodies], mu, fixed=[1])
+    return assemblies.blocks([body @ along for body in bodies], mu, fixed=[1], balanced=False)
 
 
 def books(mu: float, books: int = 5, overhang: float = 0.95) -> Packing:
@@ -62,7 +63,9 @@ def books(mu: float, books: int = 5, overhang: float = 0.95) -> Packing:
     stack = [
         rectangle(end - 1, low, end, low + _THICK) for end, low in zip(ends, bottoms, strict=True)
     ]
-    return assembly([*stack, rectangle(-2, -_THICK, 0, 0)], mu, fixed=[count])
+    return assemblies.blocks(
+        [*stack, rectangle(-2, -_THICK, 0, 0)], mu, fixed=[count], balanced=False
+    )
 
 
 def arch(mu: float, voussoirs: int = 11, thickness: float = 0.2, opening: float = 180.0) -> Packing:
@@ -74,10 +77,11 @@ def arch(mu: float, voussoirs: int = 11, thickness: float = 0.2, opening: float 
     rays = np.column_stack([np.sin(-angles), np.cos(angles)])
     inner, outer = (1 - half) * rays, (1 + half) * rays
     stones = [np.array([inner[k], inner[k + 1], outer[k + 1], outer[k]]) for k in range(count)]
-    return assembly(
+    return assemblies.blocks(
         [*stones, *(_springer(inner[k], outer[k], k) for k in (0, -1))],
         mu,
         fixed=[count, count + 1],
+        balanced=False,
     )
 
 
@@ -108,4 +112,4 @@ def wall(
         low, high = height * course, height * (course + 1)
         bodies += [rectangle(a, low, b, high) for a, b in itertools.pairwise(ends)]
     ground = rectangle(-width, -height, (blocks + 1) * width, 0)
-    return assembly([*bodies, ground], mu, fixed=[len(bodies)])
+    return assemblies.blocks([*bodies, ground], mu, fixed=[len(bodies)], balanced=False)

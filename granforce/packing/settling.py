@@ -194,8 +194,9 @@ def _place(motion: Motion, near: _Near, mu: float) -> _Place:
     b[0] = 2 * volume / unit
     stiffness = effective_masses(network, mass, box)
     everywhere = np.append(grains.ravel(), grains.size + np.arange(len(box)))
+    closing, friction = np.zeros(len(gap)), np.full(len(gap), mu)
     step = Step(
-        network, np.zeros(len(mass)), b, mass, box, stiffness, np.zeros(len(gap)), mu, everywhere
+        network, np.zeros(len(mass)), b, mass, box, stiffness, closing, friction, everywhere
     )
     return _Place(step, gap, grains, unit)
 

@@ -397,7 +397,7 @@ def _response(
     box = moving.velocity[S.pressure_row] if S.has_pressure_row else 0.0
     normal, tangential = moving.forces.T
     opened = normal <= 0
-    slid = ~opened & (np.abs(tangential) >= S.mu * normal)
+    slid = ~opened & (np.abs(tangential) >= S.friction * normal)
     return Response(
         contact=contact,
         force=float(load),

@@ -55,6 +55,7 @@ VARIABLES: dict[str, Variable] = {
     "arm_i": _real("contact", "length", "lever arm from i to the contact point"),
     "arm_j": _real("contact", "length", "lever arm from j to the contact point"),
     "levers": _real("contact end", "length", "offset along t of the contact point, from i and j"),
+    "friction_ratio": _real("contact", "1", "friction coefficient over μ"),
     "forces": _real("contact component", "force", f"original force network, {_COMPONENT}"),
     "corners": _real("corner axis", "length", "corners of all polygons, body by body"),
     "sides": _whole("grain", "number of corners of the body, 0 for a disk"),

@@ -207,8 +207,8 @@ def project(normal, tangential, mu):
     network = contact_matrix.make_network(
         np.zeros((2, 2)), np.array([0]), np.array([1]), nothing, nothing, np.zeros((1, 0, 2))
     )
-    rows = np.zeros(6)
-    problem = contact_program.make_problem(network, rows, rows[:0], rows, np.arange(6), mu, 0.0)
+    rows, one = np.zeros(6), np.array([mu])
+    problem = contact_program.make_problem(network, rows, rows[:0], rows, np.arange(6), one, 0.0)
     at = contact_program.make_iterate(problem, 1)
     work = contact_program.make_workspace(problem, 1)
     at.c[0], at.c[1] = -0.5 * (normal + mu * tangential), -0.5 * (normal - mu * tangential)

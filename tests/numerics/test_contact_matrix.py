@@ -126,7 +126,7 @@ def test_rows_that_follow_from_others_are_found():
     )
     rows, idle = np.zeros(3 * grains), np.tile([0.0, 0.0, 1.0], grains)
     problem = contact_program.make_problem(
-        network, rows, rows[:0], idle, np.arange(3 * grains), 1.0, 1e-11
+        network, rows, rows[:0], idle, np.arange(3 * grains), np.ones(grains), 1e-11
     )
     out = interior_point.dependent_rows(problem, idle)
     assert out.sum() == 2

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 import granforce as gf
 from granforce.cli.parser import main
-from granforce.packing.assemblies import assembly
+from granforce.packing.assemblies import with_network
 from granforce.packing.masonry import rectangle
 from granforce.study.kinds import imported_parameters
 from granforce.study.schema import dataset_packing, packing_dataset
@@ -69,7 +69,7 @@ def test_an_arch_needs_the_thickness_of_milankovitch():
 def test_edges_touch_at_both_ends_of_what_they_share_and_corners_at_one_point():
     turned = np.array([[0, 0], [1, 1], [0, 2], [-1, 1]]) / 2 + [2.2, 0]
     bodies = [rectangle(0, 0, 1, 1), rectangle(0.4, 1, 2, 2), turned, [-0.5, 0.5, 0.5], GROUND]
-    packing = assembly(bodies, 0.5, fixed=[4])
+    packing = gf.blocks(bodies, 0.5, fixed=[4], balanced=False)
     at = {}
     for c, point in enumerate(packing.contact_points):
         pair = int(packing.contacts.i[c]), int(packing.contacts.j[c])
@@ -99,11 +99,11 @@ def test_a_contact_given_twice_is_refused_unless_its_places_differ():
 
 def test_doubtful_pairs_are_named():
     bodies = [rectangle(0, 0, 1, 1), rectangle(1, 1, 2, 2), rectangle(1.00003, 0, 2, 0.5), GROUND]
-    packing = assembly(bodies, 0.5, fixed=[3], tolerance=1e-6)
+    packing = gf.blocks(bodies, 0.5, fixed=[3], tolerance=1e-6, balanced=False)
     assert packing.info["corner_on_corner"] == [[0, 1]]
     ((i, j, gap),) = packing.info["nearly_touching"]
     assert (i, j) == (0, 2) and gap == pytest.approx(3e-5)
-    closer = assembly(bodies, 0.5, fixed=[3], tolerance=1e-4)
+    closer = gf.blocks(bodies, 0.5, fixed=[3], tolerance=1e-4, balanced=False)
     assert len(closer.contacts.i) == len(packing.contacts.i) + 2
     assert closer.contacts.gap.max() == pytest.approx(3e-5)
 
@@ -121,17 +121,21 @@ def random_assembly(rng):
             elif rng.random() < 0.5:
                 body[2:, 0] += rng.uniform(-0.2, 0.2)
             try:
-                assembly([*kept, body, GROUND], 0.5, fixed=[len(kept) + 1])
+                gf.blocks([*kept, body, GROUND], 0.5, fixed=[len(kept) + 1], balanced=False)
             except gf.InputError:  # it overlaps another
                 continue
             kept.append(body)
             above.append(x)
         middles, low = np.array(above), low + height
-    made = assembly([*kept, GROUND], float(rng.uniform(0.1, 0.9)), fixed=[len(kept)])
+    mu = float(rng.uniform(0.1, 0.9))
+    made = gf.blocks([*kept, GROUND], mu, fixed=[len(kept)], balanced=False)
     # A disk that rests on one point rolls under any of it.
     made.load[made.shapes.sides > 0, 0] = (
         rng.uniform(-0.15, 0.15) * made.load[made.shapes.sides > 0, 1]
     )
+    if rng.random() < 0.5:  # each contact with its own friction, some without any
+        ratio = rng.choice([0.0, 0.4, 1.0], len(made.contacts.i), p=[0.1, 0.3, 0.6])
+        made = made._replace(contacts=made.contacts._replace(friction_ratio=ratio))
     return made
 
 
@@ -150,15 +154,16 @@ def own_program(packing, load=None):
                 force = sign * way
                 torque = arm[0] * force[1] - arm[1] * force[0]
                 A[rows[int(body)] : rows[int(body)] + 3, 2 * c + part] = [*force, torque]
-    count, mu = len(packing.contacts.i), packing.mu
+    count, mu = len(packing.contacts.i), packing.contacts.friction(packing.mu)
     cones = np.zeros((2 * count, 2 * count))
     for c in range(count):
-        cones[2 * c : 2 * c + 2, 2 * c] = -mu
+        cones[2 * c : 2 * c + 2, 2 * c] = -mu[c]
         cones[2 * c : 2 * c + 2, 2 * c + 1] = 1, -1
     return A, -(packing.load if load is None else load)[moving].ravel(), cones
 
 
 def check_against_linprog(seed):
+    """Whether the assembly of this seed stands, as linprog says; so are bounds and limit load."""
     rng = np.random.default_rng(seed)
     packing = random_assembly(rng)
     A, b, cones = own_program(packing)
@@ -199,6 +204,110 @@ def test_bounds_and_limit_loads_of_random_assemblies_agree_with_linprog():
     assert 20 < sum(stood) < 58
 
 
+def work_of(packing, forces):
+    """The most that weights do beyond friction at these normal forces, by linprog, for |u| ≤ 1."""
+    A, b, _ = own_program(packing)
+    friction = packing.contacts.friction(packing.mu) * forces[:, 0]
+    opening, sliding = A[:, ::2].T, A[:, 1::2].T
+    slip, none = np.eye(len(friction)), np.zeros((len(friction),) * 2)
+    rows = np.block([[-opening, none], [sliding, -slip], [-sliding, -slip]])
+    bounds = [(-1, 1)] * len(b) + [(0, None)] * len(friction)
+    return -linprog(np.append(b, friction), rows, np.zeros(len(rows)), bounds=bounds).fun
+
+
+def test_nothing_at_rest_can_lose_height_and_what_falls_does():
+    stood = 0
+    for seed in range(16):
+        packing = random_assembly(np.random.default_rng(seed))
+        A, b, _ = own_program(packing)
+        fall = gf.fall(packing)
+        if fall is None:
+            S = gf.ensemble(packing)
+            certificate = gf.rest(gf.ensemble(with_network(packing)))
+            states = S.expand(gf.sample_uniform(S, 2, seed=1).states)
+            networks = [certificate.forces, *states.reshape(-1, *packing.forces.shape)]
+            assert certificate.at_rest
+            assert max(work_of(packing, one) for one in networks) < 1e-8 * np.abs(b).max()
+            stood += 1
+            continue
+        fall[:, 2] /= packing.r
+        u = fall[~np.isnan(packing.load[:, 0])].ravel()
+        opening, sliding = (A.T @ u).reshape(-1, 2).T
+        least = packing.contacts.friction(packing.mu) * np.abs(sliding)
+        assert np.all(opening >= least - 1e-9) and -b @ u > 1e-6
+    assert 4 < stood < 14
+
+
+@pytest.mark.parametrize("mu, width", [(0.5, 1.0), (0.9, 0.6)])
+def test_motion_at_the_critical_load_loses_what_friction_takes(mu, width):
+    """Of the work of weight and load, sliding dissipates all and tipping nothing."""
+    S = gf.ensemble(gf.scene("slope", mu, angle=15, width=width))
+    found, packing, turn = gf.critical_load(S, precision=1e-4), S.packing, np.radians(15)
+    weight, u = -packing.load[0, 1], found.displacement[0]
+    gained = weight * (found.high * u[0] - u[1])
+    along, across = u @ [np.cos(turn), np.sin(turn)], u @ [-np.sin(turn), np.cos(turn)]
+    if mu < width:
+        assert across == pytest.approx(0.0, abs=1e-3)
+        pressure = weight * (np.cos(turn) + found.high * np.sin(turn))
+        assert gained == pytest.approx(mu * pressure * along, rel=2e-3)
+    else:
+        assert (along, across) == pytest.approx(np.array([1, width]) / np.hypot(1, width), abs=1e-3)
+        assert gained == pytest.approx(0.0, abs=2e-3)
+
+
+def test_a_ladder_on_a_smooth_wall_has_the_one_network_of_the_textbook():
+    """N = (W/2) cot θ, which the floor must hold by friction: cot θ ≤ 2 μ."""
+    packing = gf.scene("ladder", 0.5, angle=60)
+    at_wall = np.abs(packing.contacts.normal[:, 0]) > 0.5
+    S = gf.ensemble(packing, np.where(at_wall, 0.0, 0.5))
+    pressure = 0.5 / np.tan(np.radians(60))
+    assert S.dimension == 0 and gf.body(S).corners.shape == (1, 0)
+    bounds = gf.intervals(S)
+    assert np.allclose(bounds.low, bounds.high)
+    assert np.allclose(bounds.low[at_wall], [[pressure, 0]])
+    assert gf.rest(S).at_rest
+    with pytest.raises(gf.NotJammedError):
+        gf.ensemble(packing, np.where(at_wall, 0.0, 0.999 * pressure))
+
+
+def test_friction_of_pairs_of_materials_in_arrays_and_files():
+    """A crate on a plank that lies on ice: either may slide first."""
+    ice, plank, crate = GROUND, rectangle(0, 0, 2, 0.1), rectangle(0.5, 0.1, 1.5, 1.1)
+    for of_crate, of_plank, expected in ((0.1, 0.3, 0.1), (0.3, 0.2, 0.2)):
+        pairs = {("wood", "steel"): of_crate, ("wood", "ice"): of_plank}
+        materials = ["steel", "wood", "ice"]
+        packing = gf.blocks(
+            [crate, plank, ice], 0.9, fixed=[2], materials=materials, friction=pairs
+        )
+        assert gf.load_factor(gf.ensemble(packing)).factor == pytest.approx(expected)
+        assert gf.load_factor(gf.ensemble(packing, 0.5 * packing.mu)).factor == pytest.approx(
+            0.5 * expected
+        )
+        bodies = [
+            {"corners": body.tolist(), "material": material, "fixed": material == "ice"}
+            for body, material in zip([crate, plank, ice], materials, strict=True)
+        ]
+        text = json.dumps({"bodies": bodies, "friction": [[*k, v] for k, v in pairs.items()]})
+        again = gf.read_blocks(io.StringIO(text), mu=0.9)
+        assert np.array_equal(
+            again.contacts.friction(again.mu), packing.contacts.friction(packing.mu)
+        )
+
+
+def test_disks_take_a_friction_for_each_contact():
+    packing = gf.scene("pyramid")
+    count = len(packing.contacts.i)
+    S, same = gf.ensemble(packing, 0.9), gf.ensemble(packing, np.full(count, 0.9))
+    assert np.array_equal(gf.intervals(S).high, gf.intervals(same).high)
+    ratio = np.where(np.arange(count) % 2, 1.0, 0.5)
+    mixed = gf.ensemble(packing, 0.9 * ratio)
+    states = gf.sample_uniform(mixed, 50, seed=0).states
+    limit = 0.9 * ratio[mixed.index] * states[..., 0]
+    assert np.all(np.abs(states[..., 1]) <= limit + 1e-9) and np.all(S.admits(states))
+    with pytest.raises(gf.InputError, match="one μ only"):
+        gf.walk(mixed, 2, relax=gf.gauss_seidel)
+
+
 @pytest.mark.stress
 def test_those_of_many_random_assemblies_agree_with_linprog():
     stood = [check_against_linprog(seed) for seed in range(60, 400)]
@@ -226,7 +335,8 @@ def test_bodies_without_friction_need_their_torques():
 
 
 def test_files_and_stores_carry_shapes(tmp_path):
-    packing = gf.blocks([rectangle(0, 0, 1, 1), [1.5, 0.5, 0.5], GROUND], 0.5, fixed=[2])
+    bodies = [rectangle(0, 0, 1, 1), [1.5, 0.5, 0.5], GROUND]
+    packing = gf.blocks(bodies, [0.5, 0.5, 0.1, 0.0], fixed=[2])
     gf.save_packing(packing, tmp_path / "blocks.npz")
     for again in (
         gf.load_packing(tmp_path / "blocks.npz"),
@@ -234,9 +344,10 @@ def test_files_and_stores_carry_shapes(tmp_path):
     ):
         assert imported_parameters(again) == imported_parameters(packing)
         assert all(np.array_equal(a, b) for a, b in zip(again.shapes, packing.shapes, strict=True))
+        assert np.array_equal(again.contacts.friction_ratio, packing.contacts.friction_ratio)
         assert again.info == packing.info
     disks = gf.scene("pyramid")
-    assert "levers" not in packing_dataset(disks) and "mass" not in packing_dataset(disks)
+    assert not {"levers", "mass", "friction_ratio"} & set(packing_dataset(disks))
 
 
 @pytest.mark.parametrize(
@@ -252,6 +363,12 @@ def test_files_and_stores_carry_shapes(tmp_path):
         ),
         (lambda: gf.blocks([rectangle(0, 0, 1, 1), GROUND], 0.5, fixed=[2]), "from 0 to 1"),
         (lambda: gf.blocks([GROUND], 0.5, weights=[0.0]), "weight ≤ 0"),
+        (
+            lambda: gf.blocks([GROUND], 0.5, materials=["a", "b"]),
+            "material of each of the 1 bodies",
+        ),
+        (lambda: gf.blocks([GROUND], 0.5, friction={("a", "b"): 1}), "no body has this material"),
+        (lambda: gf.ensemble(gf.scene("slope"), [0.5]), "friction coefficients must have shape"),
         (lambda: gf.walk(gf.ensemble(gf.scene("slope")), 2, relax=gf.gauss_seidel), "disks only"),
         (lambda: gf.margin(gf.scene("slope")), "disks only"),
         (lambda: gf.save_vtk(gf.scene("slope"), "a.vtp", "b.vtp"), "disks only"),
@@ -313,6 +430,8 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
         ("[1, 2]", {}, "give an object"),
         (GIVEN.replace("0.3]", "null]"), {}, "body 2"),
         (GIVEN, {"density": 0}, "density must be"),
+        (GIVEN.replace('"fixed"', '"material": 3, "fixed"'), {}, "a material is a text"),
+        (GIVEN.replace("{", '{"friction": [["a", 0.3]], ', 1), {}, '"friction" is'),
     ],
 )
 def test_what_cannot_be_read_as_bodies_is_one_line(text, options, words):

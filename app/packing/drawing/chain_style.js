@@ -70,7 +70,7 @@ export class Look {
   /** Position on the colour scale, 0 … 1. */
   shade(c, { normal, tangential }) {
     const { colour, most } = this.asked
-    if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
+    if (colour === "mobilised") return 0.5 + (this.mobilised(c, normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
@@ -81,8 +81,9 @@ export class Look {
   }
 
   /** fₜ/(μ fₙ), or null if undefined. */
-  mobilised(normal, tangential) {
-    return this.walk.mu > 0 && normal > CARRYING ? tangential / (this.walk.mu * normal) : null
+  mobilised(c, normal, tangential) {
+    const friction = this.walk.friction[c]
+    return friction > 0 && normal > CARRYING ? tangential / (friction * normal) : null
   }
 
   // Details of the contact under the pointer: rows of name and value
@@ -95,7 +96,7 @@ export class Look {
       ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", t.toFixed(3)],
-      ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
+      ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
     if (seen) rows.push(["fₙ seen", told(low[c], high[c])])

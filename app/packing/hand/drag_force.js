@@ -173,7 +173,7 @@ export class Grab {
     if (more) return this.arrived()
     this.begun = mixed.normal[this.contact]
     this.remember()
-    this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.mu * mixed.normal[c])
+    this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.friction[c] * mixed.normal[c])
     this.arrived()
   }
 

@@ -13,13 +13,15 @@ from granforce.packing.importers.text import Source, Table, read_csv, read_text
 from granforce.records import InputError, Packing, brief, positive
 from granforce.types import Floats, Integers
 
-KEYS = ("corners", "disk", "density", "fixed")  # of a body in JSON
+KEYS = ("corners", "disk", "density", "fixed", "material")  # of a body in JSON
 
 
 class _Bodies(NamedTuple):
     outlines: list[Any]  # corners (k, 2), or x, y, r of a disk
     density: list[float | None]  # None: not given
     fixed: list[bool]
+    materials: list[Any] | None
+    friction: dict[Any, Any]  # of pairs of materials
 
 
 def read_blocks(
@@ -30,7 +32,8 @@ def read_blocks(
     source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y;
     optionally r (above 0: the row is a disk), and density and fixed (0 or 1), alike in all rows of
     a body. JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or disk [x, y, r],
-    and optionally density and fixed (true or false). mu: friction coefficient of all contacts.
+    and optionally density, fixed (true or false) and material, and in the object "friction" of
+    pairs of materials, [["stone", "wood", 0.4], …]. mu: friction coefficient of all other contacts.
     density: mass per area of the bodies that have none in the file, by default 1. tolerance: as for
     `blocks`. packing.info has notes on pairs in doubt, and lists them.
 
@@ -56,6 +59,8 @@ def read_blocks(
             mu,
             fixed=np.flatnonzero(found.fixed),
             weights=np.array(own) * [area(body, k) for k, body in enumerate(found.outlines)],
+            materials=found.materials,
+            friction=found.friction,
             tolerance=tolerance,
         )
     except InputError as error:
@@ -99,6 +104,8 @@ def _from_table(table: Table) -> _Bodies:
         [np.array([*x[k[0]], r[k[0]]]) if r[k[0]] else x[k] for k in rows],
         alike("density", table.numbers("density")) if "density" in table.header else none,
         [bool(value) for value in alike("fixed", held)],
+        None,
+        {},
     )
 
 
@@ -119,4 +126,20 @@ def _from_json(name: str, text: str) -> _Bodies:
             raise InputError(f"{name}: fixed of body {k} must be true or false")
     shapes = [body.get("corners", body.get("disk")) for body in bodies]
     held = [body.get("fixed", False) for body in bodies]
-    return _Bodies(shapes, [body.get("density") for body in bodies], held)
+    materials = [body.get("material") for body in bodies]
+    if not all(isinstance(material, str | None) for material in materials):
+        raise InputError(f"{name}: a material is a text")
+    friction = {}
+    for row in _rows_of(given.get("friction", []), name):
+        friction[row[0], row[1]] = row[2]
+    return _Bodies(shapes, [body.get("density") for body in bodies], held, materials, friction)
+
+
+def _rows_of(given: Any, name: str) -> list[list[Any]]:
+    """Pairs of materials and their friction, [a, b, μ]."""
+    rows = given if isinstance(given, list) else [given]
+    for row in rows:
+        kinds = [type(value) for value in row] if isinstance(row, list) else []
+        if kinds[:2] != [str, str] or len(kinds) != 3 or kinds[2] not in (int, float):
+            raise InputError(f'{name}: "friction" is [["stone", "wood", 0.4], …], not {brief(row)}')
+    return rows

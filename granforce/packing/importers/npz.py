@@ -42,7 +42,8 @@ def load_packing(
 
     source: a path or an open binary file. Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if
     none), mu, i, j, nx, ny, branch, fn, ft; optionally seed, load, tilt, arm_i, arm_j and info
-    (JSON); for bodies other than disks also levers, gap, corners, sides, mass and inertia.
+    (JSON); friction_ratio (N_c,), friction of each contact over mu; for bodies other than disks
+    also levers, gap, corners, sides, mass and inertia.
     unpacked: most bytes of all arrays together; most_grains: largest number of grains.
     Raises InputError naming the error.
     """
@@ -89,7 +90,11 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
         "fn": packing.forces[:, 0],
         "ft": packing.forces[:, 1],
         "load": packing.load,
-        **({} if contacts.levers is None else {"levers": contacts.levers}),
+        **{
+            name: values
+            for name in ("levers", "friction_ratio")
+            if (values := getattr(contacts, name)) is not None
+        },
         **dict(zip(_SHAPES, packing.shapes or (), strict=False)),
         "info": np.array(info),
         **_seed(packing.info),
@@ -159,6 +164,11 @@ def _packing(arrays: dict[str, npt.NDArray[Any]]) -> Packing:
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
     info = _info(arrays)
     contacts = _contacts(arrays, r, info)
+    if "friction_ratio" in arrays:
+        ratio = float_array(arrays["friction_ratio"], contacts.i.shape, "friction_ratio")
+        if np.any((ratio < 0) | (ratio > 1)):
+            raise InputError("friction_ratio must lie between 0 and 1: mu is the largest friction")
+        contacts = contacts._replace(friction_ratio=ratio)
     forces = [float_array(arrays[key], contacts.i.shape, key) for key in ("fn", "ft")]
     return make_packing(
         arrays["x"],

@@ -133,7 +133,7 @@ def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
 NORMAL = np.array([[1.0, 2.0], [0.5, 3.0], [2.0, 1.0], [1.5, 2.5]])
 TANGENTIAL = np.array([[0.1, -0.2], [0.0, 0.4], [-0.3, 0.1], [0.2, 0.2]])
 WALK = {
-    "contacts": 2, "mu": 0.5, "states": 3, "number": [0, 1, 2, 3],
+    "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "states": 3, "number": [0, 1, 2, 3],
     "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
     "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8], "unit": 1,
 }  # fmt: skip
@@ -181,7 +181,8 @@ def test_to_and_fro_between_two_states_has_a_track_of_two(run):
 
 # A disk of radius 1/2 between two of radius 1, along x: contacts at −1/2 and 1/2.
 PRESSED = {
-    "contacts": 2, "mu": 0.5, "contact": [0, 1], "i": [0, 1], "j": [1, 2], "grain": [0, 1, 2],
+    "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "contact": [0, 1], "i": [0, 1], "j": [1, 2],
+    "grain": [0, 1, 2],
     "x0": [-1.5, 0.0], "y0": [0.0, 0.0], "x1": [0.0, 1.5], "y1": [0.0, 0.0],
     "x": [-1.5, 0.0, 1.5], "y": [0.0, 0.0, 0.0], "r": [1.0, 0.5, 1.0], "radius": [1.0, 0.5, 1.0],
     "kind": [0, 0, 0], "box": [-1, -1], "tilt": 0, "window": [-3, 3, -3, 3], "unit": 1.0,
