@@ -11,6 +11,7 @@ from ..browser.messages import Message
 from ..results import compute
 from ..results.library import Cell
 from ..results.progress_feed import Summary
+from ..results.replays import worded
 from ..state.app_state import AppState
 from ..widgets.hints import term
 from . import result_values
@@ -79,7 +80,7 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     doubt = (
         f'<p class="flag" role="note">⚠ {sampling.doubt}</p>' if sampling and sampling.doubt else ""
     )
-    left = f'<p class="left">{left_out(state.replay.summary)}</p>'
+    left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
     return (
         _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [values])

@@ -124,7 +124,7 @@ export class Scene {
     this.drawChains(this.style)
     Object.assign(this, { disks, chains, marks, view, size })
     this.changed()
-    return sheet.svg(geometry.window, { ...caption, unit: geometry.unit })
+    return sheet.svg(geometry.window, { ...caption, unit: geometry.unit, bodies: geometry.outlines?.length > 0 })
   }
 
   drawDisks() {

@@ -53,7 +53,7 @@ export class Sheet {
   clearRect() {}
 
   /** The drawing as text, with colour bar, scale and caption below. */
-  svg([left, right, bottom, top], { background, ink, bar, lines: told, unit }) {
+  svg([left, right, bottom, top], { background, ink, bar, lines: told, unit, bodies }) {
     const lines = told.flatMap(wrapped)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
     const element = ({ name, ...given }) =>
@@ -70,7 +70,7 @@ export class Sheet {
       "</svg>",
       `<g fill="${ink}">`,
       ...colourBar(bar),
-      ...scaleBar((PIXELS / (right - left)) * SCALE_LENGTH * unit),
+      ...scaleBar(PIXELS / (right - left), SCALE_LENGTH * unit, bodies),
       ...lines.map((line, k) => `<text x="12" y="${PIXELS + BELOW + LINE * k}">${safe(line)}</text>`),
       "</g>",
       "</svg>",
@@ -103,10 +103,15 @@ function colourBar({ low, high, stops }) {
   ]
 }
 
-function scaleBar(length) {
+/** A bar of SCALE_LENGTH; of bodies, of a round length in their own unit. */
+function scaleBar(scale, most, bodies) {
+  const ten = 10 ** Math.floor(Math.log10(most)), round = ten * [5, 2, 1].find((k) => k * ten <= most)
+  const length = scale * (bodies ? round : most)
+  const words = bodies ? `${Number(round.toPrecision(1))}, in the unit of the bodies` : `${SCALE_LENGTH} largest radii`
   return [
     `<rect x="${PIXELS - 20 - length}" y="${PIXELS + 26}" width="${length}" height="4"/>`,
-    `<text x="${PIXELS - 20 - length / 2}" y="${PIXELS + 20}" text-anchor="middle">` +
-      `${SCALE_LENGTH} largest radii</text>`,
+    bodies
+      ? `<text x="${PIXELS - 20}" y="${PIXELS + 20}" text-anchor="end">${words}</text>`
+      : `<text x="${PIXELS - 20 - length / 2}" y="${PIXELS + 20}" text-anchor="middle">${words}</text>`,
   ]
 }

@@ -437,3 +437,26 @@ def test_the_point_in_force_space_stays_within_the_outline(run, target, reached)
         target=target,
     )  # fmt: skip
     assert normal == pytest.approx(reached, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "unit, bodies, words, size",
+    [
+        (1.0, False, "5 largest radii", 500),
+        (0.3, True, "1, in the unit of the bodies", 100),
+        (0.05, True, "0.2, in the unit of the bodies", 20),
+    ],
+)
+def test_the_scale_of_a_picture_is_a_round_length_of_bodies(run, unit, bodies, words, size):
+    text = run(
+        "packing/drawing/svg_context",
+        """({ Sheet, PIXELS }, { unit, bodies }) => {
+            const half = PIXELS / 200, window = [-half, half, -half, half]
+            const bar = { low: "0", high: "1", stops: ["black", "white"] }, background = "white"
+            const caption = { background, ink: "black", bar, lines: [] }
+            return new Sheet().svg(window, { ...caption, unit, bodies })
+        }""",
+        unit=unit,
+        bodies=bodies,
+    )
+    assert f">{words}</text>" in text and f'width="{size}" height="4"' in text

@@ -19,8 +19,10 @@ from small_store import KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
+from app.background.jobs import Job
 from app.background.limits import Limits
 from app.browser.messages import TO_BROWSER, listed
+from app.explore import results_line
 from app.explore.controls import Controls
 from app.explore.result_values import between
 from app.explore.tabs.export import export as export_view
@@ -861,3 +863,13 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
     assert b"bk-" in page and b"ofAnotherPage" not in page
+
+
+def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):
+    state = visited("?scene=arch&states=3")
+    wait_for(state)
+    page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
+    assert '"thrust": {"a": [' in page and "where the resultant of a joint can pass" in page
+    assert '"outlines": [[' in page
+    state.replay.summary["rattlers"] = 2
+    assert ">loose bodies<" in results_line.tables(state, None, False)

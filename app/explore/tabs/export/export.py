@@ -13,7 +13,7 @@ from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, origin, stem
 from ....packing.view import gone, measured, pins
 from ....results import planes
-from ....results.compute import computed_anew
+from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
 from ....results.saved_file import File, csv
 from ....state.app_state import AppState
@@ -81,14 +81,16 @@ class Snapshot:
 
     def html(self, job: Job) -> File:
         """The view as a page that needs no server."""
-        outlined = None
+        outlined, shown = None, self._shown
         if self.replay.summary["dimension"] > 0:
             kept = standalone.thinned(self.replay)
             principal = planes.principal(kept)
             outlined = planes.outline(self.library, self.cell, kept, principal)(job)
+            if self.replay.outlines:
+                shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
         job.begin("making the page")
         content = standalone.html(
-            self.library, self.cell, self.replay, self.possible, self._shown, view=self.view,
+            self.library, self.cell, self.replay, self.possible, shown, view=self.view,
             outlined=outlined, link=self.link, command=self.command,
             source=" ".join([self.source, *self.known]),
         )  # fmt: skip

@@ -16,7 +16,7 @@ from bokeh.resources import Resources
 
 from ....browser.bundle import Scripted, module
 from ....packing.player import Player, frames
-from ....packing.view import exact_intervals, full_extent, legend
+from ....packing.view import THRUST, exact_intervals, full_extent, legend
 from ....results import planes
 from ....results.library import Cell, Library
 from ....results.replays import Replay, evenly
@@ -71,7 +71,7 @@ def html(
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: with known forces; shown: loads, gone, measured and pins, as for the player.
+    exact: with known forces; shown: loads, gone, measured, pins and thrust, as for the player.
     """
     intervals = exact_intervals(exact, replay)
     kept = thinned(replay)
@@ -96,7 +96,8 @@ def html(
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
-        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"])),
+        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"]))
+        + (THRUST if given["thrust"] else ""),
         "source": source,
         "frame": frame,
         "between": between,

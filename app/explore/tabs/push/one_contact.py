@@ -95,7 +95,7 @@ def decay_sentence(pushed: Pushed) -> str:
 def decay(pushed: Pushed) -> Figure:
     """|u| of every grain against its distance from the contact, and its mean in shells."""
     fig = figure(
-        "displacement", None, "distance from the pushed contact, in largest radii",
+        "displacement", None, "distance from the pushed contact, in the packing's unit",
         "first motion |u| (rms = 1)", height=300, x_axis_type="log", y_axis_type="log",
     )  # fmt: skip
     seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
