@@ -36,7 +36,6 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if arguments.out is not None:
         series.check_folder(arguments.out)
     store = open_store(arguments.cache)
-    store.make()
     with Bar("frames", "frame") as progress:
         dataset, failed = series.infer_series(
             store.path,
@@ -71,7 +70,6 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
         raise InputError(f"--out {arguments.out}: with --frames the name must end with .zarr")
     check_outputs(arguments.csv, arguments.out)
     store = open_store(arguments.cache)
-    store.make()
     if snapshots.lost:
         print(f"granforce: {snapshots.lost}", file=sys.stderr)
     with Bar("snapshots", "cell") as progress:

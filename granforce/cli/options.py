@@ -226,7 +226,7 @@ def add_conditions(command: Parser, known: bool = True) -> None:
         "--prescribe",
         choices=["pressure", "stress", "none"],
         default="pressure",
-        help="the pressure (default), the whole stress, or nothing (with --slice)",
+        help="the pressure (default), the whole stress, or nothing (always so with --slice)",
     )
     group.add_argument(
         "--stress",
@@ -356,6 +356,11 @@ def add_exact(command: Parser) -> None:
     add_unit(group)
     add_conditions(command)
     add_store(command)
+    command.leaves_out(
+        "with --slice, where the frozen contacts determine the stress",
+        lambda given: given.slice is not None and given.prescribe != "none",
+        {"prescribe", "stress"},
+    )
 
 
 def add_reading(group: argparse._ActionsContainer) -> None:

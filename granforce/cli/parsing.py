@@ -41,7 +41,17 @@ class Edited(str):
         return [Output(name) for name in self.split(",") if name]
 
 
-ROLES = (Input, Output, Workplace, StorePath, Edited)
+class TableOrStore(str):
+    """A table (.csv), which is replaced, or a store of results."""
+
+    @property
+    def files(self) -> list[Output | StorePath]:
+        return [Output(self) if self.endswith(".csv") else StorePath(self)]
+
+
+ROLES = (Input, Output, Workplace, StorePath, Edited, TableOrStore)
+# A word that begins so is a negative number, or a list of numbers: no option does.
+_NEGATIVE = re.compile(r"-\.?\d")
 
 
 def _no_file(path: str) -> bool:
@@ -99,6 +109,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(*args, **kwargs)
         self.unused: list[Unused] = []
         self.seen: set[str] = set()  # attributes given so far in a command line
+        self._negative_number_matcher = _NEGATIVE
         for name in (None, "store"):
             self.register("action", name, _Once)
 
@@ -205,7 +216,7 @@ class Parser(argparse.ArgumentParser):
         for action in self._actions:
             path = getattr(arguments, action.dest, None)
             known = re.search(r"\.\{?([a-z,]+)\}?$", str(action.metavar))
-            if isinstance(path, Output) and known and not _no_file(path):
+            if isinstance(path, (Output, TableOrStore)) and known and not _no_file(path):
                 suffixes = [f".{suffix}" for suffix in known[1].split(",")]
                 if not path.endswith(tuple(suffixes)):
                     *others, last = suffixes
@@ -218,6 +229,6 @@ class Parser(argparse.ArgumentParser):
         for name, typed in self.options.items():
             value = getattr(arguments, name, None)
             for word in value if isinstance(value, list) else [value]:
-                for path in word.files if isinstance(word, Edited) else [word]:
+                for path in getattr(word, "files", [word]):
                     if isinstance(path, ROLES):
                         yield typed, path

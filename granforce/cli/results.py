@@ -45,6 +45,14 @@ def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[A
         raise InputError(f"{option} {text[:40]!r}: give numbers separated by commas") from None
 
 
+def different(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
+    """The same for a list of cases; InputError for one that is given twice."""
+    found = numbers(option, text, cast)
+    if repeated := [one for k, one in enumerate(found or []) if one in (found or [])[:k]]:
+        raise InputError(f"{option} {repeated[0]} is given twice; give it once")
+    return found
+
+
 def check_outputs(*paths: str | None) -> None:
     """InputError for files that cannot be written, before anything is computed."""
     for path in paths:

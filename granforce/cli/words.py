@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+
 from granforce import __version__
 from granforce.cli import report_lines
 from granforce.cli.options import (
@@ -34,7 +36,7 @@ from granforce.cli.options import (
     subcommand,
     walls,
 )
-from granforce.cli.parsing import Edited, Input, Output, Parser, StorePath, Workplace
+from granforce.cli.parsing import Edited, Input, Output, Parser, TableOrStore, Workplace
 
 
 def add_pack(commands: Commands) -> None:
@@ -228,6 +230,11 @@ def add_infer(commands: Commands) -> None:
         lambda arguments: arguments.states == 0,
         {"sample_seed", "chains", "again"},
     )
+    command.leaves_out(
+        "with --states 0 and without --certain or --frames",
+        lambda given: given.states == 0 and not given.certain and given.frames is None,
+        {"workers"},
+    )
 
 
 def add_informative(commands: Commands) -> None:
@@ -284,12 +291,21 @@ def add_scan(commands: Commands) -> None:
     command.add_argument("--seeds", type=int, default=1, help="packings per μ: seeds 1 … SEEDS")
     add_packing(command, several=True)
     add_walk_options(command)
-    command.add_argument("--out", type=StorePath, metavar="STORE", help="store for the results")
+    command.add_argument(
+        "--out",
+        type=TableOrStore,
+        metavar="FILE.{csv,zarr}",
+        help="write the table (.csv), or use this store of results instead of --cache (.zarr)",
+    )
     add_store(command)
     command.add_argument("--keep", type=int, help="store only this many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
     add_scheduler(command)
-    command.leaves_out("with --out", lambda arguments: arguments.out is not None, {"cache"})
+    command.leaves_out("with --out FOLDER.zarr", _into_store, {"cache"})
+
+
+def _into_store(arguments: argparse.Namespace) -> bool:
+    return arguments.out is not None and not arguments.out.endswith(".csv")
 
 
 def add_figures(commands: Commands) -> None:

@@ -25,7 +25,7 @@ from granforce.forces.build import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
-from granforce.packing.importers.network import WORTH_REVERSING, judged
+from granforce.packing.importers.network import WORTH_REVERSING, judged, worth_reversing
 from granforce.packing.importers.text import Source, check_grains
 from granforce.records import (
     InputError,
@@ -160,10 +160,7 @@ def read_pegs(
     )
     notes = [] if note is None else [note]
     if saved > WORTH_REVERSING:
-        notes.append(
-            f"the unbalance of grains falls by {saved:.0%} if tangential forces change sign: "
-            + ("leave out reverse" if reverse else "--reverse (reverse=True) changes it")
-        )
+        notes.append(worth_reversing(saved, reverse))
     found = wall_contacts(listing, x, r, at_wall, walls, reach)
     if found is not None and found.outline is not None:
         note = bad_fit(found.outline, x, r, at_wall)

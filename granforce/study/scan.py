@@ -152,7 +152,6 @@ def run(
     Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """
     store = open_store(path)
-    store.make()
     todo = []
     for k, cell in enumerate(cells):
         if load(store, *cell) is None:
@@ -178,13 +177,16 @@ def run(
         tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
         needs = _needs({k: cells[k] for k in todo})
         if scheduler is None:
+            store.make()
             waits = Waits(needs, failed)
             _over_processes(tasks, waits, workers, finished, tell, enough or (lambda: False))
         else:
-            first = set(needs.values())
-            for part in (first, tasks.keys() - first):
-                some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
-                _over_dask(some, scheduler, finished)
+            with _client_of(scheduler) as client:
+                store.make()  # only once a scheduler has answered
+                first = set(needs.values())
+                for part in (first, tasks.keys() - first):
+                    some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
+                    _over_dask(client, some, scheduler, finished)
     return [(cells[k], failed[k]) for k in sorted(failed)]
 
 
@@ -364,43 +366,52 @@ def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None
 
 
 def _over_dask(
-    tasks: Tasks, scheduler: str, finished: Callable[[int, Callable[[], bool]], object]
+    client: Any,
+    tasks: Tasks,
+    scheduler: str,
+    finished: Callable[[int, Callable[[], bool]], object],
 ) -> None:
     """Run tasks on the workers of a dask scheduler, which restarts those of lost workers."""
-    try:
-        from dask.distributed import Client, KilledWorker, as_completed
-    except ImportError:
-        raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
+    from dask.distributed import KilledWorker, as_completed
+
     unreachable = InputError(
         f"the dask scheduler at {scheduler} is gone; finished entries are saved"
     )
-    with _without_tracebacks(), _client_of(scheduler, Client) as client:
-        waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
-        completed, workers = as_completed(list(waiting)), _Workers(scheduler)
-        try:
-            while waiting:
-                for future in completed.next_batch(block=False):
-                    if future.status == "cancelled":  # its fate is unknown
-                        raise unreachable
-                    dead = isinstance(future.exception(), KilledWorker)
-                    finished(waiting.pop(future), _lost if dead else future.result)
-                try:
-                    present = client.nthreads()
-                except OSError:
-                    raise unreachable from None
-                workers.count(present)
-                time.sleep(LOOK)
-        except BaseException:
-            client.cancel(list(waiting))
-            raise
-
-
-def _client_of(scheduler: str, client: Callable[..., Any]) -> Any:
+    waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
+    completed, workers = as_completed(list(waiting)), _Workers(scheduler)
     try:
-        return client(scheduler, timeout=10)
-    except Exception as error:  # another service at this address may answer anything
-        words = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InputError(f"no dask scheduler at {scheduler}: {words}") from None
+        while waiting:
+            for future in completed.next_batch(block=False):
+                if future.status == "cancelled":  # its fate is unknown
+                    raise unreachable
+                dead = isinstance(future.exception(), KilledWorker)
+                finished(waiting.pop(future), _lost if dead else future.result)
+            try:
+                present = client.nthreads()
+            except OSError:
+                raise unreachable from None
+            workers.count(present)
+            time.sleep(LOOK)
+    except BaseException:
+        client.cancel(list(waiting))
+        raise
+
+
+@contextmanager
+def _client_of(scheduler: str) -> Iterator[Any]:
+    """A client of a dask scheduler; InputError if it cannot be reached."""
+    try:
+        from dask.distributed import Client
+    except ImportError:
+        raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
+    with _without_tracebacks():
+        try:
+            client = Client(scheduler, timeout=10)
+        except Exception as error:  # another service at this address may answer anything
+            words = " ".join(str(error).split())[:200] or type(error).__name__
+            raise InputError(f"no dask scheduler at {scheduler}: {words}") from None
+        with client:
+            yield client
 
 
 @contextmanager

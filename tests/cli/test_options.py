@@ -32,13 +32,18 @@ LINES = {
     "infer": [
         f"{MU} --measured m.csv --states 8",
         f"{MU} --measured m.csv --states 0",
+        f"{MU} --measured m.csv --states 0 --certain",
         "p.npz --measured m.csv --states 8",
         f"{FRAMES} --frames all --mu 0.3 --states 4 --workers 1 --strict",
     ],
     "informative": [f"{MU} --states 8", "p.npz --states 8"],
-    "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
-    "intervals": [MU, "p.npz"],
-    "limit-loads": [MU, "p.npz"],
+    "scan": [
+        "-n 8 --mu 0.3 --states 3",
+        "-n 8 --mu 0.3 --states 3 --out scan.zarr",
+        "-n 8 --mu 0.3 --states 3 --out scan.csv",
+    ],
+    "intervals": [MU, "p.npz", f"{MU} --slice 0,0.9,0,0.9"],
+    "limit-loads": [MU, "p.npz", f"{MU} --slice 0,0.9,0,0.9"],
     "load-factor": [
         "blocks.npz --load horizontal",
         "blocks.npz --load horizontal --critical",
@@ -219,6 +224,68 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
 def test_a_second_packing_is_refused(here, capsys):
     assert parser.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
     assert "give the file of one packing" in capsys.readouterr().err
+
+
+def _takes_numbers(action):
+    """Whether an option takes words that may begin with a minus."""
+    return action.option_strings and action.nargs is None and not action.choices
+
+
+@pytest.mark.parametrize("command", PARSERS)
+def test_values_that_begin_with_a_minus_need_no_equals_sign(command):
+    one = PARSERS[command]
+    lists = [action for action in one._actions if _takes_numbers(action) and action.type is str]
+    for action in lists:
+        for value in ("-0.1,1,0", "-.5,-1e-3", "-2"):
+            typed = action.option_strings[-1]
+            given = [shlex.split(line) for line in LINES[command]]
+            words = next((line for line in given if typed in line), given[0])
+            if typed in words:  # perhaps required: the value replaces the one there
+                del words[words.index(typed) : words.index(typed) + 2]
+            one.seen.clear()
+            found = argparse.ArgumentParser.parse_known_args(one, [*words, typed, value])[0]
+            assert getattr(found, action.dest) in (value, [value])
+
+
+@pytest.mark.parametrize("line", ["intervals -n 8 --mu 0.3 --contacts 3,0,3", "scan --mu 0.3,0.30"])
+def test_a_case_given_twice_is_refused(line, here, capsys):
+    assert parser.main(line.split()) == 2
+    assert "is given twice; give it once" in capsys.readouterr().err
+
+
+def test_a_sign_that_changes_nothing_is_refused(here, capsys, monkeypatch):
+    smooth = load_packing("p.npz")
+    smooth = smooth._replace(forces=smooth.forces * [1, 0])
+    monkeypatch.setitem(commands.packings.READERS, "table", lambda *files, **options: smooth)
+    line = "import table grains.csv grains.csv --mu 0.3 --reverse --out new.npz"
+    assert parser.main(line.split()) == 2
+    assert "every tangential force is 0" in capsys.readouterr().err
+    assert not (here / "new.npz").exists()
+
+
+def test_the_suffix_of_a_scan_decides_between_table_and_store(here, capsys, monkeypatch):
+    counts = dict.fromkeys(("rejected", "unconverged", "skipped", "dimension"), 3)
+    reals = dict.fromkeys(("packing_fraction", "coordination", "eta1", "eta2", "eta3"), 0.25)
+    rows = [{"mu": 0.5, "seed": 1, **reals, "acceptance": 1.0, **counts, "cached": False}]
+    paths = []
+
+    def scan(path, *args, **kwargs):
+        paths.append(path)
+        return rows, []
+
+    monkeypatch.setattr(commands.states.scans, "scan", scan)
+    line = "scan --mu 0.3 -n 8 --cache done/cells.zarr --out"
+    assert parser.main([*line.split(), "table.csv"]) == 0
+    head, line_of_table = Path("table.csv").read_text().splitlines()
+    assert head == ",".join(name for name in rows[0] if name != "cached")
+    assert line_of_table == "0.5,1,0.25,0.25,0.25,0.25,0.25,1,3,3,3,3"
+    assert paths == [here / "done" / "cells.zarr"]
+    with pytest.raises(SystemExit):
+        parser.main([*line.split(), "other.zarr"])
+    assert "--cache has no effect with --out FOLDER.zarr" in capsys.readouterr().err
+    assert parser.main("scan --mu 0.3 --out table.txt".split()) == 2
+    assert "the name must end with .csv or .zarr" in capsys.readouterr().err
+    assert not Path("table.txt").exists()
 
 
 def test_a_default_that_is_typed_counts_as_given(capsys):

@@ -259,7 +259,7 @@ def test_tangential_forces_of_the_other_sign_are_noticed(made, taken):
     grains, rows = made
     other = [[*row[:3], -row[3], row[4]] for row in rows]
     (note,) = read(grains, other).report["notes"]
-    assert "change sign" in note and "--reverse" in note
+    assert "other sign" in note and "--reverse" in note
     found = read(grains, other, reverse=True)
     assert "notes" not in found.report
     same(found, taken)

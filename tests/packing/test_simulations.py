@@ -388,11 +388,11 @@ def reversed_table():
 def test_the_other_sign_of_tangential_forces_is_noted_and_taken():
     packing, files = reversed_table()
     wrong = read_table(*given(*files), mu=MU, box=packing.box)
-    of_sign = [note for note in wrong.info["notes"] if "change sign" in note]
-    assert len(of_sign) == 1 and "unbalance of grains falls by 100%" in of_sign[0]
+    of_sign = [note for note in wrong.info["notes"] if "other sign" in note]
+    assert len(of_sign) == 1 and "takes away 100% of the unbalance" in of_sign[0]
     assert "--reverse" in of_sign[0]
     right = read_table(*given(*files), mu=MU, box=packing.box, reverse=True)
-    assert not any("change sign" in note for note in right.info.get("notes", []))
+    assert not any("other sign" in note for note in right.info.get("notes", []))
     assert right.info["residual"] < 1e-8 < wrong.info["residual"]
     with pytest.raises(InputError, match="leave it out"):
         read_table(*given(files[0]), mu=MU, box=packing.box, reverse=True)

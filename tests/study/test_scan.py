@@ -293,6 +293,7 @@ def test_no_scheduler_is_one_line(tmp_path):
     pytest.importorskip("dask.distributed")
     with pytest.raises(InputError, match="no dask scheduler at"):
         scan.run(tmp_path / "s", small_cells()[:1], scheduler="tcp://127.0.0.1:9")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture

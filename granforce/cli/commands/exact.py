@@ -11,6 +11,7 @@ from granforce.cli.results import (
     StoredResult,
     conditions,
     contact_labels,
+    different,
     extension,
     extents,
     found,
@@ -42,7 +43,7 @@ def solved(dataset: xr.Dataset) -> dict[str, int]:
 
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
-    chosen = numbers("--contacts", arguments.contacts, int)
+    chosen = different("--contacts", arguments.contacts, int)
     _, parameters, dataset, ends = found(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
@@ -81,7 +82,7 @@ def perturb(arguments: argparse.Namespace) -> None:
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
     """Exact bounds or limit loads."""
-    contacts = numbers("--contacts", arguments.contacts, int)
+    contacts = different("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
     chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
     return found(arguments, kind, arguments.out, **chosen)

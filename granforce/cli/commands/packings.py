@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
 from granforce.system.terminal import print_report
+from granforce.types import Floats
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -42,13 +43,21 @@ def pack(arguments: argparse.Namespace) -> None:
     _report(lines, packing, arguments)
 
 
-def _report(lines: Mapping[str, Any], packing: Packing, arguments: argparse.Namespace) -> None:
-    """Save a packing if requested, then report it, even if it could not be saved."""
+def _report(
+    lines: Mapping[str, Any],
+    packing: Packing,
+    arguments: argparse.Namespace,
+    notes: Sequence[str] = (),
+) -> None:
+    """Save a packing if requested, then report it, even if it could not be saved; notes last."""
     try:
         if arguments.out is not None:
             importers.save_packing(packing, arguments.out)
     finally:
         print_report(with_units(lines), arguments.json)
+        sys.stdout.flush()  # where both go to one place, notes come after the report
+        for note in notes:
+            print(f"granforce: {note}", file=sys.stderr)
 
 
 def _scene(arguments: argparse.Namespace) -> None:
@@ -104,8 +113,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
     packing = READERS[arguments.format](*files, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
         raise InputError("--pressure applies only to a table without forces or loads: leave it out")
-    for note in packing.info.get("notes", []):
-        print(f"granforce: {note}", file=sys.stderr)
+    _check_reverse(arguments, packing.forces)
     named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
@@ -113,8 +121,13 @@ def import_(arguments: argparse.Namespace) -> int | None:
         lines |= {"contacts_with_walls": len(packing.r) - packing.info["disks"]}
     if arguments.json and "nearly_touching" in packing.info:
         lines |= {"nearly_touching": packing.info["nearly_touching"]}
-    _report(lines, packing, arguments)
+    _report(lines, packing, arguments, packing.info.get("notes", []))
     return None
+
+
+def _check_reverse(arguments: argparse.Namespace, forces: Floats) -> None:
+    if getattr(arguments, "reverse", False) and not np.nan_to_num(forces[:, 1]).any():
+        raise InputError("--reverse has no effect, as every tangential force is 0: leave it out")
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:
@@ -127,9 +140,8 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         columns=named_columns(arguments),
         **flaws_and_walls(arguments),
     )
-    for note in found.report.get("notes", []):
-        print(f"granforce: {note}", file=sys.stderr)
-    _report(found.report, found.packing, arguments)
+    _check_reverse(arguments, found.measured)
+    _report(found.report, found.packing, arguments, found.report.get("notes", []))
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T
         columns = {"contact": np.arange(len(found.measured))}

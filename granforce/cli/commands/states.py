@@ -5,18 +5,21 @@ import json
 import sys
 from collections.abc import Sequence
 
+import numpy as np
+
 from granforce.cli.results import (
+    check_outputs,
     conditions,
     contact_labels,
+    different,
     extension,
     extents,
     found,
-    numbers,
     packing_options,
     unit,
     walked,
 )
-from granforce.cli.tables import write_columns, write_states
+from granforce.cli.tables import write_columns, write_csv, write_states
 from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -134,10 +137,13 @@ def measure(arguments: argparse.Namespace) -> None:
 
 def scan(arguments: argparse.Namespace) -> int:
     """Compute cells by processes into a store; print their table. Returns 1 if a cell failed."""
-    mus = numbers("--mu", arguments.mu, float) or []
+    mus = different("--mu", arguments.mu, float) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     worker_count(arguments.workers, "--workers")
-    store = open_store(arguments.out or arguments.cache)
+    to_table = arguments.out is not None and arguments.out.endswith(".csv")
+    if to_table:
+        check_outputs(arguments.out)
+    store = open_store(arguments.cache if to_table else arguments.out or arguments.cache)
     with Bar("scan", "cell") as progress:
         rows, failed = scans.scan(
             store.path,
@@ -156,7 +162,14 @@ def scan(arguments: argparse.Namespace) -> int:
             progress=progress,
             **packing_options(arguments),
         )
-    _report_scan(rows, failed, arguments.json)
+    try:
+        if to_table and rows:
+            names = [name for name in rows[0] if name != "cached"]
+            write_csv(
+                arguments.out, {name: np.array([row[name] for row in rows]) for name in names}
+            )
+    finally:
+        _report_scan(rows, failed, arguments.json)
     return 1 if failed else 0
 
 

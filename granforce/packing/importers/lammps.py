@@ -321,8 +321,9 @@ def _with_names(table: Table, named: bool) -> Table:
     columns = [column for column in table.header if column != "index"]
     if len(columns) != len(CONTACT_COLUMNS):
         raise InputError(
-            f"{table.name}: {len(columns)} columns ({some_of(columns)}); name, by columns=, "
-            f"the seven that hold {', '.join(CONTACT_COLUMNS)}"
+            f"{table.name}: {len(columns)} columns ({some_of(columns)}); name the seven "
+            f"that hold {', '.join(CONTACT_COLUMNS)}, as in --columns atom1={columns[0]},… "
+            "(columns=)"
         )
     ours = dict(zip(columns, CONTACT_COLUMNS, strict=True))
     return table._replace(header=tuple(ours.get(column, column) for column in table.header))
@@ -346,6 +347,6 @@ def _components(
     for c in np.flatnonzero(skew > SKEW * np.hypot(*total.T).mean())[:1]:
         raise InputError(
             f"{place(c)}: the normal force does not point along the line of centres; "
-            "name the columns by columns="
+            "name the columns, as in --columns fx=…,fy=… (columns=)"
         )
     return components(total, n)

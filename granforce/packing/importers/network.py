@@ -43,11 +43,11 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     inner = np.isfinite(load.sum(axis=1))
     gain = gain_by_reversing((c.i, c.j, c.normal), packing.forces, np.nan_to_num(load), inner)
     if gain > WORTH_REVERSING:
-        notes = packing.info.get("notes", [])
-        note = f"the unbalance of grains falls by {gain:.0%} if tangential forces change sign; " + (
-            "leave out reverse" if reverse else "--reverse (reverse=True) changes it"
-        )
-        info["notes"] = [*notes, *info.get("notes", []), note]
+        info["notes"] = [
+            *packing.info.get("notes", []),
+            *info.get("notes", []),
+            worth_reversing(gain, reverse),
+        ]
     if np.isfinite(packing.volume):
         virial = float(normal @ packing.contacts.length)
         if virial <= 0:
@@ -56,6 +56,16 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     elif not packing.load.any():
         packing = packing._replace(load=_left_over(packing))
     return packing._replace(info={**packing.info, **info, **judged(packing)})
+
+
+def worth_reversing(gain: float, reverse: bool) -> str:
+    """A note on forces that balance better by this fraction with the other sign of f_t."""
+    change = "leave out --reverse" if reverse else "give --reverse"
+    return (
+        "the forces do not balance the grains, probably because tangential forces have the other "
+        f"sign, which takes away {gain:.0%} of the unbalance: {change} (reverse={not reverse}); "
+        "the packing has the forces as read"
+    )
 
 
 def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:

@@ -105,10 +105,15 @@ def read_table(
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
-            raise InputError("reverse applies to tables with forces (f_n, f_t): leave it out")
+            raise InputError(
+                "--reverse (reverse=True) applies to tables with forces (f_n, f_t): leave it out"
+            )
         return find(packing, forces="found")
     if walls is not None or gravity:
-        raise InputError("walls and gravity apply to tables without forces: leave out f_n and f_t")
+        raise InputError(
+            "--walls and --gravity (walls=, gravity=) apply to tables without forces: leave out "
+            "f_n and f_t"
+        )
     found = adopt(packing, reverse=reverse, forces="given")
     return found if closed or load.any() else _with_edge(found)
 
