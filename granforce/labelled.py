@@ -95,8 +95,7 @@ _RENAMED = {
     "_CriticalForces": {"low": "critical_low", "high": "critical_high"},
     "Carrying": {"least": "f_n_least"},
     "Informative": {
-        "expected": "part_expected",
-        "reduction": "part_shorter",
+        "expected": "expected_reduction",
         "after": "mean_interval_after",
     },
 }
@@ -198,9 +197,10 @@ def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
 
     Columns have the names of the tables of the command line: contact, i, j, x, y, then component,
     variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
-    `read_known` and ``--known`` read the file that the table's `to_csv` writes. A Volume has a row
-    for each ladder, an Outline for each corner, a Body for each contact along each direction.
-    Arguments and errors as for `to_dataset`.
+    `read_known` and ``--known`` read the file that the table's `to_csv` writes. Of intervals,
+    ``backbone`` is True where the largest f_n is above 0. A Volume has a row for each ladder, an
+    Outline for each corner, a Body for each contact along each direction. Arguments and errors as
+    for `to_dataset`.
     """
     dataset = to_dataset(result, ensemble)
     if "contact" not in dataset.sizes:
@@ -234,7 +234,10 @@ def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers
     if isinstance(result, Packing):
         return result, np.arange(len(result.contacts.i))
     if not isinstance(ensemble, Ensemble):
-        raise InputError("labels require the ensemble of the result: gf.to_dataset(result, S)")
+        raise InputError(
+            "contacts are labelled by the ensemble S of the result: give it too, as in "
+            "gf.to_dataframe(result, S) or gf.to_dataset(result, S)"
+        )
     _refuse_foreign(result, ensemble)
     return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
 

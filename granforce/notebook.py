@@ -35,17 +35,17 @@ COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
 def brief(record: type[T]) -> type[T]:
     """A decorator: the repr of a record (named tuple or dataclass) fits into a line or two.
 
-    `help` shows the comments on its fields, with their shapes and units.
+    Its docstring, which `help` shows first, lists the comments on its fields (shapes, units).
     """
     record.__repr__ = _short  # type: ignore[method-assign]
     comments = _comments(record)
     fields = getattr(record, "_fields", None)
-    if fields is not None:
-        for name in comments.keys() & set(fields):
-            getattr(record, name).__doc__ = comments[name]
-    else:
-        told = (f"    {name}: {comments[name]}" for name in record.__annotations__)
-        record.__doc__ = "\n".join([record.__doc__ or "", "", *told])
+    for name in comments.keys() & set(fields or ()):
+        getattr(record, name).__doc__ = comments[name]
+    if fields is not None:  # some may be inherited
+        comments = {name: getattr(record, name).__doc__ for name in fields}
+    told = (f"    {name}: {comments[name]}" for name in fields or record.__annotations__)
+    record.__doc__ = "\n".join([(record.__doc__ or "").rstrip(), "", *told])
     return record
 
 

@@ -54,6 +54,12 @@ class UndecidedError(InputError):
     """Solvers reached no result that could be verified: the question is open."""
 
 
+class UnboundedError(InputError):
+    """The forces in S have no upper bounds."""
+
+    named = False  # whether the message names grains and contacts
+
+
 class Cancelled(Exception):
     """The work was cancelled on request; the current unit of work is lost."""
 
@@ -219,7 +225,7 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
     """A decorator: the function raises InputError unless its first argument has this type.
 
     kinds: {argument: type} of other arguments, which may be None. The message names the call that
-    makes such an object.
+    makes such an object. If forces turn out to be unbounded, the error names those of the Ensemble.
     """
 
     def checked(function: Callable[P, T]) -> Callable[P, T]:
@@ -232,7 +238,13 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
             for name in expected.keys() & given.keys():
                 if given[name] is not None or name not in kinds:
                     _check_kind(function.__name__, given[name], expected[name])
-            return function(*arguments, **options)
+            try:
+                return function(*arguments, **options)
+            except UnboundedError as error:
+                named = [one for one in given.values() if hasattr(one, "unbounded")]
+                if error.named or not named:
+                    raise
+                raise named[0].unbounded() from None  # type: ignore[attr-defined]
 
         return inside
 
@@ -318,6 +330,12 @@ def worker_count(value: Any, name: str = "workers") -> int:
 def brief(value: Any) -> str:
     """A value for a message: one line of at most 40 characters."""
     return " ".join(repr(value).split())[:40]
+
+
+def brief_list(values: Collection[Any], most: int = 8) -> str:
+    """The first values for a message, separated by commas."""
+    first = [str(value)[:40] for value in list(values)[:most]]
+    return ", ".join([*first, *(["…"] if len(values) > most else [])])
 
 
 def friction(mu: Any) -> float:

@@ -82,3 +82,6 @@ MU_DIGITS = 15
 # Largest error of the ends of a line of thrust at a joint, as a part of the joint's length, for
 # networks in which the joint carries at least LOADED_JOINT ⟨f_n⟩.
 JOINT_GAP, LOADED_JOINT = 1e-6, 0.01
+
+# Part of the largest coordinate of an unbounded direction from which a contact takes part in it.
+LOCKED = 1e-6

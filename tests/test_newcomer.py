@@ -20,6 +20,7 @@ import granforce as gf
 from granforce.cli import report_lines
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
+from granforce.figures import picture
 from granforce.glossary import TERMS
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
@@ -452,11 +453,26 @@ def test_the_mean_normal_force_has_one_meaning(name, cache, capsys):
     mean = np.average(S.original[:, 0], weights=S.contacts.length)
     assert S.force_scale == pytest.approx(mean) != pytest.approx(packing.forces[:, 0].mean())
     assert gf.report(packing)["mean_normal_force"] == S.force_scale
-    assert f"⟨f_n⟩ = {mean:.4g}" in title(gf.plot(packing, backend="matplotlib"))
+    assert f"⟨f_n⟩ = {mean:.4g}" in title(gf.plot(packing, colour="force", backend="matplotlib"))
     states = S.original[None]
-    figure = gf.plot(packing, states, contacts=S.index, backend="matplotlib")
+    figure = gf.plot(packing, states, "force", contacts=S.index, backend="matplotlib")
     assert f"⟨f_n⟩ = {mean:.4g}" in title(figure)
     assert f"{packing.forces[:, 0].mean():.4g}" not in packing._repr_svg_()
+
+
+def test_the_colour_bar_has_an_arrow_only_where_values_lie_beyond_it(monkeypatch):
+    def refuse(packing):
+        raise AssertionError("an ensemble is built for widths alone")
+
+    monkeypatch.setattr(picture, "ensemble", refuse)
+    packing = reference("n100_mu0.1_s11")
+    forces = packing.forces.copy()
+    forces[:, 1] = packing.mu * forces[:, 0] * (1 + 1e-12) * np.where(forces[:, 1] < 0, -1, 1)
+    for factor, seen in ((1.0, 1.0), (2.0, 2.0)):
+        forces[np.argmax(forces[:, 0]), 1] *= factor
+        drawn = gf.plot(packing._replace(forces=forces), backend="matplotlib")
+        (lines,) = (one for one in drawn if "w" in one.dimensions("value", label=True))
+        assert np.abs(lines.dimension_values("value")).max() == pytest.approx(seen, abs=0)
 
 
 def title(figure):
@@ -487,6 +503,8 @@ def test_tables_of_pandas_are_read_where_those_of_the_command_line_are(cache, ca
     exact = gf.intervals(S)
     table = gf.to_dataframe(exact, S)
     assert main("intervals p.npz --out bounds.csv".split()) == 0
+    with pytest.raises(gf.InputError, match=r"as in gf\.to_dataframe\(result, S\)"):
+        gf.to_dataframe(exact)
     written = pd.read_csv("bounds.csv")
     assert [*table.columns.drop("backbone"), "cluster"] == [*written.columns]
     table.to_csv("known.csv")  # with the index of pandas as a column without a name
@@ -548,6 +566,7 @@ def test_help_explains_the_fields_of_records_with_their_units():
             assert not getattr(record, name).__doc__.startswith("Alias"), (record, name)
     told = pydoc.render_doc(gf.Intervals, renderer=pydoc.plaintext)
     assert "(k, 2) least value, force; NaN if cancelled or not certified" in told
+    assert told.index("low: (k, 2) least value") < told.index("Method resolution order")
     above = pydoc.render_doc(gf.Packing, renderer=pydoc.plaintext)
     assert "of bodies other than disks; x are then centres of mass" in above
     assert "backbone, as positions in packing.x" in pydoc.render_doc(gf.Ensemble)
@@ -642,8 +661,9 @@ def test_what_to_measure_next(cache, capsys):
     S = gf.ensemble(packed(30, 0.3))
     best = gf.informative(S, 4, states=100, check=2)
     assert told["contact"] == best.contacts.tolist()
-    assert told["part_shorter"][:2] == best.reduction[:2].tolist()
-    assert told["part_shorter"][0] == pytest.approx(1 - best.after[0] / best.before)
+    assert told["reduction"][:2] == best.reduction[:2].tolist()
+    assert told["reduction"][0] == pytest.approx(1 - best.after[0] / best.before)
+    assert {"expected_reduction", "reduction"} <= set(gf.to_dataframe(best, S).columns) & set(told)
     assert told["twins"] == [list(others) for others in best.twins]
     assert told["mean_interval_after [mean]"][0] < told["mean_interval_now [mean]"]
     assert main(words.split()) == 0

@@ -299,12 +299,12 @@ def walls(word: str) -> str | list[list[float]]:
     return segments
 
 
-def add_out(command: argparse._ActionsContainer, what: str) -> None:
+def add_out(command: argparse._ActionsContainer, what: str, also: str = "") -> None:
     command.add_argument(
         "--out",
         type=Output,
         metavar="FILE.{csv,npz,zarr}",
-        help=f"write {what}: a table (.csv), arrays (.npz) or an xarray dataset (.zarr)",
+        help=f"write {what}: a table (.csv), arrays (.npz) or an xarray dataset (.zarr){also}",
     )
 
 
@@ -334,7 +334,8 @@ def add_scheduler(command: argparse._ActionsContainer) -> None:
     )
 
 
-def add_exact(command: Parser) -> None:
+def add_exact(command: Parser, also: str = "") -> None:
+    """Add the options of exact results; also: words on other columns of the table."""
     add_any_packing(command)
     group = command.add_argument_group("the ensemble")
     group.add_argument(
@@ -352,7 +353,7 @@ def add_exact(command: Parser) -> None:
         help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    add_out(group, "the result per contact")
+    add_out(group, "the result per contact", also)
     add_unit(group)
     add_conditions(command)
     add_store(command)

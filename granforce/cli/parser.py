@@ -83,9 +83,10 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
     try:
         from granforce.cli import commands
         from granforce.system.compiled import tell_when_compiling
+        from granforce.system.terminal import Bar
 
         interrupts.check()  # an import may have swallowed Ctrl-C
-        tell_when_compiling(_say_compiling)
+        tell_when_compiling(_say_compiling, Bar.restart)
         _check_paths(arguments, command)
         code: int = getattr(commands, arguments.run)(arguments) or 0
         store = getattr(arguments, "store", None)
@@ -124,4 +125,4 @@ def _report_interrupt() -> int:
 
 def _say_compiling() -> None:
     # Like a progress line, which later ones may overwrite.
-    print("\rgranforce: compiling, once per machine …", file=sys.stderr)
+    print("\rgranforce: compiling what this command needs, once per machine …", file=sys.stderr)

@@ -28,9 +28,11 @@ MEANINGS = {
     "interval: first tenth, …, last tenth",
     "programs": "linear programs solved",
     "again": "programs solved a second time, with refined steps or by HiGHS",
-    "part_expected": "part by which errors of f_n fall once this one is known",
-    "part_shorter": "part by which the mean interval of f_n shortens, by exact bounds",
-    "mean_interval_after": "mean interval of f_n once this one is known",
+    "expected_reduction": "fraction by which errors of f_n fall once this one is known, from "
+    "covariances",
+    "reduction": "fraction by which the mean interval of f_n shortens, by exact bounds; undefined "
+    "beyond --check",
+    "mean_interval_after": "mean length of the interval of f_n once this one is known, in ⟨f_n⟩",
     "twins": "contacts whose measurement would give the same; the table counts them",
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
     "shear_stress_from_to": "range of σ_xy/P that the contacts can carry",
@@ -127,7 +129,7 @@ MEANINGS = {
     "mean_standard_error": "mean standard error of a force",
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "those that carry force in every network within 3 σ",
-    "mean_interval_now": "mean length of the interval of f_n before a measurement",
+    "mean_interval_now": "mean length of the interval of f_n before a measurement, in ⟨f_n⟩",
 }
 _STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
 _CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
@@ -175,7 +177,7 @@ LOAD_FACTOR = (
     *("critical_factor_high", "residual", "breach", "converged"),
 )
 INFORMATIVE = (
-    *("entry", "mean_interval_now", "part_expected", "part_shorter", "mean_interval_after"),
+    *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),
     *("twins", "seconds", "cached"),
 )
 STRESS = (

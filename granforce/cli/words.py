@@ -439,7 +439,11 @@ def add_intervals(commands: Commands) -> None:
         "granforce intervals -n 400 --mu 0.1 --seed 1 --out bounds.csv",
         lines=report_lines.INTERVALS,
     )
-    add_exact(command)
+    add_exact(
+        command,
+        "; cluster numbers groups of contacts whose forces depend on each other, −1 "
+        "where force balance determines them",
+    )
 
 
 def add_limit_loads(commands: Commands) -> None:

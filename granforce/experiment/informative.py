@@ -33,7 +33,7 @@ class Informative(NamedTuple):
 
     @property
     def reduction(self) -> Floats:
-        """(k,) part by which the mean interval shortens with f_n of that contact known."""
+        """(k,) fraction by which the mean interval shortens with f_n of that contact known."""
         return 1 - self.after / self.before
 
     def _repr_html_(self) -> str:

@@ -21,7 +21,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
-from granforce.records import InputError, UndecidedError
+from granforce.records import UnboundedError, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Floats, Integers, Mask
@@ -96,7 +96,7 @@ def walls(
             "from each other; use larger errors"
         )
     if centre is None:
-        raise InputError(certificates.UNBOUNDED)
+        raise UnboundedError(certificates.UNBOUNDED)
     if not np.all(centre >= 0):
         raise UndecidedError(
             "these conditions leave too little freedom to resolve: use a larger friction "

@@ -13,6 +13,8 @@ from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
 from granforce.records import InputError, Packing, brief, float_array, takes
+from granforce.system.plain import counted
+from granforce.tolerances import ADMISSIBLE
 from granforce.types import Floats
 
 COLOURS = ("mobilisation", "force", "spread")
@@ -59,7 +61,10 @@ def plot(
         )
     several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
-    unit, told = _unit(packing, mean)
+    if isinstance(colour, str) and colour in ("force", "spread"):
+        unit, told = _unit(packing, mean)
+    else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
+        unit, told = mean[:, 0].mean() or 1.0, ""
     friction = packing.contacts.friction(packing.mu)[numbers]
     values, label, look = _coloured(friction, several, mean, colour, unit)
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
@@ -69,9 +74,8 @@ def plot(
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
     count = int((~left_open_in(packing)).sum())
-    one, several_of = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
-    kind = one if count == 1 else several_of
-    title = f"{count} {kind}, μ = {packing.mu:g}{told}"
+    kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
+    title = f"{counted(count, *kind)}, μ = {packing.mu:g}{told}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
 
 
@@ -97,6 +101,9 @@ def _coloured(
     if colour == "mobilisation":
         limit = friction * mean[:, 0]
         values = np.divide(mean[:, 1], limit, np.zeros(len(mean)), where=limit > 0)
+        # The colour bar gets an arrow at an end beyond which there are values; rounding is none.
+        admitted = np.abs(mean[:, 1]) - limit <= ADMISSIBLE * unit
+        values[admitted] = np.clip(values[admitted], -1, 1)
         return values, _WORDS[colour], look | {"clim": (-1, 1)}
     values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
     return values / unit, _WORDS[colour], look

@@ -23,17 +23,19 @@ from scipy import sparse
 from granforce import notebook
 from granforce.forces import balance, knowledge
 from granforce.forces.balance import LARGEST_RANK, left_free
-from granforce.numerics import inner_point
+from granforce.numerics import certificates, inner_point
 from granforce.records import (
     Contacts,
     InputError,
     Packing,
+    UnboundedError,
+    brief_list,
     real_array,
     refuse_hidden,
     whole,
 )
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, LARGEST_UNIT
+from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, LARGEST_UNIT, LOCKED
 from granforce.types import Floats, Integers, Mask
 
 
@@ -270,6 +272,30 @@ class Ensemble:
             )
             y = np.append(y, rest / self.units[known.contact, known.component])
         return np.maximum(y, 0.0)
+
+    def unbounded(self) -> UnboundedError:
+        """The error for unbounded forces: which can grow without a load, and what bounds them."""
+        ray = certificates.recession(self.scaled_form[0])
+        locked = np.zeros(0, dtype=np.int64)
+        if ray is not None:
+            cones = ray[: self.per_contact * len(self.index)].reshape(len(self.index), -1)
+            locked = np.flatnonzero(cones.max(axis=1) > LOCKED * ray.max())
+        ends = np.concatenate([self.contacts.i[locked], self.contacts.j[locked]])
+        held = balance.left_open_in(self.packing)[ends]
+        error = UnboundedError(certificates.UNBOUNDED)
+        if held.any() and not held.all():
+            free = np.unique(ends[~held])
+            grains, are = ("Grain", "is") if len(free) == 1 else ("Grains", "are")
+            error = UnboundedError(
+                "the forces in S are not bounded: some can press against each other without a "
+                f"load. {grains} {brief_list(free)} (counted from 0) {are} wedged between walls or "
+                f"fixed grains, where friction {self.mu:g} holds however strongly contacts "
+                f"{brief_list(self.index[locked])} press. Use a smaller friction coefficient "
+                "(--ensemble-mu, mu=), an upper bound on f_n of one of these contacts (f_n_high in "
+                "--known, known=), or a wall that is not held but carries a weight"
+            )
+        error.named = True
+        return error
 
     @cached_property
     def _row_scale(self) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError, UndecidedError
+from granforce.records import InputError, NotJammedError, UnboundedError, UndecidedError
 from granforce.tolerances import BALANCED, CARRYING
 from granforce.types import Floats
 
@@ -27,9 +27,8 @@ _BALANCED_DIRECTION = 1e-13
 _USUAL_MEAN = 2.0
 UNBOUNDED = (
     "the forces on these contacts are not bounded: some can press against each other without a "
-    "load, such as disks wedged between walls; prescribe a pressure or a load, use a smaller "
-    "friction coefficient, give bounds on single forces (known forces), or freeze the surrounding "
-    "contacts (a slice)"
+    "load; prescribe a pressure or a load, use a smaller friction coefficient, or give bounds on "
+    "single forces"
 )
 
 
@@ -48,7 +47,7 @@ def why_unsolved(
     if empty_ray(A, b, slack) is not None:
         return NotJammedError(empty)
     if recession(A) is not None:
-        return InputError(UNBOUNDED)
+        return UnboundedError(UNBOUNDED)
     return UndecidedError(
         "whether these contacts can balance is undecided: linear programs over their forces gave "
         "no result that could be checked; change a contact or the friction slightly"

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
 from granforce.packing import polygons
@@ -21,11 +22,13 @@ from granforce.packing.polygons import Meeting, Touch
 from granforce.records import (
     Contacts,
     InputError,
+    NotJammedError,
     Packing,
     Shapes,
     UndecidedError,
     are_whole,
     brief,
+    brief_list,
     float_array,
     make_cell,
     make_contacts_at,
@@ -33,11 +36,13 @@ from granforce.records import (
     positive,
     real_array,
 )
+from granforce.system.plain import counted
 from granforce.tolerances import TOUCHING
 from granforce.types import Floats, Integers, Mask
 
-# Gaps up to this many tolerances are reported as nearly touching.
-_NEARLY = 100.0
+# Gaps up to this many tolerances are reported as nearly touching; and, in the largest body, those
+# up to which pairs are named if nothing balances.
+_NEARLY, _MISSED = 100.0, 0.01
 
 
 def blocks(
@@ -50,6 +55,7 @@ def blocks(
     friction: Mapping[Any, Any] | None = None,
     tolerance: float | None = None,
     balanced: bool = True,
+    names: Sequence[str] | None = None,
 ) -> Packing:
     """A Packing of rigid bodies, with the admissible network nearest to equal normal forces.
 
@@ -62,11 +68,12 @@ def blocks(
     balanced: whether to look for a network; otherwise forces are 0, even if nothing balances. An
     edge on an edge touches at both ends of the shared part. Doubtful pairs are listed in info:
     corner_on_corner [i, j], which have no normal and no contact, and nearly_touching [i, j, gap],
-    up to 100 tolerances apart.
+    up to 100 tolerances apart. names: of the bodies, for messages; by default their numbers.
 
     Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights.
     """
-    outlines = [_outline(body, k) for k, body in enumerate(bodies)]
+    names = [str(k) for k in range(len(bodies))] if names is None else names
+    outlines = [_outline(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]
     if not outlines:
         raise InputError("there is no body; give at least one")
     held = _fixed(fixed, len(outlines))
@@ -75,10 +82,10 @@ def blocks(
         raise InputError(f"give the material of each of the {len(outlines)} bodies")
     weights = area if weights is None else float_array(weights, area.shape, "weights")
     for k in np.flatnonzero((weights <= 0) & ~held)[:1]:
-        raise InputError(f"body {k} has a weight ≤ 0: every body that can move needs a mass")
+        raise InputError(f"body {names[k]} has a weight ≤ 0: every body that can move needs a mass")
     weights = np.where(held, area, weights)
     tolerance = TOUCHING * r.max() if tolerance is None else positive(tolerance, "tolerance")
-    i, j, touches, doubts = _contacts(outlines, x, r, held, tolerance)
+    i, j, touches, doubts = _contacts(outlines, x, r, held, tolerance, names)
     number = [len(touch.gap) for touch in touches]
     points, gap = (
         np.concatenate([np.empty(shape), *(getattr(touch, name) for touch in touches)])
@@ -106,7 +113,12 @@ def blocks(
             inertia=weights * polar / area,
         ),
     )
-    return with_network(packing) if balanced else packing
+    if not balanced:
+        return packing
+    try:
+        return with_network(packing)
+    except NotJammedError as error:
+        raise NotJammedError(f"{error}{_missed(packing)}{_legend(names)}") from None
 
 
 def with_network(packing: Packing) -> Packing:
@@ -143,9 +155,42 @@ def _frictions(
     return [given.get(frozenset((named[i], named[j])), mu) for i, j in ends]
 
 
-def _outline(body: npt.ArrayLike, number: int) -> Floats:
+def _missed(packing: Packing) -> str:
+    """Words on pairs that may be contacts: their number, smallest gap, and the tolerance."""
+    shapes, tolerance = packing.shapes, packing.info["tolerance"]
+    assert shapes is not None
+    outlines = [
+        body if len(body) else np.append(x, r)
+        for body, x, r in zip(shapes.polygons(), packing.x, packing.r, strict=True)
+    ]
+    held = left_open_in(packing)
+    near = _MISSED * packing.r.max()
+    doubts = _contacts(outlines, packing.x, packing.r, held, tolerance, near=near)[3]
+    if not doubts["nearly_touching"]:
+        return ""
+    gaps = [gap for _, _, gap in doubts["nearly_touching"]]
+    return "; " + nearly_touching(gaps, tolerance)
+
+
+def nearly_touching(gaps: Sequence[float], tolerance: float) -> str:
+    """Words on pairs of bodies with these gaps, which are no contacts."""
+    pairs = counted(len(gaps), "pair of bodies nearly touches", "pairs of bodies nearly touch")
+    return (
+        f"{pairs}, with gaps from {min(gaps):.2g}, and no contact at the tolerance "
+        f"{tolerance:.2g}: a larger --tolerance (tolerance=) makes them contacts"
+    )
+
+
+def _legend(names: Sequence[str] | None) -> str:
+    """Numbers of bodies with their names, where these differ."""
+    if names is None or list(names) == [str(k) for k in range(len(names))]:
+        return ""
+    listed = brief_list([f"{k} {name}" for k, name in enumerate(names)])
+    return f"; the bodies are {listed}"
+
+
+def _outline(body: npt.ArrayLike, name: str) -> Floats:
     """Corners (k, 2), or (3,) x, y, r of a disk."""
-    name = f"body {number}"
     given = real_array(body, name)
     if given.ndim != 1:
         return polygons.polygon(given, name)
@@ -155,9 +200,9 @@ def _outline(body: npt.ArrayLike, number: int) -> Floats:
     return disk
 
 
-def area(body: npt.ArrayLike, number: int) -> float:
-    """The area of a body as `blocks` takes it; number: its place in the list, for messages."""
-    return _measured(_outline(body, number))[0]
+def area(body: npt.ArrayLike, name: str) -> float:
+    """The area of a body as `blocks` takes it, with its name for messages."""
+    return _measured(_outline(body, f"body {name}"))[0]
 
 
 def _measured(body: Floats) -> tuple[float, Floats, float, float]:
@@ -179,11 +224,19 @@ def _fixed(fixed: npt.ArrayLike, count: int) -> Mask:
 
 
 def _contacts(
-    outlines: Sequence[Floats], x: Floats, r: Floats, held: Mask, tolerance: float
+    outlines: Sequence[Floats],
+    x: Floats,
+    r: Floats,
+    held: Mask,
+    tolerance: float,
+    names: Sequence[str] = (),
+    *,
+    near: float | None = None,
 ) -> tuple[Integers, Integers, list[Touch], dict[str, Any]]:
-    """Pairs i, j (k,) that touch, their Touch, and the doubtful pairs."""
+    """Pairs i, j (k,) that touch, their Touch, and the doubtful pairs, with gaps up to near."""
+    near = _NEARLY * tolerance if near is None else near
     cell = make_cell([np.inf, np.inf])
-    first, second, _ = find_pairs(x, r, cell, _NEARLY * tolerance)
+    first, second, _ = find_pairs(x, r, cell, near)
     pairs = [
         (i, j)
         for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True))
@@ -199,10 +252,10 @@ def _contacts(
             doubts["corner_on_corner"].append([i, j])
         elif met.gap < 0:
             raise InputError(
-                f"bodies {i} and {j} overlap by {-met.gap:.3g}, more than the tolerance "
-                f"{tolerance:.3g}; move one, or raise the tolerance"
+                f"bodies {names[i]} and {names[j]} overlap by {-met.gap:.3g}, more than the "
+                f"tolerance {tolerance:.3g}; move one, or raise --tolerance (tolerance=)"
             )
-        elif met.gap <= _NEARLY * tolerance:
+        elif met.gap <= near:
             doubts["nearly_touching"].append([i, j, met.gap])
     i, j = np.array([one[:2] for one in touching], dtype=np.int64).reshape(-1, 2).T
     return i, j, [one[2] for one in touching], doubts

@@ -79,13 +79,23 @@ def margin(packing: Packing) -> Margin:
     if not len(packing.r):
         return Margin(0.0, SKIN / 2)
     unit = packing.r.max()
-    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, SKIN / 2 * unit)
-    normal, _, gap = separations(packing.x, packing.r, packing.cell, i, j, shift)
-    other = ~_listed(packing.contacts, i, j, normal, len(packing.r))
+    _, _, gap = apart(packing, SKIN / 2)
     return Margin(
         float(np.abs(packing.contacts.gap).max(initial=0.0) / unit),
-        float(gap[other].min(initial=SKIN / 2 * unit) / unit),
+        float(gap.min(initial=SKIN / 2 * unit) / unit),
     )
+
+
+def apart(packing: Packing, near: float) -> tuple[Integers, Integers, Floats]:
+    """Grains i, j (P,) of pairs that are no contacts, and their gaps (P,) below `near`.
+
+    near is in largest radii, gaps are in the unit of x. Each image of a grain counts by itself.
+    """
+    x, r = packing.x, packing.r
+    i, j, shift = find_pairs(x, r, packing.cell, near * r.max())
+    normal, _, gap = separations(x, r, packing.cell, i, j, shift)
+    other = ~_listed(packing.contacts, i, j, normal, len(r))
+    return i[other], j[other], gap[other]
 
 
 def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int) -> Mask:

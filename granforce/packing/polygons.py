@@ -50,9 +50,23 @@ def polygon(corners: npt.ArrayLike, name: str) -> Floats:
     if len(corners) < 3:
         raise InputError(f"{name} needs three corners that do not lie on one line")
     turned = bend.sum() / (2 * np.pi)
-    if not (np.all(bend > 0) or np.all(bend < 0)) or abs(abs(turned) - 1) > 1e-6:
+    if not _convex(bend):
+        away = corners - corners.mean(axis=0)
+        around = corners[np.argsort(np.arctan2(away[:, 1], away[:, 0]))]
+        edges = np.roll(around, -1, axis=0) - around
+        if _convex(_bends(np.roll(edges, 1, axis=0), edges)):
+            raise InputError(
+                f"the corners of {name} are in the wrong order, so that its sides cross; list "
+                "them one after the other around the body"
+            )
         raise InputError(f"{name} is not convex; divide it into convex parts")
     return corners if turned > 0 else corners[::-1].copy()
+
+
+def _convex(bend: Floats) -> bool:
+    """Whether an outline with these bends turns once, always to the same side."""
+    once = abs(abs(bend.sum()) / (2 * np.pi) - 1) <= 1e-6
+    return once and bool(np.all(bend > 0) or np.all(bend < 0))
 
 
 def _bends(before: Floats, after: Floats) -> Floats:

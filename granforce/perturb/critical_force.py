@@ -333,8 +333,9 @@ def response(
     force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
     above the limit load if the bracket ends there). critical: the CriticalForce, computed if not
     given. The motion is that of one step of contact dynamics from rest, followed until the
-    violation of Coulomb's law is at most STEADY times the fastest relative velocity. cancel()
-    returning True raises Cancelled.
+    violation of Coulomb's law is at most STEADY times the fastest relative velocity. displacement
+    and rotation of rattlers are NaN, as nothing moves them: use `S.grains` for the others, or
+    numpy's nanmax and nanmean. cancel() returning True raises Cancelled.
 
     Raises InputError if the grains come to rest under this load.
     """

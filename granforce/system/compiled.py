@@ -33,17 +33,25 @@ def find_a_place() -> None:
     )
 
 
-def tell_when_compiling(say: Callable[[], object]) -> None:
-    """Call say() once, as soon as a kernel is compiled that is not in the cache."""
+def tell_when_compiling(
+    say: Callable[[], object], compiled: Callable[[], object] = lambda: None
+) -> None:
+    """Call say() once, as soon as a kernel is compiled that is not in the cache.
+
+    compiled() is called after each compilation.
+    """
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]  # numba has no type hints
+        said = False
+
         def on_start(self, happening: Any) -> None:
-            event.unregister("numba:compile", self)
-            say()
+            if not self.said:
+                self.said = True
+                say()
 
         def on_end(self, happening: Any) -> None:
-            pass
+            compiled()
 
     event.register("numba:compile", Listener())
 

@@ -1,4 +1,4 @@
-"""Values in JSON (RFC 8259), which has neither NaN nor infinities."""
+"""Values in JSON (RFC 8259), which has neither NaN nor infinities, and in words."""
 
 import json
 import math
@@ -16,6 +16,11 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def counted(count: int, one: str, several: str) -> str:
+    """A number with the words for one or for several: 1 pair, 2 pairs."""
+    return f"{count} {one if count == 1 else several}"
 
 
 def spaced(name: str) -> str:

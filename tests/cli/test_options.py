@@ -1,7 +1,9 @@
 """Over the whole parser: every option is used or refused, no output replaces what is read."""
 
 import argparse
+import ast
 import os
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -224,6 +226,19 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
 def test_a_second_packing_is_refused(here, capsys):
     assert parser.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
     assert "give the file of one packing" in capsys.readouterr().err
+
+
+def test_messages_that_name_an_argument_name_its_option_too():
+    names = {action.dest for command in PARSERS.values() for action in command._actions}
+    library = Path(parser.__file__).parents[1]
+    wrong = []
+    for path in (*library.glob("packing/**/*.py"), *library.glob("experiment/*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Raise) and node.exc is not None:
+                text = ast.unparse(node.exc)
+                named = set(re.findall(r"\b(\w+)=(?=[,)…; ])", text)) & names
+                wrong += [(path.name, name) for name in named if f"--{name}" not in text]
+    assert wrong == []
 
 
 def _takes_numbers(action):

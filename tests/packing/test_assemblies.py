@@ -406,6 +406,7 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
     for file in (
         gf.read_blocks(io.StringIO(GIVEN), mu=0.5, density=1.5),
         gf.read_blocks(io.StringIO(ROWS), mu=0.5),
+        gf.read_blocks(io.StringIO(ROWS.replace("1.5,1\n", "1.5,Yes\n")), mu=0.5),
     ):
         assert file.load == pytest.approx(expected.load, nan_ok=True)
         assert file.contact_points == pytest.approx(expected.contact_points)
@@ -416,13 +417,17 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
 @pytest.mark.parametrize(
     "text, options, words",
     [
-        (ROWS, {"density": 3}, "density of every body: leave out density"),
+        (ROWS, {"density": 3}, "density of every body: leave out --density"),
         (ROWS.replace("7,1,1,0,2,0", "7,1,1,0,3,0"), {}, "line 8: density differs within body 7"),
-        (ROWS.replace("7,1,1,0,2,0", "7,1,1,0,2,2"), {}, "line 8: fixed must be 0 or 1"),
+        (ROWS.replace("7,1,1,0,2,0", "7,1,1,0,2,2"), {}, "line 8: fixed is '2'; give 1 or 0"),
         (ROWS.replace("7,1,1,0,2", "7,1,1,0.2,2"), {}, "a disk is one row"),
         (ROWS.replace("body,", "stone,"), {}, "no column body"),
-        (ROWS.replace("7,1,1,0", "7,0.5,0.2,0"), {}, "body 1 is not convex"),
-        (ROWS.replace(",2,0", ",-2,0"), {}, "the density of body 1"),
+        (ROWS.replace("7,1,1,0", "7,0.5,0.2,0"), {}, "body 7 is not convex"),
+        (ROWS.replace("7,0,0,0,", "7,0.9,1,0,"), {}, "corners of body 7 are in the wrong order"),
+        (ROWS.replace("ball,0.5,1.3", "ball,0.5,0.9"), {}, "bodies 7 and ball overlap by 0.4"),
+        (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.31"), {}, r"gaps from 0\.01, .* 3e-09: a larger"),
+        (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.9"), {}, "the bodies are 0 ground, 1 7, 2 ball"),
+        (ROWS.replace(",2,0", ",-2,0"), {}, "the density of body 7"),
         (GIVEN.replace("corners", "corner"), {}, 'either "corners" or "disk"'),
         (GIVEN.replace("density", "mass"), {}, "body 1 has 'mass'"),
         (GIVEN.replace("true", "1"), {}, "fixed of body 0 must be true or false"),
@@ -443,13 +448,12 @@ def test_what_cannot_be_read_as_bodies_is_one_line(text, options, words):
 def test_pairs_of_bodies_in_doubt_are_noted():
     near = GIVEN.replace("1.3", "1.30000001")
     assert gf.read_blocks(io.StringIO(GIVEN), mu=0.5, tolerance=1e-7).info["nearly_touching"] == []
-    with pytest.raises(gf.NotJammedError):  # the ball hangs in the air
+    hangs = "1 pair of bodies nearly touches, with gaps from 1e-08, and no contact at .* 1e-09"
+    with pytest.raises(gf.NotJammedError, match=hangs):
         gf.read_blocks(io.StringIO(near), mu=0.5, tolerance=1e-9)
     bodies = '{"corners": [[1, 1], [2, 1], [2, 2], [1, 2]], "fixed": true}, {"disk"'
     found = gf.read_blocks(io.StringIO(GIVEN.replace('{"disk"', bodies)), mu=0.5)
-    assert found.info["notes"] == [
-        "pairs of bodies that meet corner on corner, which is no contact: 1"
-    ]
+    assert found.info["notes"] == ["1 pair of bodies meets corner on corner, which is no contact"]
 
 
 @pytest.mark.parametrize(

@@ -62,8 +62,11 @@ def test_a_groove_locks_itself_where_friction_is_as_steep_as_its_walls(angle):
     assert np.abs(S.A @ S.to_vector(ray)).max() < 1e-12
     assert np.all(ray[:, 0] > 0) and np.all(np.abs(ray[:, 1]) <= S.mu * ray[:, 0] + 1e-12)
     assert found.intervals[1][:, 0] == pytest.approx([np.inf, np.inf])
-    with pytest.raises(InputError, match="not bounded"):
+    with pytest.raises(InputError, match=r"not bounded: .* Grain 0 .* is wedged .*contacts 0, 1"):
         gf.intervals(S)
+    limit = [np.inf, np.inf]
+    bounded = gf.Known([1], [np.negative(limit)], [[2 * S.force_scale, np.inf]])
+    assert np.isfinite(gf.intervals(gf.ensemble(S.packing, known=bounded)).high).all()
 
 
 def test_two_disks_in_a_box_carry_their_weight():

@@ -30,6 +30,16 @@ def test_rates_count_from_the_beginning(capsys):
     assert told and 30 < float(told[1]) <= 50.1
 
 
+def test_compiling_does_not_count_in_rates():
+    with Bar("bounds", "bound") as progress:
+        progress(0, 10)
+        progress.bar.start_t -= 60
+        Bar.restart()
+        progress(1, 10)
+        assert progress.bar.format_dict["initial"] == 1
+        assert progress.bar.format_dict["elapsed"] < 30
+
+
 def test_a_bar_knows_its_end(capsys):
     with Bar("cells", "cell") as progress:
         progress(0.25, 2)

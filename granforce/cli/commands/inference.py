@@ -40,8 +40,8 @@ def informative(arguments: argparse.Namespace) -> None:
     now, after = dataset["mean_before"].item(), dataset["mean_after"].values
     twins = [[int(c) for c in others] for others in json.loads(dataset.attrs["twins"])]
     columns = contact_labels(arguments, parameters, dataset) | {
-        "part_expected": dataset["part_expected"].values,
-        "part_shorter": 1 - after / now,
+        "expected_reduction": dataset["part_expected"].values,
+        "reduction": 1 - after / now,
         "mean_interval_after [mean]": after,
         "twins": np.array([len(others) for others in twins]),
     }

@@ -8,18 +8,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.packing.assemblies import area, blocks
+from granforce.packing.assemblies import area, blocks, nearly_touching
 from granforce.packing.importers.text import Source, Table, read_csv, read_text
 from granforce.records import InputError, Packing, brief, positive
+from granforce.system.plain import counted
 from granforce.types import Floats, Integers
 
 KEYS = ("corners", "disk", "density", "fixed", "material")  # of a body in JSON
+_WORDS = {"1": 1, "0": 0, "1.0": 1, "0.0": 0, "yes": 1, "no": 0, "true": 1, "false": 0}
 
 
 class _Bodies(NamedTuple):
     outlines: list[Any]  # corners (k, 2), or x, y, r of a disk
     density: list[float | None]  # None: not given
     fixed: list[bool]
+    names: list[str]  # labels, or numbers
     materials: list[Any] | None
     friction: dict[Any, Any]  # of pairs of materials
 
@@ -30,52 +33,54 @@ def read_blocks(
     """A Packing of rigid bodies from a file, as `blocks` makes it.
 
     source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y;
-    optionally r (above 0: the row is a disk), and density and fixed (0 or 1), alike in all rows of
-    a body. JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or disk [x, y, r],
-    and optionally density, fixed (true or false) and material, and in the object "friction" of
-    pairs of materials, [["stone", "wood", 0.4], …]. mu: friction coefficient of all other contacts.
-    density: mass per area of the bodies that have none in the file, by default 1. tolerance: as for
-    `blocks`. packing.info has notes on pairs in doubt, and lists them.
+    optionally r (above 0: the row is a disk), and density and fixed (0 or 1, or no and yes), alike
+    in all rows of a body. JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or
+    disk [x, y, r], and optionally density, fixed (true or false) and material, and in the object
+    "friction" of pairs of materials, [["stone", "wood", 0.4], …]. mu: friction coefficient of all
+    other contacts. density: mass per area of the bodies that have none in the file, by default 1.
+    tolerance: as for `blocks`. packing.info has notes on pairs in doubt, and lists them.
 
     Raises InputError naming the line or the body, NotJammedError if nothing balances the weights.
     """
-    name, text = read_text(source)
+    file, text = read_text(source)
     if text.lstrip()[:1] in "{[":
-        found = _from_json(name, text)
+        found = _from_json(file, text)
     else:
-        file = io.StringIO(text)
-        file.name = name
-        found = _from_table(read_csv(file))
+        table = io.StringIO(text)
+        table.name = file
+        found = _from_table(read_csv(table))
     if density is not None and None not in found.density:
-        raise InputError(f"{name} gives the density of every body: leave out density")
+        raise InputError(f"{file} gives the density of every body: leave out --density (density=)")
     usual = 1.0 if density is None else positive(density, "density")
     try:
         own = [
-            usual if one is None else positive(one, f"the density of body {k}")
-            for k, one in enumerate(found.density)
+            usual if one is None else positive(one, f"the density of body {name}")
+            for name, one in zip(found.names, found.density, strict=True)
         ]
+        areas = [area(body, name) for name, body in zip(found.names, found.outlines, strict=True)]
         packing = blocks(
             found.outlines,
             mu,
             fixed=np.flatnonzero(found.fixed),
-            weights=np.array(own) * [area(body, k) for k, body in enumerate(found.outlines)],
+            weights=np.array(own) * areas,
             materials=found.materials,
             friction=found.friction,
             tolerance=tolerance,
+            names=found.names,
         )
     except InputError as error:
-        raise type(error)(f"{name}: {error}") from None
+        raise type(error)(f"{file}: {error}") from None
     notes = _notes(packing)
     return packing._replace(info=packing.info | {"source": "blocks"} | notes)
 
 
 def _notes(packing: Packing) -> dict[str, list[str]]:
-    words = {
-        "corner_on_corner": "meet corner on corner, which is no contact",
-        "nearly_touching": "nearly touch, and are no contacts",
-    }
-    counts = {word: len(packing.info[key]) for key, word in words.items()}
-    notes = [f"pairs of bodies that {word}: {n}" for word, n in counts.items() if n]
+    notes = []
+    if count := len(packing.info["corner_on_corner"]):
+        pairs = counted(count, "pair of bodies meets", "pairs of bodies meet")
+        notes.append(f"{pairs} corner on corner, which is no contact")
+    if near := packing.info["nearly_touching"]:
+        notes.append(nearly_touching([gap for _, _, gap in near], packing.info["tolerance"]))
     return {"notes": notes} if notes else {}
 
 
@@ -97,16 +102,27 @@ def _from_table(table: Table) -> _Bodies:
         return values[begin].tolist()
 
     none: list[Any] = [None] * len(first)
-    held = table.whole("fixed") if "fixed" in table.header else np.zeros(len(x), dtype=int)
-    for row in np.flatnonzero(held > 1)[:1]:
-        raise InputError(f"{table.place(row)}: fixed must be 0 or 1")
+    held = _fixed(table) if "fixed" in table.header else np.zeros(len(x), dtype=int)
     return _Bodies(
         [np.array([*x[k[0]], r[k[0]]]) if r[k[0]] else x[k] for k in rows],
         alike("density", table.numbers("density")) if "density" in table.header else none,
         [bool(value) for value in alike("fixed", held)],
+        list(first),
         None,
         {},
     )
+
+
+def _fixed(table: Table) -> Integers:
+    """The column fixed (rows,) as 0 or 1, which may also be written in words."""
+    values = [_WORDS.get(text.lower(), -1) for text in table.fields("fixed")]
+    if -1 in values:
+        row = values.index(-1)
+        raise InputError(
+            f"{table.place(row)}: fixed is {brief(table.fields('fixed')[row])}; give 1 or 0 (or "
+            "yes, no, true, false)"
+        )
+    return np.array(values)
 
 
 def _from_json(name: str, text: str) -> _Bodies:
@@ -132,7 +148,9 @@ def _from_json(name: str, text: str) -> _Bodies:
     friction = {}
     for row in _rows_of(given.get("friction", []), name):
         friction[row[0], row[1]] = row[2]
-    return _Bodies(shapes, [body.get("density") for body in bodies], held, materials, friction)
+    names = [str(k) for k in range(len(bodies))]
+    density = [body.get("density") for body in bodies]
+    return _Bodies(shapes, density, held, names, materials, friction)
 
 
 def _rows_of(given: Any, name: str) -> list[list[Any]]:

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from granforce.cell import Cell
+from granforce.packing.closing import apart
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
     Contacts,
@@ -17,6 +18,7 @@ from granforce.records import (
     positive,
     repeated,
 )
+from granforce.system.plain import counted
 from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP
 from granforce.types import Floats, Integers, Mask
 
@@ -62,25 +64,8 @@ def largest_gap(tolerance: float) -> float:
 def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, Floats]:
     """Grains i, j (P,) of all overlapping pairs, and their gaps (P,) < 0; centres may coincide."""
     i, j, shift = find_pairs(x, r, cell, 0.0)
-    return i, j, _gaps(x, r, cell, i, j, shift)
-
-
-def apart(packing: Packing, near: float) -> tuple[Integers, Integers, Floats]:
-    """Grains i, j (P,) of pairs that are no contacts, and their gaps (P,) below `near`.
-
-    near is in largest radii, gaps are in the unit of x.
-    """
-    x, r, c = packing.x, packing.r, packing.contacts
-    i, j, shift = find_pairs(x, r, packing.cell, near * r.max())
-    joined = np.minimum(c.i, c.j) * len(r) + np.maximum(c.i, c.j)
-    free = ~np.isin(i * len(r) + j, joined)
-    i, j, shift = i[free], j[free], shift[free]
-    return i, j, _gaps(x, r, packing.cell, i, j, shift)
-
-
-def _gaps(x: Floats, r: Floats, cell: Cell, i: Integers, j: Integers, shift: Integers) -> Floats:
-    """Gaps (P,) of pairs, whose centres may coincide: `separations` needs a direction."""
-    return np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
+    # `separations` needs a direction.
+    return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
 def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
@@ -100,10 +85,10 @@ def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
     near = min(NEARLY * tolerance, 1.0)
     i, j, gap = apart(packing, near)
     if len(i):
-        pairs = "1 pair is" if len(i) == 1 else f"{len(i)} pairs are"
         notes.append(
-            f"{pairs} in doubt: gaps below {near:.2g} of the largest radius, but no contacts; "
-            "nearly_touching in the report by --json (in packing.info) lists them"
+            f"{counted(len(i), 'pair is', 'pairs are')} in doubt: gaps below {near:.2g} of the "
+            "largest radius, but no contacts; nearly_touching in the report by --json (in "
+            "packing.info) lists them"
         )
     rows = zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
     info: dict[str, Any] = {"nearly_touching": [list(row) for row in rows]}

@@ -11,9 +11,10 @@ from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
-from granforce.packing.closing import margin
-from granforce.packing.importers.geometry import apart, gain_by_reversing, overlapping
+from granforce.packing.closing import apart, margin
+from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
+from granforce.system.plain import counted
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 from granforce.types import Floats, Integers
 
@@ -241,7 +242,7 @@ def _missed(packing: Packing) -> str:
     gap = apart(packing, MISSED)[2] / packing.r.max()
     if not len(gap):
         return ""
-    pairs = "1 pair nearly touches" if len(gap) == 1 else f"{len(gap)} pairs nearly touch"
+    pairs = counted(len(gap), "pair nearly touches", "pairs nearly touch")
     return (
         f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius: a larger --tolerance "
         "(tolerance=) makes them contacts"
