@@ -17,7 +17,7 @@ from packings import packed
 
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
-from granforce.paper import claims, documents, tables
+from granforce.paper import benchmarks, claims, documents, tables
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
@@ -196,6 +196,14 @@ def test_the_claims_are_those_of_the_shipped_study(study):
             shipped = known[claim.statement, sampler]
             assert claim.verdict == shipped["verdict"]
             assert claim.value == pytest.approx(shipped["value"], rel=1e-6)
+
+
+def test_the_page_on_accuracy_is_what_the_shipped_benchmark_gives(tmp_path):
+    page, copied = text("granforce/docs/pages/accuracy.md"), tmp_path / "copy.md"
+    copied.write_text(benchmarks.MARK.sub(r"\1\3", page))
+    line = ["bench", "--table", str(ROOT / "data/bench.json"), "--documents", str(copied)]
+    assert main(line) == 0
+    assert copied.read_text() == page and page.count("\n| ---") >= 8
 
 
 @pytest.mark.parametrize("document", RESULTS)

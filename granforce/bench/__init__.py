@@ -122,14 +122,14 @@ def main(
     quick: bool = False,
     as_json: bool = False,
     parts: Parts = PARTS,
-) -> int:
-    """The command `granforce bench`: tables or JSON on stdout, progress on stderr; returns 0."""
+) -> dict[str, Any]:
+    """The command `granforce bench`: tables or JSON on stdout, progress on stderr."""
     results = run(out, quick, parts=parts, show=(lambda text: None) if as_json else print)
     if as_json:
         print(json_text(results, ascii_only=False))
     else:
         print(table("Environment", [{**results["environment"], **_versions(results)}]))
-    return 0
+    return results
 
 
 def _versions(results: dict[str, Any]) -> dict[str, str]:

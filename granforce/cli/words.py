@@ -734,6 +734,23 @@ def add_bench(commands: Commands) -> None:
     command.add_argument(
         "--out", type=Workplace, metavar="FOLDER", help="write the rows as JSON to this folder"
     )
+    command.add_argument(
+        "--documents",
+        type=Edited,
+        metavar="FILES",
+        help="update the text between <!-- bench: PART --> and <!-- end --> in these files, names "
+        "separated by commas",
+    )
+    command.add_argument(
+        "--table",
+        type=Input,
+        metavar="FILE.json",
+        help="measure nothing: use these rows, such as data/bench.json",
+    )
+    command.leaves_out("without --documents", lambda given: given.documents is None, {"table"})
+    command.leaves_out(
+        "with --table", lambda given: given.table is not None, {"quick", "out", "json"}
+    )
 
 
 def add_cache(commands: Commands) -> None:

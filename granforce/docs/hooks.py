@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import importlib
-import json
 import re
 import tempfile
 from collections.abc import Iterator
@@ -27,7 +26,6 @@ DATA = next(  # inside an installed wheel, next to the package in a clone
 )
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as linked in the sources
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
-BENCH = re.compile(r"<!-- bench: (\w+) -->")
 
 # Sections of the library reference, by the module that a name comes from.
 SECTIONS = {
@@ -59,12 +57,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Fill in the tables of the benchmark, and link figures to their place on the site."""
+    """Link figures to their place on the site, and show those of the gallery."""
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
     if page.file.src_uri == GALLERY.name:
         markdown = SHOWN.sub(pictured, markdown)
-    return BENCH.sub(lambda match: bench_table(match[1]), markdown)
+    return markdown
 
 
 def gallery() -> Iterator[tuple[str, bytes]]:
@@ -87,27 +85,6 @@ def pictured(match: re.Match[str]) -> str:
     heading, text, block, _ = match.groups()
     picture = f"![{heading}](figures/{picture_name(heading)}.png)"
     return f"## {heading}\n{text}{picture}\n\n{block}"
-
-
-def bench_table(part: str) -> str:
-    """The rows of a part of the benchmark as a table."""
-    rows = json.loads((DATA / "bench.json").read_text()).get(part)
-    if not rows:
-        return "*Not measured.*\n"
-    if isinstance(rows, dict):
-        libraries = rows.pop("libraries")
-        rows |= {name: version for name, version in libraries.items() if version}
-        return markdown_table(["", "value"], [[name, str(value)] for name, value in rows.items()])
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
-    heads = [name.replace("_", " ") for name in names]
-    return markdown_table(heads, [[cell(row.get(name)) for name in names] for row in rows])
-
-
-def cell(value: Any) -> str:
-    if value is None:
-        return ""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def library() -> str:

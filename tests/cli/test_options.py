@@ -83,7 +83,7 @@ LINES = {
     "import blocks": ["bodies.csv --mu 0.5"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "export": ["p.npz g.vtp c.vtp"],
-    "bench": ["--quick"],
+    "bench": ["--quick", "--documents bench.md --table bench.json"],
     "cache": ["list", "size", "verify", "clear", "path"],
 }
 
@@ -131,6 +131,8 @@ def place(tmp_path_factory):
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
     frames.write(folder, grains, rows)
     open_store(folder / "done" / "cells.zarr").make()
+    (folder / "bench.md").write_text("<!-- bench: walks -->\n<!-- end -->\n")
+    (folder / "bench.json").write_text('{"environment": {"libraries": {}}}')
     return folder
 
 

@@ -137,10 +137,17 @@ def completion(arguments: argparse.Namespace) -> None:
 
 
 def bench(arguments: argparse.Namespace) -> None:
-    """Print the benchmark's report."""
+    """Print the benchmark's report, and update documents by it, or by that in a file."""
     from granforce.bench import main
+    from granforce.paper import benchmarks
 
-    main(arguments.out, arguments.quick, arguments.json)
+    documents = benchmarks.named(arguments.documents)
+    if arguments.table is None:
+        results = main(arguments.out, arguments.quick, arguments.json)
+    else:
+        results = benchmarks.load(arguments.table)
+    if documents:
+        benchmarks.renew(documents, results)
 
 
 def cache(arguments: argparse.Namespace) -> int:
