@@ -244,7 +244,7 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
                 named = [one for one in given.values() if hasattr(one, "unbounded")]
                 if error.named or not named:
                     raise
-                raise named[0].unbounded() from None  # type: ignore[attr-defined]
+                raise named[0].unbounded() from None
 
         return inside
 

@@ -399,6 +399,9 @@ ball,0.5,1.3,0.3,1.5,0
 """
 
 
+CROSSED = "7,1,0,0,2,0\n7,1,1,0,2,0", "7,1,1,0,2,0\n7,1,0,0,2,0"
+
+
 def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
     ground, square = np.array([[-3, -1], [3, -1], [3, 0], [-3, 0]]), rectangle(0, 0, 1, 1)
     weights = [1, 2, 1.5 * np.pi * 0.09]
@@ -423,7 +426,7 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
         (ROWS.replace("7,1,1,0,2", "7,1,1,0.2,2"), {}, "a disk is one row"),
         (ROWS.replace("body,", "stone,"), {}, "no column body"),
         (ROWS.replace("7,1,1,0", "7,0.5,0.2,0"), {}, "body 7 is not convex"),
-        (ROWS.replace("7,0,0,0,", "7,0.9,1,0,"), {}, "corners of body 7 are in the wrong order"),
+        (ROWS.replace(*CROSSED), {}, "corners of body 7 are in the wrong order"),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,0.9"), {}, "bodies 7 and ball overlap by 0.4"),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.31"), {}, r"gaps from 0\.01, .* 3e-09: a larger"),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.9"), {}, "the bodies are 0 ground, 1 7, 2 ball"),
