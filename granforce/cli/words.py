@@ -441,8 +441,8 @@ def add_intervals(commands: Commands) -> None:
     )
     add_exact(
         command,
-        "; cluster numbers groups of contacts whose forces depend on each other, −1 "
-        "where force balance determines them",
+        "; cluster numbers the groups of undetermined contacts that are connected through shared "
+        "grains, the largest first, and is −1 where forces are determined",
     )
 
 
