@@ -118,7 +118,8 @@ def blocks(
     try:
         return with_network(packing)
     except NotJammedError as error:
-        raise NotJammedError(f"{error}{_missed(packing)}{_legend(names)}") from None
+        legend = _legend(names) if "grains" in str(error) else ""
+        raise NotJammedError(f"{error}{_missed(packing)}{legend}") from None
 
 
 def with_network(packing: Packing) -> Packing:
