@@ -1,4 +1,7 @@
-"""Ten findings, one sentence each, with numbers from the study; left out if a number is missing."""
+"""Ten findings, one sentence each, with numbers from the study.
+
+A finding is omitted if the study lacks one of its numbers.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -85,9 +88,9 @@ def _maximum(of: _Numbers) -> Highlight:
 
 def _seen(of: _Numbers) -> Highlight:
     return Highlight(
-        "A random walk of 1000 states sees only part of what is possible: at intermediate μ its "
-        f"intervals are {of.judged(WALK_OVER_EXACT)} times as long as the exact ones, and those of "
-        "uniform states are "
+        "A random walk of 1000 states covers only part of S: at intermediate μ its intervals are "
+        f"{of.judged(WALK_OVER_EXACT)} times as long as the exact ones, and those of a uniform "
+        "sample are "
         f"{of.judged('η3 of uniform states over exact η3, intermediate μ')} times as long.",
         "samplers",
         "exact-intervals",
@@ -128,8 +131,8 @@ def _alike(of: _Numbers) -> Highlight:
 
 def _critical(of: _Numbers) -> Highlight:
     return Highlight(
-        "Where friction matters, a contact gives way below its limit load: F_crit divided by the "
-        f"limit load is {of.judged('⟨F_crit⟩ over ⟨limit load⟩, small μ')} at small, "
+        "Where friction matters, a contact gives way below its limit load: the ratio of F_crit to "
+        f"the limit load is {of.judged('⟨F_crit⟩ over ⟨limit load⟩, small μ')} at small, "
         f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, intermediate μ')} at intermediate and "
         f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, large μ')} at large μ.",
         "figure2_limit",
@@ -139,9 +142,9 @@ def _critical(of: _Numbers) -> Highlight:
 
 def _stability(of: _Numbers) -> Highlight:
     return Highlight(
-        "The critical force follows the exact η3 only in part: over all μ, their rank correlation "
-        f"is {of.judged('F_crit rises with η', 'exact')}; with η2 of nearest walks it is "
-        f"{of.judged('F_crit rises with η', 'nearest')}.",
+        "The critical force is only loosely related to indeterminacy: over all μ, its rank "
+        f"correlation is {of.judged('F_crit rises with η', 'exact')} with the exact η3 and "
+        f"{of.judged('F_crit rises with η', 'nearest')} with η2 of nearest walks.",
         "figure2",
         "local-perturbation",
     )
@@ -176,10 +179,10 @@ SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
 
 def highlights(table: StudyTable, claims: Rows, findings: Rows) -> list[Highlight]:
     """The findings for which the study has all numbers."""
-    numbers, found = _Numbers(table, claims, findings), []
+    numbers, complete = _Numbers(table, claims, findings), []
     for sentence in SENTENCES:
         try:
-            found.append(sentence(numbers))
+            complete.append(sentence(numbers))
         except KeyError:
             continue
-    return found
+    return complete
