@@ -80,10 +80,14 @@ def import_format(
 
 def add_cell(command: Parser) -> None:
     command.add_argument(
-        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="sides of the box (default: open)"
+        "--box",
+        type=float,
+        nargs=2,
+        metavar=("LX", "LY"),
+        help="sides of the periodic box (default: open)",
     )
     command.add_argument(
-        "--tilt", type=float, default=0.0, help="tilt of the box, LAMMPS' xy (default 0)"
+        "--tilt", type=float, default=0.0, help="tilt of the box, xy in LAMMPS (default 0)"
     )
 
 
@@ -96,15 +100,17 @@ def add_series(command: Parser) -> None:
     others = command.options.keys()
     group = command.add_argument_group(
         "many snapshots",
-        "with --frames: exact intervals of each snapshot in one dataset (--out FOLDER.zarr), and a "
-        "line for each",
+        "with --frames: write exact intervals of all snapshots to one dataset (--out FOLDER.zarr), "
+        "and print one line per snapshot",
     )
-    group.add_argument("--frames", type=str, help="all, or numbers separated by commas")
+    group.add_argument("--frames", type=str, help="snapshots: all, or numbers separated by commas")
     group.add_argument(
         "--states", type=int, default=0, help="states of a random walk, for η1 and η2 (default 0)"
     )
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
-    group.add_argument("--csv", type=Output, metavar="FILE.csv", help="write the lines as a table")
+    group.add_argument(
+        "--csv", type=Output, metavar="FILE.csv", help="write these lines as a table"
+    )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_scheduler(group)
     add_store(group)
@@ -129,7 +135,7 @@ def add_columns(
 
 def add_reverse(command: argparse._ActionsContainer) -> None:
     command.add_argument(
-        "--reverse", action="store_true", help="tangential forces have the other sign"
+        "--reverse", action="store_true", help="reverse the sign of tangential forces"
     )
 
 
@@ -137,8 +143,8 @@ def add_wall_contacts(command: Parser) -> None:
     command.add_argument(
         "--walls",
         choices=("held", "pressing"),
-        help="treat walls as grains: held (any force) or pressing (each exerts its force from "
-        "the simulation); default: forces of walls are loads on grains",
+        help="treat walls as grains: held (able to exert any force) or pressing (with their force "
+        "from the simulation); default: forces from walls are loads on grains",
     )
 
 
@@ -166,32 +172,32 @@ def add_packing(command: Parser, several: bool = False) -> None:
         "--radii",
         type=spec_or_file,
         default="uniform:0.5,1",
-        help="uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION_LARGE, or a file with a radius "
+        help="uniform:LOW,HIGH, bidisperse:SMALL,LARGE,FRACTION_LARGE, or a file with one radius "
         "per line (default uniform:0.5,1)",
     )
     group.add_argument("--pressure", type=float, default=1.0, help="pressure P0 (default 1)")
+    group.add_argument("--dt", type=float, help="longest time step (default 0.1; 0.03 for μ ≥ 0.2)")
     group.add_argument(
-        "--dt", type=float, help="longest time step (default 0.1; 0.03 from μ = 0.2 on)"
+        "--box-mass", type=float, default=100.0, help="inertia of the box (default 100)"
     )
-    group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
     group.add_argument(
         "--sweeps",
         type=int,
-        help="largest number of sweeps per step (default 600; 150 from μ = 0.2 on)",
+        help="most sweeps per step (default 600; 150 for μ ≥ 0.2)",
     )
     group.add_argument(
         "--step-accuracy",
         type=float,
         default=0.01,
-        help="violation of the contact laws at which a step ends, relative to the fastest grain "
-        "(default 0.01)",
+        help="largest violation of the contact laws at the end of a step, relative to the speed of "
+        "the fastest grain (default 0.01)",
     )
     group.add_argument(
         "--box",
         choices=("square", "isotropic"),
         default="square",
-        help="square, or a cell whose sides and tilt follow until the stress is isotropic, so that "
-        "the packing is jammed against shear too (default square)",
+        help="square (default), or a cell whose sides and tilt adapt until the stress is "
+        "isotropic, so that the packing is also jammed against shear",
     )
 
 
@@ -201,7 +207,7 @@ def add_packing_file(command: Parser, needed: bool = True) -> None:
         type=Input,
         nargs=None if needed else "?",
         metavar="FILE.npz",
-        help="the packing" if needed else "use this packing instead of making one",
+        help="file of the packing" if needed else "use this packing instead of making one",
     )
 
 
@@ -220,19 +226,20 @@ def add_made_packing(command: Parser, given: Callable[[argparse.Namespace], bool
 
 def add_conditions(command: Parser, known: bool = True) -> None:
     group = command.add_argument_group(
-        "condition on the forces, in addition to balance and friction"
+        "conditions on the forces, in addition to balance and friction"
     )
     group.add_argument(
         "--prescribe",
         choices=["pressure", "stress", "none"],
         default="pressure",
-        help="the pressure (default), the whole stress, or nothing (always so with --slice)",
+        help="prescribe the pressure (default), the whole stress, or nothing (always so with "
+        "--slice)",
     )
     group.add_argument(
         "--stress",
         type=str,
         metavar="XX,YY,XY",
-        help="the stress for --prescribe stress (default: that of the packing's forces)",
+        help="stress for --prescribe stress (default: that of the packing's own forces)",
     )
     if known:
         add_known(group)
@@ -243,14 +250,16 @@ def add_known(group: argparse._ArgumentGroup) -> None:
         "--known",
         type=Input,
         metavar="FILE.csv",
-        help="known forces, in the packing's unit: columns contact, and f_n, f_t (exactly) or "
+        help="known forces, in the packing's unit: columns contact, and f_n, f_t (exact) or "
         "f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
     )
 
 
 def add_walk_options(command: Parser) -> None:
     group = command.add_argument_group("the random walk")
-    group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
+    group.add_argument(
+        "--states", type=int, default=1000, help="number of accepted states (default 1000)"
+    )
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
     group.add_argument(
         "--ensemble-mu",
@@ -261,9 +270,9 @@ def add_walk_options(command: Parser) -> None:
         "--relax",
         choices=list(RELAXATIONS),
         default="nearest",
-        help="how a state is relaxed: to the nearest admissible network (nearest, default; "
-        "nearest_piqp: by PIQP), or by the paper's contact dynamics with an exact finish or "
-        "(slower, to 1e-6) without",
+        help="relaxation of a state: nearest (default) and nearest_piqp (a check by PIQP) find the "
+        "nearest admissible network; gauss_seidel uses the paper's contact dynamics and finishes "
+        "with the nearest network; gauss_seidel_only does not finish (slower, to 1e-6)",
     )
     group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
@@ -282,7 +291,7 @@ def add_unit(command: argparse._ActionsContainer) -> None:
         choices=["packing", "mean"],
         default="packing",
         help="unit of forces in reports and tables: the packing's (default), or the mean normal "
-        "force ⟨f_n⟩; names include the unit",
+        "force ⟨f_n⟩; column names include the unit",
     )
 
 
@@ -314,7 +323,7 @@ def add_picture(command: Parser) -> None:
         type=Output,
         required=True,
         metavar="FILE.{png,svg,pdf,html}",
-        help="write the picture, or a page to zoom into (.html)",
+        help="write a picture, or a page that can be zoomed (.html)",
     )
 
 
@@ -330,7 +339,8 @@ def add_scheduler(command: argparse._ActionsContainer) -> None:
         type=str,
         metavar="ADDRESS",
         help="run on the workers of this dask scheduler, such as tcp://head:8786, instead of "
-        "local processes; workers must see the same store; ends after 10 minutes without a worker",
+        "local processes. Workers must see the same store. Without workers, the run ends after 10 "
+        "minutes",
     )
 
 
@@ -344,7 +354,7 @@ def add_exact(command: Parser, also: str = "") -> None:
         help="friction of the cones, if it differs from that of the packing",
     )
     group.add_argument(
-        "--contacts", type=str, help="only these contacts, numbers separated by commas"
+        "--contacts", type=str, help="only the contacts with these numbers, separated by commas"
     )
     group.add_argument(
         "--slice",
@@ -369,15 +379,17 @@ def add_reading(group: argparse._ActionsContainer) -> None:
         "--reach",
         type=float,
         default=0.5,
-        help="largest gap of candidate contacts, in mean radii (default 0.5; 0: none are added)",
+        help="largest gap of candidate contacts, in mean radii (default 0.5; 0: no candidates)",
     )
-    group.add_argument("--scale", type=float, default=1.0, help="factor on the radii (default 1)")
     group.add_argument(
-        "--error", type=float, help="standard error of a force (default: as the data suggest)"
+        "--scale", type=float, default=1.0, help="factor that multiplies the radii (default 1)"
+    )
+    group.add_argument(
+        "--error", type=float, help="standard error of a force (default: estimated from the data)"
     )
     add_reverse(group)
     add_columns(
-        group, "headers, or numbers from 1, of the columns frame, id, x, y, r, flag, i, j, f_t, f_n"
+        group, "names or numbers (from 1) of the columns frame, id, x, y, r, flag, i, j, f_t, f_n"
     )
 
 
@@ -386,7 +398,7 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
     group.add_argument(
         "--flag",
         choices=["ignore"],
-        help="ignore the flags of the grains: grains at the boundary of the frame count as "
+        help="ignore the flags of the grains and treat grains at the boundary of the frame as "
         "grains at walls (default: flagged grains, unless nearly all are flagged)",
     )
     group.add_argument(
@@ -402,9 +414,10 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         "--walls",
         type=str,
         metavar="SHAPE",
-        help="walls of the frame: box, annulus, circle or auto (the best fit), found from the "
-        "grains at them or given (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); "
-        "open: no walls (default for a *_solved.mat with the directions of wall contacts)",
+        help="walls of the frame: box, annulus, circle or auto (the best fit), detected from the "
+        "grains at the boundary or specified (box:x0,x1,y0,y1, annulus:x,y,inner,outer, "
+        "circle:x,y,R); open: no walls (default for a *_solved.mat with the directions of wall "
+        "contacts)",
     )
     group.add_argument(
         "--wall-force",
@@ -412,7 +425,7 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         metavar="'WALL: FX FY SIGMA'",
         action="append",
         default=[],
-        help="measured force of the grains on a wall of a box (left, right, bottom, top), such "
-        "as from a load cell; may be given several times",
+        help="measured force of the grains on a wall of a box (left, right, bottom, top), for "
+        "example from a load cell; can be repeated",
     )
     command.leaves_out("with --strict", lambda arguments: arguments.strict, {"repair"})

@@ -54,21 +54,23 @@ def add_pack(commands: Commands) -> None:
         "--scene",
         type=str,
         metavar="NAME",
-        help="a small scene instead of a compressed packing: groove, box, pyramid, press, "
-        "leaning, six, solid, column, thirteen or many, or blocks: slope, ladder, books, stones, "
-        "arch or wall; of the options below only --mu applies to it",
+        help="make a small scene instead of a compressed packing: groove, box, pyramid, press, "
+        "leaning, six, solid, column, thirteen or many; of blocks: slope, ladder, books, stones, "
+        "arch or wall. Of the options below, only --mu applies",
     )
     command.add_argument(
         "--scene-options",
         type=str,
         metavar="NAME=…,NAME=…",
-        help="numbers of the scene, separated by commas: courses, blocks, width, height (wall); "
+        help="options of the scene, separated by commas: courses, blocks, width, height (wall); "
         "voussoirs, thickness, opening (arch); books, overhang (books); angle, width, height "
         "(slope); angle (ladder, groove, pyramid); disks, angle (column)",
     )
     add_packing(command)
     add_store(command)
-    command.add_argument("--max-steps", type=int, default=100_000, help="step budget")
+    command.add_argument(
+        "--max-steps", type=int, default=100_000, help="most time steps (default 100000)"
+    )
     command.add_argument(
         "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
     )
@@ -120,7 +122,7 @@ def add_volume(commands: Commands) -> None:
     command = subcommand(
         commands,
         "volume",
-        "measure the volume of all force networks of a packing, with its standard error",
+        "compute the volume of the force space of a packing, with its standard error",
         "granforce volume -n 400 --mu 0.1 --seed 1 --accuracy 0.1",
         lines=report_lines.VOLUME,
     )
@@ -156,8 +158,8 @@ def add_infer(commands: Commands) -> None:
         "files",
         type=Input,
         nargs="*",
-        help="a packing: FILE.npz; with --frames: a folder, *_solved.mat files, or positions and "
-        "adjacency",
+        help="a packing (FILE.npz); with --frames: a folder, *_solved.mat files, or a file of "
+        "positions and one of contacts",
     )
     add_made_packing(command, lambda given: given.frames is None and bool(given.files))
     group = command.add_argument_group("the inference")
@@ -171,16 +173,15 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--unmeasured",
         type=float,
-        help="standard error, in ⟨f_n⟩, with which unmeasured forces count as 0 (default 1000, "
-        "any force; 2 with --again; 1 with --frames; use about 1 for a frame without a "
-        "pressure)",
+        help="treat unmeasured forces as 0 with this standard error, in ⟨f_n⟩ (default 1000, "
+        "which allows any force; 2 with --again; 1 with --frames; use about 1 for a frame without "
+        "a pressure)",
     )
     group.add_argument(
         "--again",
         action="store_true",
-        help="error bars for networks made by dynamics: repeat simulated measurements of the "
-        "most likely network (default: all networks are equally likely before the "
-        "measurement)",
+        help="compute error bars by repeated simulated measurements of the most likely network "
+        "(default: assume that all networks are equally likely before the measurement)",
     )
     group.add_argument(
         "--states", type=int, help="draws for error bars (default 1000, with --frames 200; 0: none)"
@@ -199,9 +200,7 @@ def add_infer(commands: Commands) -> None:
     )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument(
-        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
-    )
+    group.add_argument("--csv", type=Output, metavar="FILE.csv", help="write a per-contact table")
     add_unit(group)
     add_conditions(command)
     add_store(command)
@@ -212,7 +211,7 @@ def add_infer(commands: Commands) -> None:
     series.add_argument(
         "--frames",
         type=str,
-        help="all, or numbers separated by commas: import and infer each of them",
+        help="import these frames and infer their forces: all, or numbers separated by commas",
     )
     series.add_argument(
         "--out", type=Output, metavar="FOLDER.zarr", help="write all frames as one dataset"
@@ -241,7 +240,7 @@ def add_informative(commands: Commands) -> None:
     command = subcommand(
         commands,
         "informative",
-        "rank contacts by how much a measurement of their normal force would narrow all others",
+        "rank contacts by how much measuring their normal force would narrow all others",
         "granforce informative -n 400 --mu 0.1 --seed 1 --best 5 --known known.csv",
         lines=report_lines.INFORMATIVE,
     )
@@ -249,7 +248,7 @@ def add_informative(commands: Commands) -> None:
     group = command.add_argument_group("the ranking")
     group.add_argument("--best", type=int, default=10, help="contacts to list (default 10)")
     group.add_argument(
-        "--check", type=int, default=10, help="contacts to check by exact bounds (default 10)"
+        "--check", type=int, default=10, help="contacts to check with exact bounds (default 10)"
     )
     group.add_argument("--states", type=int, default=400, help="uniform states (default 400)")
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
@@ -281,7 +280,7 @@ def add_scan(commands: Commands) -> None:
     command = subcommand(
         commands,
         "scan",
-        "packings and walks for many μ and seeds, in parallel and resumable",
+        "make packings and walks for many μ and seeds in parallel; interrupted runs resume",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
         lines=report_lines.SCAN,
     )
@@ -316,7 +315,9 @@ def add_figures(commands: Commands) -> None:
         "granforce figures scan.zarr --out figure1.pdf",
         reports=False,
     )
-    command.add_argument("scan", type=Input, metavar="STORE", help="as granforce scan makes it")
+    command.add_argument(
+        "scan", type=Input, metavar="STORE", help="store written by granforce scan"
+    )
     add_picture(command)
 
 
@@ -324,7 +325,7 @@ def add_plot(commands: Commands) -> None:
     command = subcommand(
         commands,
         "plot",
-        "draw a packing and the forces in its contacts",
+        "draw a packing and its contact forces",
         "granforce plot packing.npz --out packing.png\n"
         "  granforce plot packing.npz --states states.zarr --colour spread --out spread.pdf",
         reports=False,
@@ -335,18 +336,18 @@ def add_plot(commands: Commands) -> None:
         "--states",
         type=Input,
         metavar="FILE.{csv,npz,zarr}",
-        help="draw the mean of these networks, as --out of walk or uniform writes them (default: "
-        "the packing's own network)",
+        help="draw the mean of these networks, written by walk or uniform with --out (default: the "
+        "packing's own network)",
     )
     command.add_argument(
-        "--state", type=int, metavar="K", help="draw only this one of the networks, from 0"
+        "--state", type=int, metavar="K", help="draw only network number K, counted from 0"
     )
     command.add_argument(
         "--colour",
         choices=["mobilisation", "force", "spread"],
         default="mobilisation",
-        help="colour of contacts: mobilisation f_t/(μ f_n) (default), force f_n, or spread, the "
-        "standard deviation of f_n over the networks",
+        help="quantity shown as colour: mobilisation f_t/(μ f_n) (default), force f_n, or spread, "
+        "the standard deviation of f_n over the networks",
     )
     command.leaves_out("without --states", lambda arguments: arguments.states is None, {"state"})
 
@@ -355,25 +356,29 @@ def add_study(commands: Commands) -> None:
     command = subcommand(
         commands,
         "study",
-        "compute the paper's study, draw its figures and judge its claims, resumable",
+        "compute the paper's study, draw its figures and judge its claims; interrupted runs resume",
         "granforce study --out study\n  granforce study --quick --out quick",
     )
-    command.add_argument("--quick", action="store_true", help="a small version, in minutes")
+    command.add_argument("--quick", action="store_true", help="run a small version, in minutes")
     command.add_argument(
-        "--out", type=Workplace, metavar="FOLDER", default="study", help="(default study)"
+        "--out",
+        type=Workplace,
+        metavar="FOLDER",
+        default="study",
+        help="folder of the results (default study)",
     )
     command.add_argument(
         "--paper",
         action="store_true",
-        help="compute only the paper's study, with the paper's relaxation",
+        help="compute only what the paper computed, with the paper's relaxation",
     )
     command.add_argument(
-        "--parts", type=str, help="compute only these parts, names separated by commas"
+        "--parts", type=str, help="compute only the parts with these names, separated by commas"
     )
     command.add_argument(
         "--minutes",
         type=float,
-        help="start no new cell after this many minutes; run the same command again to resume",
+        help="start no new computation after this many minutes; run the command again to resume",
     )
     command.add_argument(
         "--status",
@@ -390,14 +395,14 @@ def add_study(commands: Commands) -> None:
         "--reduce",
         type=Input,
         metavar="STORE",
-        help="compute nothing: reduce the cells of this store, with missing ones from --table",
+        help="compute nothing: reduce the results in this store; missing ones come from --table",
     )
     command.add_argument(
         "--documents",
         type=Edited,
         metavar="FILES",
-        help="update the text between <!-- study: NAME --> and <!-- end --> in these files, "
-        "names separated by commas",
+        help="update the text between <!-- study: NAME --> and <!-- end --> in these files "
+        "(separated by commas)",
     )
     others = set(command.options)
     group = command.add_argument_group("size")
@@ -405,10 +410,14 @@ def add_study(commands: Commands) -> None:
     group.add_argument("--mu", type=str, help="friction coefficients, separated by commas")
     group.add_argument("--packings", type=int, help="packings at each μ (default 30)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
-    group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (10)")
-    group.add_argument("--response-packings", type=int, help="pushed at contacts (default 10)")
+    group.add_argument(
+        "--gauss-seidel-packings", type=int, help="packings with the paper's walks (10)"
+    )
+    group.add_argument(
+        "--response-packings", type=int, help="packings pushed at contacts (default 10)"
+    )
     group.add_argument("--response-contacts", type=int, help="contacts pushed in each (default 20)")
-    group.add_argument("--perturb-packings", type=int, help="pushed in larger steps (default 3)")
+    group.add_argument("--perturb-packings", type=int, help="packings pushed in larger steps (3)")
     group.add_argument("--perturb-contacts", type=int, help="contacts pushed in each (default 30)")
     group.add_argument(
         "--sizes", type=str, help="other numbers of disks (default 100,200,800,1600)"
@@ -416,7 +425,7 @@ def add_study(commands: Commands) -> None:
     sized = command.options.keys() - others
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     command.add_argument(
-        "--formats", type=str, default="html,png,svg", help="of the figures; empty: none"
+        "--formats", type=str, default="html,png,svg", help="formats of the figures; empty: none"
     )
     add_scheduler(command)
     computing = {"minutes", "workers", "scheduler"}
@@ -476,7 +485,7 @@ def add_load_factor(commands: Commands) -> None:
     command.add_argument(
         "--critical",
         action="store_true",
-        help="also raise the load from the packing's own forces until bodies move",
+        help="also raise the load, starting from the packing's own forces, until bodies move",
     )
 
 
@@ -484,8 +493,8 @@ def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
         "stress",
-        "compute the stresses that the contacts can carry at the packing's pressure, and the "
-        "largest shear",
+        "compute all stresses that the contacts can carry at the packing's pressure, and the "
+        "largest shear stress",
         "granforce stress -n 400 --mu 0.1 --seed 1 --out outline.csv",
         lines=report_lines.STRESS,
     )
@@ -509,16 +518,16 @@ def add_perturb(commands: Commands) -> None:
     command = subcommand(
         commands,
         "perturb",
-        "push the grains of single contacts apart until the packing moves: critical force and "
-        "first motion",
+        "push the grains of single contacts apart until the packing moves, for the critical force "
+        "and the first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
         lines=report_lines.PERTURB,
     )
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")
     which = group.add_mutually_exclusive_group()
-    which.add_argument("--random", type=int, default=50, help="this many contacts (default 50)")
-    which.add_argument("--contacts", type=str, help="these contacts, numbers separated by commas")
+    which.add_argument("--random", type=int, default=50, help="number of contacts (default 50)")
+    which.add_argument("--contacts", type=str, help="numbers of contacts, separated by commas")
     which.add_argument("--all", action="store_true", help="all contacts that carry force")
     group.add_argument("--draw-seed", type=int, default=0, help="seed of --random (default 0)")
     group.add_argument(
@@ -527,7 +536,7 @@ def add_perturb(commands: Commands) -> None:
         help="friction of the contacts, if it differs from that of the packing",
     )
     group.add_argument(
-        "--precision", type=float, default=0.01, help="of F_crit, in ⟨f_n⟩ (default 0.01)"
+        "--precision", type=float, default=0.01, help="precision of F_crit, in ⟨f_n⟩ (default 0.01)"
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
@@ -543,16 +552,18 @@ def add_app(commands: Commands) -> None:
     command = subcommand(
         commands,
         "app",
-        "open the app in a browser: packings and their force networks, live",
+        "open the app in a browser",
         "granforce app\n  granforce app --port 8080 --no-show",
         reports=False,
     )
-    command.add_argument("--port", type=int, default=5006, help="(default 5006; 0: any free one)")
+    command.add_argument(
+        "--port", type=int, default=5006, help="port (default 5006; 0: any free port)"
+    )
     command.add_argument(
         "--address",
         type=str,
         default="localhost",
-        help="to listen at (default localhost: this machine only)",
+        help="address to listen at (default localhost: this machine only)",
     )
     command.add_argument(
         "--allow-websocket-origin",
@@ -560,11 +571,13 @@ def add_app(commands: Commands) -> None:
         metavar="HOST[:PORT]",
         action="append",
         default=[],
-        help="host name at which other machines open the app; may be given several times",
+        help="host name under which other machines open the app; can be repeated",
     )
-    command.add_argument("--no-show", action="store_true", help="open no browser")
+    command.add_argument("--no-show", action="store_true", help="do not open a browser")
     command.add_argument(
-        "--warm", action="store_true", help="load everything before the first visitor arrives"
+        "--warm",
+        action="store_true",
+        help="compile and load everything before the first visitor arrives",
     )
 
 
@@ -572,12 +585,12 @@ def add_docs(commands: Commands) -> None:
     command = subcommand(
         commands,
         "docs",
-        "build the documentation and open it in a browser, until interrupted",
+        "build the documentation and open it in a browser; stop with Ctrl-C",
         "granforce docs\n  granforce docs --out site",
         reports=False,
     )
     command.add_argument(
-        "--out", type=Output, metavar="FOLDER", help="build it in this folder only"
+        "--out", type=Output, metavar="FOLDER", help="only build it, in this folder"
     )
 
 
@@ -585,7 +598,7 @@ def add_completion(commands: Commands) -> None:
     command = subcommand(
         commands,
         "completion",
-        "print the script with which a shell completes commands, options and files",
+        "print a script for shell completion of commands, options and files",
         "granforce completion bash > ~/.local/share/bash-completion/completions/granforce\n"
         "  granforce completion zsh > ~/.zfunc/_granforce\n"
         "  granforce completion fish > ~/.config/fish/completions/granforce.fish",
@@ -598,7 +611,7 @@ def add_import(commands: Commands) -> None:
     command = subcommand(
         commands,
         "import",
-        "read a packing from another program, check it and save it",
+        "import a packing from another program, check it and save it",
         "granforce import lammps particles.dump contacts.dump --mu 0.3 --out packing.npz\n"
         "  granforce import lammps particles.dump contacts.dump --mu 0.3 --frames all "
         "--out series.zarr\n"
@@ -611,29 +624,29 @@ def add_import(commands: Commands) -> None:
     # One parser per format: it takes the options that its reader uses, and rejects all others.
     formats = command.add_subparsers(dest="format", metavar="FORMAT", required=True)
     lammps = import_format(
-        *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
+        *(formats, "lammps", "import a particle dump and a contact dump from LAMMPS"),
         "particles.dump contacts.dump",
         "dump custom of the particles: id, x y (or xu yu, xs ys, xsu ysu), radius or diameter; "
         "dumps may be compressed (.gz, .bz2, .xz, .zst)",
         "dump local of the contacts: two ids, distance, normal force x y, tangential force x y, in "
-        "this order or named atom1 atom2 distance fx fy px py",
+        "this order or under the names atom1 atom2 distance fx fy px py",
     )
     add_frame(lammps, "timestep")
     add_columns(lammps)
     add_reverse(lammps)
     add_series(lammps)
     yade = import_format(
-        *(formats, "yade", "read the bodies and interactions of YADE"),
+        *(formats, "yade", "import bodies and interactions from YADE"),
         "bodies.txt interactions.txt",
-        "bodies by export.textExt: x y z r, and id (format x_y_z_r_attrs) if there are walls",
-        "a line for each interaction: id1 id2, phys.normalForce x y z, phys.shearForce x y z",
+        "bodies from export.textExt: x y z r, and id (format x_y_z_r_attrs) if there are walls",
+        "one line per interaction: id1 id2, phys.normalForce x y z, phys.shearForce x y z",
     )
     add_cell(yade)
     add_columns(yade)
     add_wall_contacts(yade)
     add_reverse(yade)
     mercury = import_format(
-        *(formats, "mercury", "read the .data and .fstat of MercuryDPM"),
+        *(formats, "mercury", "import .data and .fstat files from MercuryDPM"),
         *("run.data run.fstat", "particles: NAME.data", "contacts: NAME.fstat"),
     )
     add_frame(mercury, "number of the time step in the files, from 0")
@@ -642,7 +655,7 @@ def add_import(commands: Commands) -> None:
     add_reverse(mercury)
     add_series(mercury)
     table = import_format(
-        *(formats, "table", "read a table of grains and, if there is one, a table of contacts"),
+        *(formats, "table", "import a table of grains and, optionally, a table of contacts"),
         *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and f_n, f_t if known"),
         contacts_needed=False,
     )
@@ -659,13 +672,14 @@ def add_import(commands: Commands) -> None:
     table.add_argument(
         "--gravity",
         type=float,
-        help="gravitational acceleration times mass density, downwards: a disk of radius r "
-        "weighs π r² times this",
+        help="gravitational acceleration times mass density: a disk of radius r weighs π r² times "
+        "this, downwards",
     )
     table.add_argument(
         "--tolerance",
         type=float,
-        help="largest gap of disks that count as touching, in largest radii (default 1e-6)",
+        help="largest gap at which disks count as touching, in units of the largest radius "
+        "(default 1e-6)",
     )
     table.add_argument("--forces", action="store_true", default=None, help="require f_n and f_t")
     table.add_argument(
@@ -677,24 +691,26 @@ def add_import(commands: Commands) -> None:
         {"tolerance"},
     )
     blocks = import_format(
-        *(formats, "blocks", "read rigid bodies of any shape: convex polygons and disks"),
+        *(formats, "blocks", "import rigid bodies: convex polygons and disks"),
         "bodies.csv",
-        "CSV: a row for each corner, columns body, x, y, and if needed r (of a disk), density and "
+        "CSV with one row per corner: columns body, x, y, and optionally r (of disks), density and "
         'fixed (0 or 1); or JSON: {"bodies": [{"corners": [[x, y], …], "fixed": true}, {"disk": '
         '[x, y, r], "density": 2}, …]}',
         None,
     )
     blocks.add_argument(
-        "--density", type=float, help="mass per area of bodies that have none (default 1)"
+        "--density",
+        type=float,
+        help="mass per area of bodies without a density in the file (default 1)",
     )
     blocks.add_argument(
         "--tolerance",
         type=float,
-        help="distance up to which surfaces touch or may overlap, in the unit of the bodies "
-        "(default 1e-9 of the largest body)",
+        help="largest gap or overlap of surfaces that touch, in the unit of the file (default 1e-9 "
+        "of the largest body)",
     )
     pegs = import_format(
-        *(formats, "pegs", "read a photoelastic frame of PeGS"),
+        *(formats, "pegs", "import a photoelastic frame from PeGS"),
         *("positions.txt adjacency.txt", "positions, or a *_solved.mat of PeGS 2", "adjacency"),
         contacts_needed=False,
     )
@@ -713,21 +729,23 @@ def add_export(commands: Commands) -> None:
     command = subcommand(
         commands,
         "export",
-        "write a packing and its force network for ParaView or LAMMPS",
+        "export a packing and its force network to ParaView or LAMMPS",
         "granforce export packing.npz grains.vtp contacts.vtp\n"
         "  granforce export packing.npz particles.dump contacts.dump",
         reports=False,
     )
     add_packing_file(command)
     command.add_argument("grains", type=Output, help="FILE.vtp for ParaView, FILE.dump for LAMMPS")
-    command.add_argument("contacts", type=Output, help="the same, for the contacts and forces")
+    command.add_argument(
+        "contacts", type=Output, help="file of the same type for contacts and forces"
+    )
 
 
 def add_bench(commands: Commands) -> None:
     command = subcommand(
         commands,
         "bench",
-        "measure run time against error of every solver on this machine",
+        "measure the run time and error of every solver on this machine",
         "granforce bench --quick --out bench",
     )
     command.add_argument("--quick", action="store_true", help="small sizes, under 3 minutes")
@@ -757,7 +775,7 @@ def add_cache(commands: Commands) -> None:
     command = subcommand(
         commands,
         "cache",
-        "list, size, clear or verify the store, or print its path",
+        "list, measure, clear or verify the store of results, or print its path",
         "granforce cache verify --cache scan.zarr",
     )
     command.add_argument("action", choices=["list", "size", "clear", "verify", "path"])
@@ -798,7 +816,7 @@ def make_parser() -> Parser:
     """The parser of the whole command line."""
     parser = Parser(
         prog="granforce",
-        description="Explore how undetermined the forces in a packing of rigid disks are.",
+        description="Explore how undetermined the contact forces in a packing of rigid disks are.",
         epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
         formatter_class=EXAMPLE,
     )

@@ -78,12 +78,12 @@ VARIABLES: dict[str, Variable] = {
     "worst_r_hat": _real("", "1", "largest split R̂ of any component"),
     "least_bulk_size": _real("", "1", "smallest bulk effective sample size"),
     "least_tail_size": _real("", "1", "smallest tail effective sample size"),
-    "reached": _whole("", "1 where chains mixed to the effective size wanted"),
+    "reached": _whole("", "1 if the chains mixed and reached the requested effective size"),
     "turns": _whole("", "reflections of the billiard walk"),
-    "refused": _whole("", "paths with too many reflections, not taken"),
-    "dropped": _whole("", "states left out while chains warmed up"),
-    "held": _whole("", "cone coordinates that are zero in all of the ensemble"),
-    "setup_seconds": _real("", "s", "wall time until the first step"),
+    "refused": _whole("", "paths discarded because of too many reflections"),
+    "dropped": _whole("", "states discarded while the chains warmed up"),
+    "held": _whole("", "coordinates f_n ± f_t/μ that are zero in all of S"),
+    "setup_seconds": _real("", "s", "wall time before the first step"),
     "sampling_seconds": _real("", "s", "wall time of the steps"),
     # a measurement, and the inferred forces
     "grain_id": _real("grain", "1", "name in the files; below 0: a wall"),
@@ -91,14 +91,16 @@ VARIABLES: dict[str, Variable] = {
         "region stress_component", "force/length", "stress xx, yy, xy by region"
     ),
     "regional_stress_error": _real("region stress_component", "force/length", "its standard error"),
-    "added": _whole("contact", "1 where the contact was not listed"),
+    "added": _whole("contact", "1 if the contact is not listed in the files"),
     "measured": _real("contact component", "force", f"measured forces, {_COMPONENT}"),
-    "sigma": _real("contact component", "force", f"their standard errors, {_COMPONENT}"),
+    "sigma": _real(
+        "contact component", "force", f"standard errors of measured forces, {_COMPONENT}"
+    ),
     "inferred": _real("contact component", "force", f"likeliest admissible network, {_COMPONENT}"),
     "deviation": _real("contact component", "1", f"(inferred − measured)/σ, {_COMPONENT}"),
     "expected": _real("contact component", "force", f"mean of the draws, {_COMPONENT}"),
     "standard_error": _real(
-        "contact component", "force", f"standard deviation of them, {_COMPONENT}"
+        "contact component", "force", f"standard deviation of the draws, {_COMPONENT}"
     ),
     "least_normal": _real(
         "contact", "force", "least f_n over all networks within 3 σ of the measured"
@@ -121,25 +123,27 @@ VARIABLES: dict[str, Variable] = {
     "position": _real("contact", "1", "place of the original f_n in its interval, 0 to 1"),
     # which measurement is most informative
     "part_expected": _real(
-        "contact", "1", "part by which errors of f_n fall once this one is known"
+        "contact", "1", "expected fraction by which errors of f_n fall once this f_n is known"
     ),
     "mean_before": _real("", _SCALE, "mean interval of f_n"),
-    "mean_after": _real("contact", _SCALE, "the same once f_n of this one is known"),
+    "mean_after": _real(
+        "contact", _SCALE, "mean interval of f_n once f_n of this contact is known"
+    ),
     "limit_load": _real("contact", "force", "limit load of a normal force pair"),
     "load_gap": _real("contact", _SCALE, "duality gap of the limit loads"),
     # the response to a force pair on one contact
     "critical_low": _real("contact", "force", "F_crit: largest load at rest"),
-    "critical_high": _real("contact", "force", "least load not at rest, or the limit load"),
+    "critical_high": _real("contact", "force", "smallest load not at rest, or the limit load"),
     "load_residual": _real("contact", _SCALE, "unbalance under the largest load at rest"),
-    "load_violation": _real("contact", _SCALE, "cone violation under that load"),
-    "motion_breach": _real("contact", "1", "breach of Coulomb's law by the first motion"),
+    "load_violation": _real("contact", _SCALE, "cone violation under the largest load at rest"),
+    "motion_breach": _real("contact", "1", "violation of Coulomb's law by the first motion"),
     "pair_opening": _real("contact", "1", "opening of the contact, rms |u| = 1"),
     "opened": _whole("contact", "contacts that the first motion opens"),
     "slid": _whole("contact", "contacts that slide in the first motion"),
     "kept": _whole("contact", "contacts that stick in the first motion"),
     "loads_at_rest": _whole("contact", "loads that ended at rest"),
     "loads_moving": _whole("contact", "loads that ended in steady motion"),
-    "loads_undecided": _whole("contact", "loads that ended in motion not yet steady"),
+    "loads_undecided": _whole("contact", "loads that ended in unsteady motion"),
     "flow_steps": _whole("contact", "implicit steps of the flow"),
     "linear_systems": _whole("contact", "linear systems solved"),
     "contact_seconds": _real("contact", "s", "wall time of the critical force"),
@@ -147,7 +151,7 @@ VARIABLES: dict[str, Variable] = {
     "shell_radius": _real("shell", "length", "middle of the shell"),
     "profile": _real("contact shell", "1", "mean |u| of the shell's grains"),
     "critical_force": _real("", _SCALE, "mean of F_crit"),
-    "decay_exponent": _real("", "1", "α of mean |u| ~ r^−α"),
+    "decay_exponent": _real("", "1", "exponent α of the mean displacement |u| ~ r^−α"),
     "decay_low": _real("", "1", "lower end of the 95 % interval of α"),
     "decay_high": _real("", "1", "upper end of the 95 % interval of α"),
     "fit_inner": _real("fit", "length", "smallest r of other fits"),
@@ -156,7 +160,7 @@ VARIABLES: dict[str, Variable] = {
     # the number of networks: forces of every contact in ⟨f_n⟩
     "log_volume": _real("", "1", "ln V, the h-dimensional volume of S"),
     "log_volume_error": _real("", "1", "standard error of ln V"),
-    "log_volume_ladders": _real("ladder", "1", "ln V on the ways down and up"),
+    "log_volume_ladders": _real("ladder", "1", "ln V from the ladder down and the ladder up"),
     "log_volume_per_grain": _real("", "1", "ln V per grain of the backbone"),
     "extent": _real("", _SCALE, "extent V^(1/h)/√(2πe) of S per free dimension"),
     # the outline of S in a plane of force space
@@ -172,7 +176,9 @@ VARIABLES: dict[str, Variable] = {
     "stress_outer": _real("outer_corner plane_axis", "1", "polygon around the outline of stresses"),
     "stress_own": _real("plane_axis", "1", "stress of the original network"),
     "friction": _real("", "1", "largest shear stress over pressure"),
-    "friction_bound": _real("", "1", "what that certainly does not exceed"),
+    "friction_bound": _real(
+        "", "1", "certified upper bound on the largest shear stress over pressure"
+    ),
     "programs": _whole("", "linear programs solved"),
     "max_gap": _real("", _SCALE, "largest duality gap"),
     "packing_fraction": _real("", "1", "packing fraction φ, rattlers included"),
@@ -182,13 +188,13 @@ VARIABLES: dict[str, Variable] = {
     "resolution": _real("", _SCALE, "width up to which directions are taken as pinned"),
     "force_scale": _real("", "force", "mean normal force ⟨f_n⟩"),
     "original_distance": _real("", _SCALE, "distance of the original network from the centre"),
-    "acceptance": _real("", "1", "accepted states per attempt"),
-    "accepted": _whole("", "attempts that gave a new state"),
-    "rejected": _whole("", "attempts that ended in no equilibrium"),
+    "acceptance": _real("", "1", "fraction of attempts that were accepted"),
+    "accepted": _whole("", "number of accepted attempts"),
+    "rejected": _whole("", "attempts that found no equilibrium"),
     "unconverged": _whole("", "attempts that ran out of iterations"),
     "skipped": _whole("", "states that needed no relaxation (h = 0)"),
     "rattlers": _whole("", "grains outside the backbone"),
-    "unloaded_contacts": _whole("", "contacts that can carry nothing"),
+    "unloaded_contacts": _whole("", "contacts that cannot carry force"),
     "tangential_unknowns": _whole("", "tangential unknowns dropped at μ = 0"),
     "seconds": _real("", "s", "wall time of the computation"),
 }
@@ -213,16 +219,18 @@ VARIABLES |= {
     "row_version": _real("row", "1", "version of the kind of result"),
     "row_packing_version": _real("row", "1", "version of the algorithm that made the packing"),
     "row_packing_mu": _real("row", "1", "friction with which the packing was made, if not μ"),
-    "row_contacts": _real("row", "1", "number of contacts that carry"),
+    "row_contacts": _real("row", "1", "number of contacts that carry force"),
     "row_mean_extent": _real("row", _SCALE, "⟨ΔF_n⟩ over contacts"),
     "row_mean_length": _real("row", _SCALE, "mean length of the intervals of all components"),
-    "row_excess": _real("row", _SCALE, "how far intervals seen reach beyond exact ones, mean"),
+    "row_excess": _real("row", _SCALE, "mean length of seen intervals outside the exact ones"),
     "row_mean_distance": _real("row", _SCALE, "mean distance of states from their centre"),
-    "row_reached_part": _real("row", "1", "states that the walk reached, of those wanted"),
-    "row_skipped_part": _real("row", "1", "states that are the one point that S is, of all"),
+    "row_reached_part": _real("row", "1", "fraction of the requested states that the walk reached"),
+    "row_skipped_part": _real("row", "1", "fraction of states not relaxed because S is one point"),
     "row_pair_spread": _real("row", "1", "standard deviation over mean of distances between pairs"),
     "row_undetermined": _real("row", "1", "contacts without a unique force"),
-    "row_undetermined_part": _real("row", "1", "their part of all that carry"),
+    "row_undetermined_part": _real(
+        "row", "1", "fraction of carrying contacts without a unique force"
+    ),
     "row_original_ratio": _real(
         "row", "1", "distance of the original network over that of uniform states"
     ),
@@ -230,7 +238,7 @@ VARIABLES |= {
     "row_limit_load": _real("row", _SCALE, "mean limit load of the contacts"),
     "row_own_shear": _real("row", "1", "shear stress over pressure of the original network"),
     "row_mean_shear": _real("row", "1", "mean shear stress over pressure of uniform states"),
-    "row_largest_shear": _real("row", "1", "the largest of them"),
+    "row_largest_shear": _real("row", "1", "largest shear stress over pressure of uniform states"),
     "row_clusters": _real("row", "1", "clusters of undetermined contacts"),
     "row_largest_cluster": _real("row", "1", "contacts of the largest cluster"),
     "decay_row": _whole("decay", "row that the shell belongs to"),
