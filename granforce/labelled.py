@@ -175,7 +175,9 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         arrays = _arrays(result, list(dimensions))
     if not dimensions:
         known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))
-        raise InputError(f"a {type(result).__name__} has no labels; those have: {known}, networks")
+        raise InputError(
+            f"a {type(result).__name__} cannot be labelled; labels exist for: {known}, networks"
+        )
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
@@ -189,7 +191,7 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         labels = {name: label for name, label in labels.items() if _dimension(label, name) in used}
         return xr.Dataset(variables, labels, _attributes(result))
     except ValueError as error:
-        raise InputError(f"the result is of another ensemble: {error}") from None
+        raise InputError(f"the result belongs to another ensemble: {error}") from None
 
 
 def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
@@ -253,7 +255,7 @@ def _refuse_foreign(result: Any, ensemble: Ensemble) -> None:
         forces = starting_network(ensemble)[ensemble.positions(result.contacts)]
         outside = np.maximum(result.low - forces, forces - result.high)
         if np.nanmax(outside, initial=0.0) > AT_REST * ensemble.force_scale:
-            raise InputError("the result is of another ensemble: its own forces are outside")
+            raise InputError("the result belongs to another ensemble: its own forces are outside")
 
 
 def _corners(dataset: xr.Dataset) -> pd.DataFrame:

@@ -302,7 +302,7 @@ def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
     ):
         raise InputError(f"{name} must have shape {shape}, got {array.shape}")
     if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} holds NaN or infinite values; remove or repair them")
+        raise InputError(f"{name} contains NaN or infinite values; remove or repair them")
     return array
 
 
@@ -557,8 +557,8 @@ def make_packing(
     if twice := repeated(contacts):
         i, j = contacts.i[twice[0]], contacts.j[twice[0]]
         raise InputError(
-            f"contacts {twice[0]} and {twice[1]} are one: both join grains {i} and {j}; give each "
-            "contact once"
+            f"contacts {twice[0]} and {twice[1]} are the same: both join grains {i} and {j}; give "
+            "each contact once"
         )
     shapes = None if shapes is None else _shapes(shapes, len(r))
     info = dict(info or {})
@@ -600,7 +600,7 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
         )
     if abs(tilt) > LARGEST_TILT * box[0]:
         raise InputError(
-            f"the tilt {tilt:g} is more than {LARGEST_TILT:g} times the side {box[0]:g}; take away "
+            f"the tilt {tilt:g} is more than {LARGEST_TILT:g} times the side {box[0]:g}; subtract "
             "whole sides"
         )
     return Cell(box, float(tilt - box[0] * np.round(tilt / box[0])) if tilt else 0.0)

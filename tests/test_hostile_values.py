@@ -119,7 +119,7 @@ def test_conditions_beside_an_ensemble_are_refused(S):
         lambda: gf.rest(S, mu=0.1),
         lambda: gf.rest(S, prescribed="stress"),
     ):
-        with pytest.raises(InputError, match="an ensemble has its own"):
+        with pytest.raises(InputError, match="an ensemble already has"):
             call()
 
 
@@ -136,7 +136,7 @@ def test_labels_of_another_ensemble_are_refused(S):
     other = gf.ensemble(packed(12, 0.3, seed=3))
     bounds = gf.intervals(S)
     assert gf.to_dataset(bounds, S).sizes["contact"] == len(S.index)
-    with pytest.raises(InputError, match="of another ensemble"):
+    with pytest.raises(InputError, match="belongs to another ensemble"):
         gf.to_dataset(bounds, other)
 
 
@@ -150,7 +150,7 @@ def test_networks_of_another_packing_are_refused_by_every_method(S, others):
 
 def test_masks_are_no_list_of_contacts(S):
     mask = np.zeros(len(S.index), dtype=bool)
-    with pytest.raises(InputError, match="numbers in the packing"):
+    with pytest.raises(InputError, match="list of contact numbers of the packing"):
         gf.intervals(S, mask)
 
 

@@ -327,7 +327,7 @@ def test_results_are_labelled_in_xarray_and_pandas():
         assert len(gf.to_dataframe(result, S)) % len(S.index) == 0
     with pytest.raises(gf.InputError, match=r"gf\.to_dataset\(result, S\)"):
         gf.to_dataset(walk)
-    with pytest.raises(gf.InputError, match="of another ensemble"):
+    with pytest.raises(gf.InputError, match="belongs to another ensemble"):
         gf.to_dataset(walk, gf.ensemble(gf.scene("groove", 0.5)))
 
 

@@ -107,9 +107,11 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
     try:
         numbers = {float(part) for part in text.split(",")}
     except ValueError:
-        raise InputError(f"--frames {text[:40]!r}: all, or numbers separated by commas") from None
+        raise InputError(
+            f"--frames {text[:40]!r}: give all, or numbers separated by commas"
+        ) from None
     for number in sorted(numbers - set(there)):
-        raise InputError(f"no frame {number:g}: there are {min(there):g} … {max(there):g}")
+        raise InputError(f"no frame {number:g}; the frames are {min(there):g} … {max(there):g}")
     return [number for number in there if number in numbers]
 
 

@@ -31,7 +31,7 @@ def radii(text: str, n: int) -> str | list[float]:
     except ValueError as error:
         raise InputError(f"radii file {text}: {error}") from None
     if len(radii) != n:
-        raise InputError(f"radii file {text} holds {len(radii)} radii for {n} disks (-n)")
+        raise InputError(f"radii file {text} has {len(radii)} radii for {n} disks (-n)")
     return radii
 
 

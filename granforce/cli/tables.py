@@ -129,7 +129,9 @@ def read_states(path: str, packing: Packing) -> tuple[Integers, Floats]:
         raise InputError(f"{path}: contacts must be numbered 0 … {count - 1} as in the packing")
     contact = contact.astype(np.int64)
     if not (np.array_equal(own.i[contact], i) and np.array_equal(own.j[contact], j)):
-        raise InputError(f"{path}: its contacts join other grains; is it of another packing?")
+        raise InputError(
+            f"{path}: its contacts join other grains; does it belong to another packing?"
+        )
     return contact, float_array(states, (-1, len(contact), 2), f"{path}: states")
 
 
@@ -168,7 +170,7 @@ def _picked(path: str, arrays: Mapping[Any, Any], states: str, there: Any) -> _S
     names = ("contact", "i", "j", states)
     if states not in there or any(name not in arrays for name in names):
         raise InputError(
-            f"{path}: no states in the packing's unit; write them by granforce walk or uniform "
+            f"{path}: no states in the packing's unit; write them with granforce walk or uniform "
             "--out with --unit packing"
         )
     contact, i, j, values = (arrays[name] for name in names)

@@ -139,8 +139,8 @@ class TextFrames(NamedTuple):
         if len(one) > 1 or len(two) > 1:
             lone, many = (self.grains, self.contacts) if len(two) > 1 else reversed(self)
             raise InputError(
-                f"{many.name} has {len(many.frames)} frames and {lone.name} no column for the "
-                "frame; give files of one frame, or add the column"
+                f"{many.name} has {len(many.frames)} frames, but {lone.name} has no column for the "
+                "frame; give files with one frame, or add the column"
             )
         return one if len(one) else two if len(two) else np.ones(1)
 
@@ -191,8 +191,8 @@ def read_frames(
     if "frame" in given and not any(file.frame_given for file in files):
         raise InputError(
             f"{files[0].name} and {files[1].name}: no column has the header "
-            f"{given['frame'][:40]!r} for frame; to number it, give the other columns of its file, "
-            "too"
+            f"{given['frame'][:40]!r} for frame; to give its number, also give the other columns "
+            "of its file"
         )
     return _with_frames(*files)
 
@@ -204,7 +204,8 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
         name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
         if name is None:
             raise InputError(
-                f"no column is called {word[:40]!r} here: frame, id, x, y, r, flag, i, j, f_t, f_n"
+                f"unknown column {word[:40]!r}; choose from frame, id, x, y, r, flag, i, j, f_t, "
+                "f_n"
             )
         if name in given:
             raise InputError(f"the column {name} is given twice; give each name once")
@@ -225,15 +226,15 @@ def _with_frames(grains: Columns, contacts: Columns) -> TextFrames:
         found = next((some for some in map(_ascending, ends) if some[-1] == count), None)
         if found is None:
             raise InputError(
-                f"{grains.name}: ids restart {count} times, and where in {contacts.name} a frame "
-                "ends is unclear; add a column for the frame to both files"
+                f"{grains.name}: ids restart {count} times, but in {contacts.name} it is unclear "
+                "where a frame ends; add a column for the frame to both files"
             )
         contacts = contacts.with_frames(found)
     elif len(numbers) == count:
         parts = numbers[parts - 1]
     else:
         raise InputError(
-            f"{grains.name}: ids restart {count} times, and {contacts.name} has {len(numbers)} "
+            f"{grains.name}: ids restart {count} times, but {contacts.name} has {len(numbers)} "
             "frames; add a column for the frame"
         )
     return TextFrames(grains.with_frames(parts), contacts)
@@ -276,7 +277,7 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
     while rows and not any(np.isfinite(_number(field)) for field in rows[0][1]):
         header = rows.pop(0)[1]
     if not rows:
-        raise InputError(f"{name}: no line with numbers; is it a file of PeGS?")
+        raise InputError(f"{name}: no line with numbers; is it a PeGS file?")
     width = max(set(counts := [len(fields) for _, fields in rows]), key=counts.count)
     numbers = np.full((len(rows), width), np.nan)
     for row, (_, fields) in zip(numbers, rows, strict=True):
@@ -354,12 +355,12 @@ def _given(
             )
         if named[column] in given:
             raise InputError(
-                f"{file}: column {theirs[:40]!r} is given two names, {named[column]} and {name}"
+                f"{file}: column {theirs[:40]!r} is used twice, for {named[column]} and {name}"
             )
         named[column] = name
     missing = sorted(_needed(wanted) - set(named))
     if missing:
-        raise InputError(f"{file}: columns for {', '.join(missing)} are to be given, too")
+        raise InputError(f"{file}: also give the columns for {', '.join(missing)}")
     return named
 
 
@@ -380,7 +381,7 @@ def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[s
     if found is None:
         raise InputError(
             f"{name}: {width} fields in a line, which are not "
-            f"{', '.join(wanted)} (the first and the last may be missing); is it a file of PeGS? "
+            f"{', '.join(wanted)} (the first and the last may be missing); is it a PeGS file? "
             "Give a header line that names the columns"
         )
     return found

@@ -27,7 +27,7 @@ class Measurement(NamedTuple):
         """Forces and σ (count, 2) of all contacts of a packing; InputError for unknown contacts."""
         if self.contacts.max(initial=0) >= count:
             raise InputError(
-                f"contact {self.contacts.max()} was measured, and the packing's contacts are "
+                f"contact {self.contacts.max()} was measured, but the packing's contacts are "
                 f"numbered 0 … {count - 1}; is it the right packing?"
             )
         forces, sigma = np.full((2, count, 2), np.nan)

@@ -107,7 +107,7 @@ def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing,
     """
     most = MOST if repair is True else float(repair)
     if not 0 <= most <= 1:
-        raise InputError(f"repair is a part of the data, from 0 to 1, got {repair}")
+        raise InputError(f"repair must be a fraction of the data, from 0 to 1, got {repair}")
     account = Account([], repair is False, most)
     whole = len(listing.ids), len(listing.ends)
     listing, note = _named(listing, account)
@@ -237,7 +237,7 @@ def _without_doubled_names(listing: Listing, account: Account) -> Listing:
     _, first, which = np.unique(listing.ids, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[which] != np.arange(len(which)))
     texts = [
-        f"{listing.place(0, k)}: id {plain(listing.ids[k])} was given in line "
+        f"{listing.place(0, k)}: id {plain(listing.ids[k])} already appears in line "
         f"{int(listing.lines[0][first[which[k]]])} already"
         for k in again
     ]

@@ -46,7 +46,7 @@ class SolvedFrame(NamedTuple):
         """Its Listing; InputError for another frame."""
         if frame is not None and frame != self.frames[0]:
             raise InputError(
-                f"{self.only.names[0]} is frame {self.frames[0]:g}, and frame {frame:g} is wanted"
+                f"{self.only.names[0]} is frame {self.frames[0]:g}, not frame {frame:g}"
             )
         return self.only
 
@@ -72,7 +72,7 @@ def read_solved(source: Source) -> SolvedFrame:
         raise InputError(
             f"{wanted} that is damaged; save it again in MATLAB with save(…, '-v7')"
             if hdf5
-            else f"{name}: no MATLAB file with a struct array, or damaged"
+            else f"{name}: not a MATLAB file with a struct array, or damaged"
         ) from None
     if columns is None:
         raise InputError(

@@ -35,7 +35,7 @@ class SyntheticFrame(NamedTuple):
     def listing(self, frame: float | None = None) -> Listing:
         """Its Listing; InputError for another frame."""
         if frame is not None and frame != self.only.frame:
-            raise InputError(f"the frame is {self.only.frame:g}, and frame {frame:g} is wanted")
+            raise InputError(f"this is frame {self.only.frame:g}, not frame {frame:g}")
         return self.only
 
     def truth(self, found: Photoelastic) -> Floats:

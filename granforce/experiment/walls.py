@@ -257,7 +257,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
     inner = flag < 0
     if shape == "annulus" and inner.sum() < 3:
         raise InputError(
-            "walls annulus: too few grains are flagged −1, or lie at a hole, for the inner wall"
+            "walls annulus: too few grains at the inner wall (flagged −1, or next to a hole)"
         )
     if shape == "circle":
         inner[:] = False

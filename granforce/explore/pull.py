@@ -157,8 +157,8 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         if np.all(ensemble.admits(states)):
             return states
         raise UndecidedError(
-            f"the nearest network was not found; contact {contact} has the same normal force in "
-            "all of them"
+            f"the nearest network was not found; the normal force of contact {contact} is the same "
+            "in all of them"
         )
     position = ensemble.position(contact)
     for part in _INWARD:
@@ -209,7 +209,9 @@ def reach(
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
     if not np.all(ensemble.admits(states)):
-        raise UndecidedError(f"no balanced network at the ends of contact {contact} was reached")
+        raise UndecidedError(
+            f"no balanced network was found at the ends of the interval of contact {contact}"
+        )
     lower, upper = attained * [1.0, -1.0] * ensemble.force_scale
     return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
 

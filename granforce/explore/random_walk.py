@@ -135,7 +135,7 @@ def walk(
         raise InputError(f"relax must be a function, such as granforce.nearest, got {brief(relax)}")
     check_memory(16 * states * len(ensemble.index), f"{states} states")
     if chains > 1 and not (begun is None and enough is None):
-        raise InputError("begun and enough need a single chain")
+        raise InputError("begun and enough require a single chain")
     all_chains = [
         _Chain(ensemble, k, states // chains + (k < states % chains), own, max_attempts, whole)
         for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
@@ -279,7 +279,7 @@ class _Chain:
         """Continue from the states of an earlier walk, at its position in the random stream."""
         tried, count = int(begun.attempts.sum()), len(begun.states)
         if count > len(self.walk.states) or tried != sum(begun.counts.values()):
-            raise InputError("the walk to continue has more states, or ended between two")
+            raise InputError("the walk to continue already has more states, or ended within a step")
         for _ in range(tried - 1):  # each attempt drew this many numbers
             self.rng.uniform(size=self.forces.shape)
         if count > 1:
@@ -287,8 +287,8 @@ class _Chain:
         again = relaxed(self.kicked()).forces
         if not np.abs(again - begun.states[-1]).max() <= AT_REST * self.ensemble.force_scale:
             raise InputError(
-                "the walk to continue was made with another seed, relaxation or ensemble: its last "
-                "state is another one; give the same arguments"
+                "the walk to continue was made with another seed, relaxation or ensemble, as its "
+                "last state shows; give the same arguments"
             )
         self.counts.update(begun.counts)
         self.walk.states[:count], self.walk.residual[:count] = begun.states, begun.residual

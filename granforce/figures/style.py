@@ -70,7 +70,7 @@ def ready(backend: str) -> None:
     Raises InputError for a backend other than "bokeh" and "matplotlib".
     """
     if backend not in ("bokeh", "matplotlib"):
-        raise InputError(f"no figures for the backend {backend!r}: take bokeh or matplotlib")
+        raise InputError(f"unknown backend {backend!r}; choose bokeh or matplotlib")
     if backend not in hv.Store.registry:
         current = hv.Store.current_backend if hv.Store.registry else backend
         hv.extension(backend)

@@ -111,7 +111,7 @@ def ensemble_at(packing: Packing | Ensemble, **conditions: Any) -> Ensemble:
         return ensemble(packing, **conditions)
     given = [name for name, value in conditions.items() if value is not None]
     if given:
-        raise InputError(f"an ensemble has its own {given[0]}: leave it out, or give the packing")
+        raise InputError(f"an ensemble already has {given[0]}: leave it out, or give the packing")
     return packing
 
 
@@ -170,8 +170,8 @@ def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
     if np.any(short > ADMISSIBLE * S.force_scale):
         worst = int(np.argmax(short))
         raise NotJammedError(
-            f"contact {out[worst]} carries nothing in any network of these conditions; what is "
-            f"known of it would have to give {short[worst]:.3g}"
+            f"contact {out[worst]} carries no force in any network under these conditions; its "
+            f"known bounds would have to be relaxed by {short[worst]:.3g}"
         )
 
 

@@ -354,7 +354,7 @@ class Ensemble:
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
         contacts = np.asarray(refuse_hidden(contacts, "contacts"))
         if contacts.ndim != 1 or not (contacts.dtype.kind in "iuf" or not contacts.size):
-            raise InputError("contacts are given by their numbers in the packing: a list of them")
+            raise InputError("contacts must be a list of contact numbers of the packing")
         unknown = contacts[~np.isin(contacts, self.index)]
         if len(unknown):
             raise InputError(

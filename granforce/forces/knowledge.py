@@ -71,7 +71,9 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     there = are_whole(contacts, count - 1)
     if not there.all():
         first = contacts[~there][0]
-        raise InputError(f"known contact {first:g} is none of the packing's 0 … {count - 1}")
+        raise InputError(
+            f"known contact {first:g} does not exist; the packing's contacts are 0 … {count - 1}"
+        )
     contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
         raise InputError("a bound is NaN; use −inf and inf for unknown bounds")
@@ -84,7 +86,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     if len(wrong):
         c, k = wrong[0]
         raise InputError(
-            f"what is known of {_NAMES[k]} of contact {c} is contradictory: at least "
+            f"the bounds on {_NAMES[k]} of contact {c} are contradictory: at least "
             f"{bounds[c, k, 0]:.6g}, at most {bounds[c, k, 1]:.6g}"
         )
     return bounds
@@ -140,13 +142,14 @@ def _beyond_coulomb(contact: int, bounds: Floats, mu: float, needed: float, shor
     (_, high), (t_low, t_high) = bounds
     if high < 0:
         return (
-            f"no network agrees with what is known of contact {contact}: f_n ≤ {high:.6g}, where "
-            f"contacts can only press; it would have to give {-high:.3g}"
+            f"no network satisfies the bounds on contact {contact}: f_n ≤ {high:.6g}, but "
+            f"contacts can only press; the bound must be relaxed by {-high:.3g}"
         )
     tangential = f"f_t ≥ {t_low:.6g}" if t_low > 0 else f"f_t ≤ {t_high:.6g}"
     return (
-        f"no network agrees with what is known of contact {contact}: f_n ≤ {high:.6g} and "
-        f"{tangential} contradict Coulomb's law at μ = {mu:g}; f_n would have to give {short:.3g}"
+        f"no network satisfies the bounds on contact {contact}: f_n ≤ {high:.6g} and "
+        f"{tangential} contradict Coulomb's law at μ = {mu:g}; the bound on f_n must be relaxed by "
+        f"{short:.3g}"
     )
 
 
@@ -272,7 +275,7 @@ def _statements(
             c = index[contact[k]]
             text = f"{_NAMES[component[k]]} {relation[k]} {value[k]:.6g} on contact {c}"
             if given[k] > BALANCED * scale:
-                text += f" (would have to give {given[k]:.3g})"
+                text += f" (must be relaxed by {given[k]:.3g})"
             texts.append(text)
     together = "; ".join(texts)
-    return f"no network agrees with all known forces; these conflict: {together}"
+    return f"no network satisfies all known forces; these conflict: {together}"

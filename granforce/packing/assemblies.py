@@ -75,7 +75,7 @@ def blocks(
     names = [str(k) for k in range(len(bodies))] if names is None else names
     outlines = [_outline(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]
     if not outlines:
-        raise InputError("there is no body; give at least one")
+        raise InputError("there are no bodies; give at least one")
     held = _fixed(fixed, len(outlines))
     area, x, polar, r = (np.array(part) for part in zip(*map(_measured, outlines), strict=True))
     if materials is not None and len(materials) != len(outlines):

@@ -116,7 +116,7 @@ def assembled(
     pressing = np.zeros(len(walls)) if pressing is None else pressing
     pressing = float_array(pressing, (len(walls),), "forces of walls")
     if not len(r):
-        raise InputError("there is no disk; add one")
+        raise InputError("there are no disks; add one")
     i, j = np.triu_indices(len(r), 1)
     branch, reach = x[j] - x[i], r[i] + r[j]
     between = _touching(np.hypot(*branch.T) - reach, r, "two disks", tolerance)

@@ -50,7 +50,7 @@ def named(files: str | None) -> list[Path]:
     paths = [Path(name) for name in (files or "").split(",") if name]
     for path in paths:
         if not path.is_file() or not MARK.search(path.read_text()):
-            raise InputError(f"--documents: {path} is no file with <!-- study: … --> in it")
+            raise InputError(f"--documents: {path} is not a file that contains <!-- study: … -->")
     return paths
 
 
@@ -73,7 +73,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     for path in paths:
         text = path.read_text()
         for name in {name for _, name, _ in MARK.findall(text)} - set(known):
-            raise InputError(f"{path}: no table {name!r}: take one of {', '.join(known)}")
+            raise InputError(f"{path}: unknown table {name!r}; choose one of {', '.join(known)}")
         renewed = MARK.sub(lambda m: m[1] + known[m[2]]() + m[3], text)
         with written(path) as file:
             file.write(renewed.encode())

@@ -37,7 +37,7 @@ def main(arguments: argparse.Namespace) -> int:
     """
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
-        raise InputError(f"--formats {arguments.formats!r}: take some of html, png, svg")
+        raise InputError(f"--formats {arguments.formats!r}: choose from html, png, svg")
     worker_count(arguments.workers, "--workers")
     if arguments.minutes is not None:
         positive(arguments.minutes, "--minutes")

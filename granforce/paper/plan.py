@@ -434,7 +434,7 @@ def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
     """The tasks of some families of parts (names from PARTS), or all."""
     unknown = set(parts or ()) - set(PARTS)
     if unknown:
-        raise InputError(f"unknown part {min(unknown)!r}: take some of {', '.join(PARTS)}")
+        raise InputError(f"unknown part {min(unknown)!r}; choose from {', '.join(PARTS)}")
     wanted = tasks(plan)
     return wanted if parts is None else [task for task in wanted if _family(task.part) in parts]
 

@@ -280,8 +280,8 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
         task = tasks.get(_name(row))
         if task is not None and _versions(row) != _versions(_named(task)):
             raise InputError(
-                f"the older table has {row['part']} {_version_words(row)}, which cannot stand "
-                f"beside {_version_words(_named(task))}: leave --table out"
+                f"the older table has {row['part']} {_version_words(row)}, which cannot be "
+                f"combined with {_version_words(_named(task))}: leave --table out"
             )
     known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
     kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
@@ -370,7 +370,7 @@ def load(path: str | Path) -> StudyTable:
         if entry.version == VERSION:
             found = store.load("study", entry.params, version=VERSION)
             return _table(store, entry, cast("xr.Dataset", found))
-    raise InputError(f"the store at {path} holds no reduced study")
+    raise InputError(f"the store at {path} contains no reduced study")
 
 
 def _dataset(table: StudyTable) -> xr.Dataset:

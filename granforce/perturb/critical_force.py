@@ -204,7 +204,9 @@ def checked(protocol: Protocol) -> Protocol:
     )
     rise = positive(protocol.rise, "rise")
     if rise > 1:
-        raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
+        raise InputError(
+            f"rise must be a fraction of the way to the limit load, at most 1, got {rise:g}"
+        )
     return Protocol(precision, rise, whole(protocol.max_steps, "max_steps", 1))
 
 

@@ -179,7 +179,7 @@ def _direction(S: Ensemble, load: Floats) -> tuple[Floats, float]:
     rows[:, 2:] /= S.packing.r[S.grains, None]
     unit = float(np.abs(rows).max(initial=0.0))
     if unit == 0:
-        raise InputError("the load acts on no grain that has to balance")
+        raise InputError("the load acts only on grains whose balance is not required")
     if S.per_grain == 2 and load[S.grains, 2].any():
         raise InputError("disks without friction carry no torque: leave it out of the load")
     return rows.ravel() / unit, unit

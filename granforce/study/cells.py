@@ -149,8 +149,8 @@ def scan_rows(store: Store) -> list[dict[str, Any]]:
     )
     if differing:
         raise InputError(
-            f"the walks in {store.path} differ in {', '.join(differing)}; give a store that holds "
-            "one scan (granforce scan --out STORE)"
+            f"the walks in {store.path} differ in {', '.join(differing)}; give a store that "
+            "contains one scan (granforce scan --out STORE)"
         )
     rows = [row(entry.params, store[entry.name], True) for entry in entries]
     return sorted(rows, key=lambda line: (line["mu"], line["seed"] or 0))

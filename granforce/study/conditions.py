@@ -43,7 +43,9 @@ def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
     except (TypeError, ValueError):
         rows = [[]]
     if any(len(row) != 5 for row in rows):
-        raise InputError("known forces are rows of a contact and four bounds: f_n, then f_t")
+        raise InputError(
+            "each row of known forces must be a contact and four bounds: two on f_n, two on f_t"
+        )
     named = []
     for contact, *bounds in rows:
         bounds = [None if b is None or np.isinf(b) else float(b) for b in bounds]

@@ -85,7 +85,7 @@ def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -
     )
     chosen = np.array(plane)
     if chosen.shape != (2,) or not are_whole(chosen, 2 * count - 1).all():
-        raise InputError("a plane has two force components: 2 c for f_n, 2 c + 1 for f_t")
+        raise InputError("a plane needs two force components: 2 c for f_n, 2 c + 1 for f_t")
     axes = np.zeros((2, count, 2))
     axes.reshape(2, -1)[[0, 1], chosen] = 1.0
     carrying = axes[:, S.index]

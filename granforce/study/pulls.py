@@ -116,7 +116,7 @@ class Puller:
         try:
             corners = ConvexHull(points).vertices
         except QhullError:
-            raise InputError("S is no area in this plane: the point cannot be pulled") from None
+            raise InputError("S has no area in this plane: the point cannot be pulled") from None
         return Fan(points[corners], states[corners], S.residual(states[corners]))
 
     def _points(self, axes: Floats, states: Floats) -> Floats:

@@ -375,7 +375,7 @@ def _over_dask(
     from dask.distributed import KilledWorker, as_completed
 
     unreachable = InputError(
-        f"the dask scheduler at {scheduler} is gone; finished entries are saved"
+        f"the dask scheduler at {scheduler} was lost; finished entries are saved"
     )
     waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
     completed, workers = as_completed(list(waiting)), _Workers(scheduler)

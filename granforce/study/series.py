@@ -310,13 +310,15 @@ def check_folder(path: str | Path) -> Path:
     """The path, if a Zarr folder can be created there; InputError otherwise."""
     path = expanded(path)
     if path.is_symlink() and not path.exists():
-        raise InputError(f"{path}: is a link to nothing; choose another")
+        raise InputError(f"{path}: is a broken link; choose another")
     if path.exists() and not (path / "zarr.json").is_file():
-        raise InputError(f"{path}: exists already and is not a Zarr folder; choose another")
+        raise InputError(f"{path}: already exists and is not a Zarr folder; choose another")
     if is_store(path):
-        raise InputError(f"{path}: is a store of results, which would be replaced; choose another")
+        raise InputError(
+            f"{path}: is a store of results, which would be overwritten; choose another"
+        )
     if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}")
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
     return path
 
 

@@ -147,7 +147,7 @@ def _refuse_foreign(path: Path) -> None:
     others = set(visible) - ours - ({"zarr.json"} if ours else set())
     if others:
         raise InputError(
-            f"{path} is not a store: it holds {min(others)!r}; give an empty or a new folder"
+            f"{path} is not a store: it contains {min(others)!r}; give an empty or a new folder"
         )
 
 

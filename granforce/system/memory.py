@@ -13,6 +13,6 @@ def check_memory(needed: float, what: str) -> None:
         return  # unknown on this system: an allocation will fail instead
     if needed > there:
         raise InputError(
-            f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, and this machine has "
+            f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, but this machine has "
             f"{there / 1e9:.3g} GB; choose smaller values"
         )

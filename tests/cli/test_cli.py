@@ -197,7 +197,7 @@ def test_forces_known_exactly_and_contradictions(run, tmp_path):
     known.write_text("contact;f_n;f_t\n0;1000;\n")
     code, out, err = run("intervals", *SMALL[:4], "--known", known)
     assert code == 2 and not out
-    assert "these conflict: f_n = 1000 on contact 0 (would have to give" in err
+    assert "these conflict: f_n = 1000 on contact 0 (must be relaxed by" in err
     known.write_text("contact,f_n\n0,1\n0.5,1\n")
     assert "known.csv, line 3" in run("intervals", *SMALL[:4], "--known", known)[2]
 

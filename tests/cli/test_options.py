@@ -227,7 +227,7 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
 
 def test_a_second_packing_is_refused(here, capsys):
     assert parser.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
-    assert "give the file of one packing" in capsys.readouterr().err
+    assert "give one packing file" in capsys.readouterr().err
 
 
 def test_messages_that_name_an_argument_name_its_option_too():

@@ -211,10 +211,10 @@ def test_columns_are_named_by_header_or_number(made, taken):
     same(found, taken)
     assert np.array_equal(found.at_wall, taken.at_wall)
     for wrong, words in (
-        ({"q": "1"}, "no column is called 'q' here: frame, id, x"),
+        ({"q": "1"}, "unknown column 'q'; choose from frame, id, x"),
         ({"r": "radius", "x": "2", "y": "3"}, "no column 'radius' for radius among 5 .size"),
-        ({"x": "2"}, "columns for radius, y are to be given"),
-        (names | {"flag": "size"}, "column 'size' is given two names, radius and flag"),
+        ({"x": "2"}, "also give the columns for radius, y"),
+        (names | {"flag": "size"}, "column 'size' is used twice, for radius and flag"),
         (names | {"radius": "edge"}, "the column radius is given twice"),
         (names | {"fn": "9"}, "no column '9' for normal among 5 .they have no names"),
         ({name: names[name] for name in ("r", "x", "y", "fn")}, "columns for id1, id2, tangential"),
@@ -245,7 +245,9 @@ def test_a_column_for_the_frame_is_named_by_its_header(made, headed):
 
 @pytest.mark.parametrize("number", ["1", "9", "name"])
 def test_a_column_for_the_frame_alone_has_no_number(made, number):
-    with pytest.raises(InputError, match=f"header '{number}' for frame; to number it, give the"):
+    with pytest.raises(
+        InputError, match=f"header '{number}' for frame; to give its number, also give the"
+    ):
         read(*made, columns={"frame": number})
 
 

@@ -45,7 +45,7 @@ def test_a_network_without_unbalance_to_hide_behind_is_still_refused():
     S = gf.ensemble(packing)
     strongest = S.index[np.argmax(S.original[:, 0])]
     beyond = 2 * gf.intervals(S, [strongest]).high[0]
-    with pytest.raises(gf.NotJammedError, match=r"these conflict|no network agrees"):
+    with pytest.raises(gf.NotJammedError, match=r"these conflict|no network satisfies"):
         gf.ensemble(packing, known=gf.Known([strongest], [[beyond[0], -np.inf]], [[np.inf] * 2]))
 
 

@@ -40,7 +40,7 @@ def test_a_walk_that_ended_when_it_was_enough_goes_on_as_if_it_had_not(S):
     assert gone_on.counts == whole.counts
     for name in ("states", "residual", "violation", "sweeps", "attempts"):
         np.testing.assert_array_equal(getattr(gone_on, name), getattr(whole, name))
-    with pytest.raises(InputError, match="need a single chain"):
+    with pytest.raises(InputError, match="require a single chain"):
         walk(S, 12, 3, chains=2, begun=part)
     with pytest.raises(InputError, match="more states"):
         walk(S, 3, 3, begun=part)

@@ -155,7 +155,7 @@ def test_one_backend_does_not_displace_the_other():
     current = hv.Store.current_backend
     figures.indeterminacy(ROWS, backend="matplotlib")
     assert hv.Store.current_backend == current
-    with pytest.raises(InputError, match="take bokeh or matplotlib"):
+    with pytest.raises(InputError, match="choose bokeh or matplotlib"):
         figures.indeterminacy(ROWS, backend="plotly")
 
 

@@ -302,7 +302,7 @@ def test_a_force_beyond_its_bound_is_told_with_what_it_would_have_to_give():
     for beyond in (1e-5, 0.3):
         message = told(normals([10], [most + beyond], [ANY]))
         assert "f_n ≥" in message and "on contact 10" in message
-        given = float(re.search(r"have to give ([\d.e+-]+)\)", message)[1])
+        given = float(re.search(r"must be relaxed by ([\d.e+-]+)\)", message)[1])
         assert given == pytest.approx(beyond, rel=0.02)
 
 
@@ -318,7 +318,7 @@ def test_statements_that_contradict_each_other_are_named_and_no_others():
     named = {int(c) for c in re.findall(r"on contact (\d+)", message)}
     assert named == set(both[:2])
     # Each alone can hold, and together they do once one gives what it is told to.
-    give = re.findall(r"contact (\d+) \(would have to give ([\d.e+-]+)\)", message)
+    give = re.findall(r"contact (\d+) \(must be relaxed by ([\d.e+-]+)\)", message)
     low = dict(zip(both, [0.9 * most[one], 0.99 * most[other], 0.0], strict=True))
     for contact, amount in give:
         low[int(contact)] -= 1.01 * float(amount)
@@ -328,7 +328,7 @@ def test_statements_that_contradict_each_other_are_named_and_no_others():
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
-        ([-2.0, -ANY], [-1.0, ANY], "contacts can only press; it would have to give 1$"),
+        ([-2.0, -ANY], [-1.0, ANY], "contacts can only press; the bound must be relaxed by 1$"),
         ([0.5, 0.3], [1.0, ANY], "contradict Coulomb's law at μ = 0.1; f_n would .* give 2$"),
         ([0.5, -ANY], [1.0, -0.3], "f_t ≤ -0.3 contradict Coulomb's law"),
     ],
@@ -349,10 +349,10 @@ def test_a_contact_that_carries_nothing_cannot_be_known_to_carry():
 @pytest.mark.parametrize(
     ("known", "words"),
     [
-        (gf.Known([1, 1], [[2.0, -1], [0, -1]], [[9.0, 1], [1, 1]]), "is contradictory"),
+        (gf.Known([1, 1], [[2.0, -1], [0, -1]], [[9.0, 1], [1, 1]]), "are contradictory"),
         (gf.Known([1], [np.nan, 0], [1, 1]), "a bound is NaN"),
-        (gf.Known([164], [0, 0], [1, 1]), "none of the packing's 0 … 163"),
-        (gf.Known([0.5], [0, 0], [1, 1]), "none of the packing's"),
+        (gf.Known([164], [0, 0], [1, 1]), "does not exist; the packing's contacts are 0 … 163"),
+        (gf.Known([0.5], [0, 0], [1, 1]), "does not exist"),
         (gf.Known([1, 2], [[0, 1, 2]] * 2, [1, 1]), "bounds .k, 2."),
         (gf.Known(["a"], [0, 1], [1, 1]), "known must be"),
         (3, "known must be"),

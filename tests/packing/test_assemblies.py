@@ -353,7 +353,7 @@ def test_files_and_stores_carry_shapes(tmp_path):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: gf.blocks([], 0.5), "no body"),
+        (lambda: gf.blocks([], 0.5), "no bodies"),
         (lambda: gf.blocks([[[0, 0], [1, 0], [2, 0]]], 0.5), "body 0 needs three corners"),
         (lambda: gf.blocks([[[0, 0], [2, 0], [1, 0.5], [1, 2]]], 0.5), "not convex"),
         (lambda: gf.blocks([[0, 0, -1]], 0.5), "above 0"),
@@ -471,7 +471,7 @@ def test_options_that_a_scene_lacks_are_refused_with_those_it_has(capsys):
     for words, said in (
         (["--scene", "wall", "--scene-options", "course=2"], "courses, blocks, width, height"),
         (["--scene", "box", "--scene-options", "disks=2"], "it has no options"),
-        (["--scene", "wall", "--scene-options", "courses=many"], "give numbers"),
+        (["--scene", "wall", "--scene-options", "courses=many"], "give NAME=NUMBER"),
         (["--scene", "wall", "--scene-options", "courses=2.5"], "whole number"),
     ):
         assert main(["pack", *words]) == 2

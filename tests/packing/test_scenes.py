@@ -251,7 +251,7 @@ def pressed(x, wall):
         (lambda: assembled([[0, 1]], [1], [[0, 0, 0, 0]], [[0, 0, 0]], 0), "no length"),
         (lambda: pressed([[0, 1], [0, -1.2]], [-3, 0, 3, 0]), "both sides"),
         (lambda: pressed([[-0.6, 0.8]], [0, 0, 3, 0]), "touches the end"),
-        (lambda: assembled(np.empty((0, 2)), [], [], np.empty((0, 3)), 0), "no disk"),
+        (lambda: assembled(np.empty((0, 2)), [], [], np.empty((0, 3)), 0), "no disks"),
     ],
 )
 def test_what_cannot_be_a_scene_is_refused(call, words):

@@ -188,7 +188,7 @@ def test_columns_of_dumps_have_any_names():
     assert read_lammps(*given(grains, text), MU, columns=columns).pressure == pytest.approx(1.0)
     with pytest.raises(InputError, match="no column 'q'; the columns are"):
         read_lammps(*given(grains, text), MU, columns=columns | {"fx": "q"})
-    with pytest.raises(InputError, match="no column is called 'speed' here"):
+    with pytest.raises(InputError, match="unknown column 'speed'"):
         read_lammps(*given(grains, text), MU, columns=columns | {"speed": "h"})
     for wrong in (["a", "b"], {"fx": 3}):
         with pytest.raises(InputError, match="columns must be"):

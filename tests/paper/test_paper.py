@@ -469,7 +469,7 @@ def test_versions_are_not_mixed(done, table, tmp_path, capsys):
         assert row["version"] == task.cell.kind.version
         assert row["packing_version"] == task.cell.parameters["packing"]["version"]
     old = table._replace(rows=[row | {"packing_version": 1} for row in table.rows])
-    with pytest.raises(InputError, match="packings of version 1, which cannot stand beside"):
+    with pytest.raises(InputError, match="packings of version 1, which cannot be combined with"):
         tables.merged(table, old)
     unknown = [{k: v for k, v in row.items() if "version" not in k} for row in table.rows]
     with pytest.raises(InputError, match="version unknown"):

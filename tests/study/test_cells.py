@@ -223,7 +223,7 @@ def test_what_would_not_fit_into_memory_is_told_at_once():
         lambda: kinds.UNIFORM.parameters(huge, 10**12),
         lambda: kinds.UNIFORM.parameters(huge, 10, effective=1e12),
     ):
-        with pytest.raises(InputError, match=r"would need .* GB of memory, and this machine has"):
+        with pytest.raises(InputError, match=r"would need .* GB of memory, but this machine has"):
             name()
 
 

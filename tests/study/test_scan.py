@@ -332,7 +332,7 @@ def test_a_scheduler_without_workers_says_so_and_goes_on_once_one_comes(
 
 def test_a_scheduler_that_goes_is_one_line(tmp_path, monkeypatch, empty_cluster):
     when_it_waits(monkeypatch, empty_cluster.close)
-    with pytest.raises(InputError, match=r"scheduler at .* is gone"):
+    with pytest.raises(InputError, match=r"scheduler at .* was lost"):
         scan.run(tmp_path / "s", small_cells()[:1], scheduler=empty_cluster.scheduler_address)
 
 

@@ -66,7 +66,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
             "give --measured FILE.csv and a packing, or files of frames with --frames all"
         )
     if len(arguments.files) > 1:
-        raise InputError("give the file of one packing; files of frames need --frames all")
+        raise InputError("give one packing file, or add --frames all to read files of frames")
     arguments.packing = arguments.files[0] if arguments.files else None
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)

@@ -75,7 +75,9 @@ def scene_options(text: str | None) -> dict[str, float]:
     try:
         return {name: float(value) for name, value in pairs.items()}
     except ValueError:
-        raise InputError(f"--scene-options {text[:40]!r}: give numbers, NAME=5,NAME=0.2") from None
+        raise InputError(
+            f"--scene-options {text[:40]!r}: give NAME=NUMBER,NAME=NUMBER, such as width=0.5"
+        ) from None
 
 
 # Reader of each format; that of pegs returns more than a packing.

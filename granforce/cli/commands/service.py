@@ -68,7 +68,7 @@ def _page() -> Path:
 def _check_address(address: str, port: int) -> None:
     """InputError if the address cannot be used, or is already in use."""
     if not address.strip():
-        raise InputError("--address is empty; give a name or a number, such as localhost")
+        raise InputError("--address is empty; give a host name or an IP address, such as localhost")
     try:
         family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind) as probe:
@@ -89,7 +89,7 @@ def docs(arguments: argparse.Namespace) -> None:
     if arguments.out:
         folder = Path(arguments.out).absolute()
         if not folder.parent.is_dir():
-            raise InputError(f"--out: there is no folder {folder.parent}")
+            raise InputError(f"--out: the folder {folder.parent} does not exist")
         _build_docs(folder)
         print(folder / "index.html")
         return
@@ -198,5 +198,5 @@ def _check_kind(store: Store, kind: str) -> None:
     """InputError for a name that is neither a kind of result nor the beginning of other entries."""
     if kind not in kinds.KINDS and not any(store.path.glob(f"{glob.escape(kind)}-*")):
         raise InputError(
-            f"no kind of results is called {kind[:40]!r}; there are {', '.join(kinds.KINDS)}"
+            f"unknown kind of result {kind[:40]!r}; choose one of {', '.join(kinds.KINDS)}"
         )

@@ -232,7 +232,7 @@ class _TimeStep(NamedTuple):
         if header is None:
             number, fields = self.rows[0]
             raise InputError(
-                f"{self.name}, line {number}: {len(fields)} fields of a particle; 8 or 14 are read"
+                f"{self.name}, line {number}: {len(fields)} fields for a particle; expected 8 or 14"
             )
         return make_table(self.name, header, [f for _, f in self.rows], [k for k, _ in self.rows])
 
@@ -386,7 +386,8 @@ def _plane(table: Table, dimensions: int) -> str:
     if spread[thin] > _FLAT * table.numbers("r").mean():
         raise InputError(
             f"{table.name}: centres do not lie in a plane (x, y, z reach over "
-            f"{', '.join(f'{spread[axis]:.3g}' for axis in 'xyz')}); only a layer is read"
+            f"{', '.join(f'{spread[axis]:.3g}' for axis in 'xyz')}); only a single layer can be "
+            "read"
         )
     return "".join(axis for axis in "xyz" if axis != thin)
 
@@ -450,8 +451,8 @@ def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
             return steps, lost
         if len(fields) not in (6, 8):
             raise InputError(
-                f"{name}, line {number}: N, time and the domain are wanted, and "
-                f"{len(fields)} fields are there; is it a .data of MercuryDPM?"
+                f"{name}, line {number}: expected N, time and the domain, got "
+                f"{len(fields)} fields; is it a .data file of MercuryDPM?"
             )
         head = make_table(name, ("n", "time"), [fields[:2]], [number])
         count, left = head.numbers("n")[0], rows[at + 1 :]

@@ -118,7 +118,7 @@ def listed(
         _check_branches(cell.nearest(branch - nearest), r.max(), place)
     length = np.hypot(*branch.T)
     for c in np.flatnonzero((i == j) | (length == 0)).tolist():
-        raise InputError(f"{place(c)}: {_pair(i, j, c)} join one point; correct the grains")
+        raise InputError(f"{place(c)}: {_pair(i, j, c)} are at the same point; correct the grains")
     contacts = make_contacts(i, j, branch / length[:, None], length, r)
     check_contacts(contacts, r, place)
     return contacts
@@ -143,7 +143,8 @@ def once(
     for c in np.flatnonzero(off > allowed * np.hypot(*force.T).mean())[:1]:
         raise InputError(
             f"{place(second[c])}: {_pair(i, j, second[c])} were given before "
-            f"({place(first[c])}) with another force; give each contact once, or twice alike"
+            f"({place(first[c])}) with another force; give each contact once, or twice with the "
+            "same force"
         )
     return np.delete(np.arange(len(i)), second)
 
@@ -188,8 +189,8 @@ def check_disks(
     extent = max(np.abs(x).max(), box[np.isfinite(box)].max(initial=0.0))
     if extent > EXTENT * largest:
         raise InputError(
-            f"positions or box reach {extent / largest:.2g} largest radii, too far to resolve a "
-            "contact; shift the origin, or check the unit of the radii"
+            f"positions or box extend over {extent / largest:.2g} largest radii, too far to "
+            "resolve a contact; shift the origin, or check the unit of the radii"
         )
     _check_crowding(x, r, cell)
     i, j, gap = overlapping(x, r, cell)
@@ -212,7 +213,7 @@ def _check_branches(misfit: Floats, largest: float, place: Callable[[int], str])
     """InputError if a branch leads to no image; misfit: its remainder without cell vectors."""
     for c in np.flatnonzero(np.hypot(*misfit.T) > MISFIT * largest)[:1]:
         raise InputError(
-            f"{place(c)}: normal and length lead {np.hypot(*misfit[c]):.2g} past the second "
+            f"{place(c)}: normal and length end {np.hypot(*misfit[c]):.2g} away from the second "
             "grain; check positions, box, and that the normal points from i to j"
         )
 

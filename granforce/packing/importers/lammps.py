@@ -208,7 +208,7 @@ def _whole(word: str, name: str, line: int) -> int:
 
 def _item(name: str, items: dict[str, _Item], title: str) -> _Item:
     if title not in items:
-        raise InputError(f"{name}: no 'ITEM: {title}' in the timestep; is the right file given?")
+        raise InputError(f"{name}: no 'ITEM: {title}' in the timestep; is it the right file?")
     return items[title]
 
 
@@ -217,7 +217,7 @@ def _table(name: str, items: dict[str, _Item], title: str) -> Table:
     count = _whole(number.body[0][0] if number.body else "", name, number.line + 1)
     if count != len(item.body):
         raise InputError(
-            f"{name}, line {item.line}: {len(item.body)} rows where {count} are announced; "
+            f"{name}, line {item.line}: {len(item.body)} rows, but {count} are announced; "
             "is the file cut off?"
         )
     if count == 0:
@@ -238,8 +238,8 @@ def box_of(name: str, items: dict[str, _Item]) -> _Box:
     flags = flags[3:] if tilted else flags
     if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
         raise InputError(
-            f"{place}: a box of kind {' '.join(item.words)!r}, which is not read; dump it with its "
-            "first side along x (without triclinic/general)"
+            f"{place}: boxes of kind {' '.join(item.words)!r} are not supported; dump the box with "
+            "its first side along x (without triclinic/general)"
         )
     # The height of the layer does not matter, but its tilts do.
     columns = ["lo", "hi", "tilt"] if tilted else ["lo", "hi"]

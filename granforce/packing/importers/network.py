@@ -52,7 +52,7 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     if np.isfinite(packing.volume):
         virial = float(normal @ packing.contacts.length)
         if virial <= 0:
-            raise InputError(f"the forces pull (Σ f_n ℓ = {virial:.3g}); check their sign")
+            raise InputError(f"the forces are tensile (Σ f_n ℓ = {virial:.3g}); check their sign")
         packing = packing._replace(pressure=virial / (2 * packing.volume))
     elif not packing.load.any():
         packing = packing._replace(load=_left_over(packing))
@@ -268,7 +268,7 @@ def _settled(packing: Packing) -> Packing:
         )
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
-            f"friction: most is left over at grains {named} (counted from 0){walls}"
+            f"friction; the largest unbalance is at grains {named} (counted from 0){walls}"
             f"{_missed(packing)}"
         )
     load = packing.load.copy()

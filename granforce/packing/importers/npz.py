@@ -159,7 +159,7 @@ def _packing(arrays: dict[str, npt.NDArray[Any]]) -> Packing:
             raise InputError(f"array {key} has type {array.dtype}; store plain numbers")
     r = float_array(arrays["r"], (-1,), "r")
     if not len(r):
-        raise InputError("it holds no grains")
+        raise InputError("it has no grains")
     if np.any(r <= 0):
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
     info = _info(arrays)

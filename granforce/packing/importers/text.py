@@ -109,7 +109,7 @@ class Table(NamedTuple):
         values = self.numbers(column)
         for row in np.flatnonzero(~are_whole(values))[:1]:
             raise InputError(
-                f"{self.place(row)}: {column} is {_quoted(self.fields(column)[row])}, and must be "
+                f"{self.place(row)}: {column} is {_quoted(self.fields(column)[row])}, but must be "
                 "a whole number, at least 0; repair or remove the row"
             )
         return values.astype(np.int64)
@@ -121,8 +121,8 @@ class Table(NamedTuple):
             first = rows.setdefault(_label(text), row)
             if first != row:
                 raise InputError(
-                    f"{self.place(row)}: {column} {_quoted(text)} was given in line "
-                    f"{self.lines[first]} already; give each grain once"
+                    f"{self.place(row)}: {column} {_quoted(text)} already appears in line "
+                    f"{self.lines[first]}; give each grain once"
                 )
         return rows
 
@@ -152,7 +152,7 @@ def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: l
     for column, times in Counter(header).items():
         if column and times > 1:
             raise InputError(
-                f"{name}: column {some_of([column])} is there twice; rename or remove one"
+                f"{name}: column {some_of([column])} appears twice; rename or remove one"
             )
     table = Table(name, tuple(header), rows, lines)
     for row, fields in enumerate(rows):
@@ -180,11 +180,11 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
         raise InputError(f"columns must be {{name here: name in the files}}, got {columns!r:.60}")
     here = {theirs.lower(): name for name, theirs in columns.items()}
     if len(here) < len(columns):
-        raise InputError("one column is given two names; give each its own")
+        raise InputError("one column is used for two names; give each its own column")
     header = [one for table in tables for one in table.header]
     for name, theirs in columns.items():
         if name not in names:
-            raise InputError(f"no column is called {name[:40]!r} here: {', '.join(names)}")
+            raise InputError(f"unknown column {name[:40]!r}; choose from {', '.join(names)}")
         if theirs.lower() not in map(str.lower, header):
             raise InputError(f"no column {theirs[:40]!r}; the columns are {some_of(header)}")
 
@@ -215,7 +215,7 @@ def read_columns(text: str, option: str = "--columns") -> dict[str, str]:
 def check_grains(count: int, most: int | None, name: str) -> None:
     """InputError if a file has more grains than allowed (most; None: any number)."""
     if most is not None and count > most:
-        raise InputError(f"{name}: {count} grains, where at most {most} are taken")
+        raise InputError(f"{name}: {count} grains; at most {most} are supported")
 
 
 def read_text(source: Source) -> tuple[str, str]:
@@ -318,7 +318,8 @@ def _unpacked(name: str, content: bytes) -> bytes:
         ) from None
     if len(unpacked) > most:
         raise InputError(
-            f"{name}: unpacks to more than {_RATIO} times its size; unpack it if that is right"
+            f"{name}: unpacks to more than {_RATIO} times its size; unpack it yourself if that is "
+            "expected"
         )
     return unpacked
 
@@ -331,7 +332,7 @@ def _zstd(name: str) -> Any:
         except ImportError:
             continue
     raise InputError(
-        f"{name}: compressed by Zstandard; unpack it by zstd -d, or install backports.zstd"
+        f"{name}: compressed with Zstandard; unpack it with zstd -d, or install backports.zstd"
     )
 
 

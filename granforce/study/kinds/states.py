@@ -66,7 +66,9 @@ def _walk_parameters(
     whether to skip relaxation if S is one point. asked: the conditions.
     """
     if relax not in RELAXATIONS:
-        raise InputError(f"unknown relaxation {brief(relax)}: take one of {', '.join(RELAXATIONS)}")
+        raise InputError(
+            f"unknown relaxation {brief(relax)}; choose one of {', '.join(RELAXATIONS)}"
+        )
     size = _size(packing, states, seed, chains, keep)
     if size["chains"] > size["states"]:
         raise InputError("there must be at least as many states as chains")

@@ -274,7 +274,7 @@ def test_damaged_and_hostile_files_are_one_clear_line(state):
 def test_sizes_are_limited():
     packing = packed(30, 0.3)
     limits = Limits(n=20, upload=1)
-    with pytest.raises(InputError, match="30 grains, where at most 20 are taken"):
+    with pytest.raises(InputError, match="30 grains; at most 20 are supported"):
         uploads.read({"npz": ("p.npz", npz(packing))}, limits=limits)
     with pytest.raises(InputError, match="at most 1 MB"):
         uploads.added({}, [("g.csv", b"x,y,r\n" + b"1,1,1\n" * 200_000)], limits)
