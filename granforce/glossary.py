@@ -223,7 +223,7 @@ TERMS = {
         "They are the same in every network of S: there is nothing to sample.",
     ),
     "dropped": Term(
-        "networks on the way",
+        "networks before the sample",
         "The first networks of a sample still depend on its starting point and are discarded.",
     ),
     "failed": Term(

@@ -115,8 +115,8 @@ def read_limits(text: str | None = None) -> Limits:
         if name not in Limits._fields or not 1 <= int(digits) <= most:
             names = ", ".join(Limits._fields)
             raise InputError(
-                f"{LIMITS_VARIABLE}: {brief(part)} is none of {names} = a whole number from 1 to "
-                f"{most}"
+                f"{LIMITS_VARIABLE}: {brief(part)} is not one of {names} = a whole number from 1 "
+                f"to {most}"
             )
         given[name] = int(value)
     return Limits(**given)

@@ -32,7 +32,7 @@ def summary_html(replay: Replay) -> str:
         text = (
             "Lines are the forces between touching disks: the thicker, the stronger. Balance "
             f"leaves {term('h', f'{free} numbers')} free, so infinitely many sets of forces hold "
-            f"the same disks in place. Play goes through some such {term('network', 'networks')}, "
+            f"the same disks in place. Play shows some of these {term('network', 'networks')}, "
             "sampled at random: alternatives, not moments in time."
         )
     return worded(replay, f"<h2>{found}</h2><p>{text}</p>")
@@ -44,8 +44,8 @@ def rest(replay: Replay) -> str:
     loose = summary.get("rattlers", 0)
     forces, grains = 2 * summary["contacts"], summary["n"] - loose
     free, mu, closed = summary["dimension"], summary["mu"], bool(np.isfinite(replay.box).all())
-    carry = f"{grains} of the {summary['n']} disks carry (pale ones are loose)."
-    carry = carry if loose else f"All {grains} disks carry."
+    carry = f"{grains} of the {summary['n']} disks carry force (the pale ones are loose)."
+    carry = carry if loose else f"All {grains} disks carry force."
     if mu == 0:
         why = (
             f"{carry} Without friction each of the {summary['contacts']} contacts carries one "
@@ -92,7 +92,7 @@ def _dependent(count: int) -> str:
     """The number of equations that follow from the others, in words."""
     if count < 1:
         return ""
-    return f" (less {count} that follow from the others, as each force acts on two disks)"
+    return f" (minus {count} that follow from the others, because each force acts on two disks)"
 
 
 def more(replay: Replay) -> str:

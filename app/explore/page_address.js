@@ -5,7 +5,7 @@ import { ask } from "../browser/send.js"
 import { goneBanner } from "../browser/connection_lost.js"
 
 export function render({ model, view }) {
-  const banner = goneBanner(view, "What is in the page still plays.")
+  const banner = goneBanner(view, "Everything already loaded still plays.")
   let asked = model.settled // number of Back and Forward requests
   const waits = () => asked > model.settled // until then the address is ahead of the view
 

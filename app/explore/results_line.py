@@ -66,7 +66,7 @@ class Results(Scripted):
 
 def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume."""
-    known = " under what is held" if state.knowledge.known else ""
+    known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
     seen = f"seen in {state.replay.summary['states']} networks"
@@ -111,7 +111,7 @@ LEFT_OUT = {
     "tangential_unknowns": ("no_friction", "force", " along contacts"),
     "skipped": ("determined", "network", " identical to the others"),
     "held": ("held_components", "force", " that cannot vary"),
-    "dropped": ("dropped", "network", " on the way to the sample"),
+    "dropped": ("dropped", "network", " before the sample"),
 }
 
 

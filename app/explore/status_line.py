@@ -80,7 +80,7 @@ def facts(state: AppState) -> Iterator[str]:
         yield "opening the packing …"
         return
     if state.missing:
-        yield f"<b>Of μ = {cell.mu:g}, {cell.series}, while others are asked for</b>"
+        yield f"<b>Still showing μ = {cell.mu:g}, {cell.series}: the requested results follow</b>"
     yield bounds(state)
     yield str(result_values.sampling(state))
 

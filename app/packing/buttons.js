@@ -39,7 +39,7 @@ const BUTTONS = `
     <div class="bar tools">
       ${button("undo", "the last pull (Z); Esc releases all", "Undo")}
       <span class="knowing">
-        ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
+        ${button("hold", "hold the selected contact at its present force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
           <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
       </span>

@@ -4,7 +4,7 @@ import { button, made } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
 const OUTSIDE = (last) => `Networks have the numbers 1 to ${last}; 0 is the network as packed.`
-const NEAREST = (asked, found) => `Network ${asked} is not stored; ${found} is the nearest that is.`
+const NEAREST = (asked, found) => `Network ${asked} is not stored; showing ${found}, the nearest stored one.`
 
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 
@@ -31,7 +31,7 @@ export class PlayerBar {
     this.stored = made("span", { className: "stored" })
     this.keep = button("Keep all", () => actions.keep(), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
-    const along = made("label", { className: "at" }), speed = made("label", { title: "how many networks pass in a second" })
+    const along = made("label", { className: "at" }), speed = made("label", { title: "networks per second" })
     const more = made("span", { className: "more" })
     along.append("network ", this.number)
     speed.append(this.speedInput, this.rate)

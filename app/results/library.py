@@ -251,8 +251,8 @@ def readable(store: Store, name: str) -> Iterator[xr.Dataset]:
 
 def _damage(store: Store, name: str) -> InputError:
     if not (store.path / name).exists():
-        return InputError(f"entry {name} in {store.path} was removed meanwhile; compute it anew")
-    return InputError(f"entry {name} in {store.path} is damaged; compute it anew, or remove it")
+        return InputError(f"entry {name} in {store.path} has been removed; compute it again")
+    return InputError(f"entry {name} in {store.path} is damaged; compute it again, or remove it")
 
 
 def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:

@@ -181,28 +181,28 @@ def account(report: dict[str, Any]) -> Iterator[str]:
     """Findings, repairs and open questions as sentences with numbers."""
     count = report.get
     if "names" in report:
-        yield f"Beware: {report['names']}."
+        yield f"Warning: {report['names']}."
     if "flags_ignored" in report:
         yield (
-            f"Beware: {report['flags_ignored']} disks are flagged as touching a wall, which is "
+            f"Warning: {report['flags_ignored']} disks are flagged as touching a wall, which is "
             "implausibly many. The flags are ignored; disks at the boundary of the frame count "
             "as those at walls."
         )
     yield (
-        f"Listed are {count('contacts_listed')} contacts of {count('grains')} disks. "
+        f"The files list {count('contacts_listed')} contacts of {count('grains')} disks. "
         f"{_walls(report)}"
     )
     mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
               if spoils and report[kind]]  # fmt: skip
     if mended:
-        yield f"Mended, and marked by crosses: {'; '.join(mended)}."
+        yield f"Repaired, and marked with crosses: {'; '.join(mended)}."
     for key, words in DOUBTS:
         if report[key]:
             yield f"{report[key]} {words}"
     if report["unbalance_saved_if_tangential_forces_were_reversed"] > REVERSED:
         yield (
-            "With the other sign for all tangential forces, disks would be closer to balance. "
-            "Programs differ in this sign; try the switch."
+            "Disks would be closer to balance if all tangential forces had the opposite sign. "
+            "Programs differ in this sign; try “Tangential forces reversed”."
         )
     yield (
         "On the listed contacts alone, no admissible forces balance "
@@ -247,6 +247,6 @@ def _left(report: dict[str, Any]) -> str:
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
         f"With them {len(names)} inner disks still cannot be balanced; the remaining unbalance is "
-        f"{report['unbalance']:.2g} ⟨mₙ⟩ in sum: their balance was left open (disks "
+        f"{report['unbalance']:.2g} ⟨mₙ⟩ in total. Their balance is not required (disks "
         f"{', '.join(map(str, names[:NAMED]))}{more})."
     )

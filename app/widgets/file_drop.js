@@ -19,7 +19,7 @@ export function render({ model, view }) {
   async function send(files) {
     const chosen = [...files], size = chosen.reduce((sum, file) => sum + file.size, 0)
     if (!chosen.length) return
-    if (size > model.most) return tell(`${(size / 1e6).toFixed(1)} MB are too many; at most ${model.most / 1e6} MB`)
+    if (size > model.most) return tell(`these files have ${(size / 1e6).toFixed(1)} MB; at most ${model.most / 1e6} MB`)
     let sent = 0
     ask(model, view, { begin: true })
     for (const file of chosen) {

@@ -617,9 +617,9 @@ def test_a_link_keeps_what_single_tabs_show(state, visited):
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
     line = StatusLine(state)
-    assert "random walk" in line.facts[-1] and "while others" not in line.facts[0]
+    assert "random walk" in line.facts[-1] and "Still showing" not in line.facts[0]
     state.param.update(missing=True)
-    assert f"Of μ = {state.cell.mu:g}" in line.facts[0]
+    assert f"Still showing μ = {state.cell.mu:g}" in line.facts[0]
 
 
 def test_the_status_line_says_what_is_certified_and_what_failed(state):
@@ -1135,7 +1135,7 @@ def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(shipped, tmp_pat
     assert state.cell is not None and state.cell.mu != 0.1
     assert [cell.mu for cell in state.catalogue] == [0, 1]
     if array == "*":
-        with pytest.raises(InputError, match=r"damaged; compute it anew"):
+        with pytest.raises(InputError, match=r"damaged; compute it again"):
             distributions.rows([best])
     gc.collect()
     assert not [told for told in caplog.records if told.name == "asyncio"]

@@ -149,7 +149,7 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     page.keyboard.press("n")
     page.locator("input.error").fill("-1")
     page.locator("button.hold").click()
-    page.locator(".said").get_by_text("An error bar is a number from 0 on").wait_for()
+    page.locator(".said").get_by_text("Enter an error bar of 0 or more").wait_for()
     assert "hold=" not in page.url
     page.locator("input.error").fill("0.1")
     page.locator("button.hold").click()
@@ -338,7 +338,7 @@ def test_ticks_of_friction_stand_apart(lasting):
 
 def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page = visit("?tab=perturb&contact=5")
-    page.get_by_role("button", name="Let the push grow").click()
+    page.get_by_role("button", name="increase the push").click()
     page.get_by_text("contacts open,").first.wait_for()
     page.get_by_role("tab", name="Friction").click()
     page.get_by_text("Forces are least determined at").wait_for()

@@ -60,7 +60,7 @@ def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
     (note,) = found.report["notes"]
     assert f"{N} of {N} grains are flagged" in note and "\n" not in note
     assert found.report["flags_ignored"] == N
-    assert f"Beware: {N} disks are flagged" in " ".join(account(found.report))
+    assert f"Warning: {N} disks are flagged" in " ".join(account(found.report))
     same(found, read(with_flag(grains, flag), rows, flag="ignore"))
     assert "notes" not in read(grains, rows, flag="ignore").report
     with pytest.raises(InputError, match="flag"):

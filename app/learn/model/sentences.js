@@ -103,7 +103,7 @@ export function special({ scene }) {
 /** The meaning of the picture of S. */
 export function pictured(body, { filled: dotted }) {
   const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
-  if (scene.idle) return "S: not before something presses"
+  if (scene.idle) return "S: nothing presses yet"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
   return h > 3 ? `shadow (projection) of S onto two of the forces${body.most ? `; S has no end: drawn where no normal force is above ${number(body.most)}` : ""}${dotted ? "; dots: random points, rarely near its edge" : ""}`

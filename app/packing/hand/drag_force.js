@@ -248,8 +248,8 @@ export class Grab {
     let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)}${possible} × the mean force`
     if (rail && end) {
       const { opened, sliding } = this.holding
-      words += `, its ${end > 0 ? "largest" : "least"}: held there by ${opened.length} contacts that opened ` +
-        `and ${sliding.length} that came to slide`
+      words += `, its ${end > 0 ? "largest" : "smallest"} value: it stops because ${opened.length} contacts opened ` +
+        `and ${sliding.length} began to slide`
     } else words += "; orange carries more than before, blue less"
     this.player.say(words)
   }

@@ -181,4 +181,4 @@ def test_limits_that_cannot_be_read_keep_the_server_from_starting(tmp_path, opti
         with serve(tmp_path, *options, GRANFORCE_LIMITS="disks=4") as _:
             pass
     (line,) = (tmp_path / "log").read_text().splitlines()
-    assert line.startswith("GRANFORCE_LIMITS: 'disks=4' is none of n, states, upload")
+    assert line.startswith("GRANFORCE_LIMITS: 'disks=4' is not one of n, states, upload")

@@ -38,7 +38,7 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
     assert "every 20th of 60 is stored" in words and "20 networks/s" in words
     assert kept == [True, False]
     assert reached[0] == ["41", 3, ""] and reached[2] == ["0", 0, ""]
-    assert reached[1] == ["21", 2, "Network 12 is not stored; 21 is the nearest that is."]
+    assert reached[1] == ["21", 2, "Network 12 is not stored; showing 21, the nearest stored one."]
     assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
 
 

@@ -128,7 +128,7 @@ def test_friction_by_night_on_a_narrow_screen(visit):
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = scene(page, "scene.offset")
-    page.get_by_role("button", name="Let the push grow").click()
+    page.get_by_role("button", name="increase the push").click()
     page.get_by_text("contacts open,").first.wait_for()
     assert before is None
     until(page, "Math.abs(scene.offset?.amplitude) > 0.001")

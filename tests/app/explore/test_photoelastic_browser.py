@@ -31,7 +31,7 @@ def dropped(page, tmp_path, numbers=NUMBERS):
     page.locator("input[type=file]").set_input_files(
         [tmp_path / "positions.txt", tmp_path / "adjacency.txt"]
     )
-    page.get_by_text("Listed are").wait_for()
+    page.get_by_text("The files list").wait_for()
     laid_out(page, "photoelastic_network")
 
 

@@ -230,7 +230,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(page):
 def test_at_the_end_of_the_rail_the_page_says_why(page):
     contact, _ = pulled(page, up=600)
     until(page, "scene.hand.end === 1")
-    page.get_by_text("held there by").wait_for()
+    page.get_by_text("it stops because").wait_for()
     until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
     assert normal(page)[contact] == pytest.approx(scene(page, "scene.hand.rail.upper"), abs=1e-4)
     picture(page, "live/end")

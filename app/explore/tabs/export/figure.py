@@ -14,7 +14,7 @@ TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
 WIDTH_MM = 170  # width of two columns
 HELP = """
-As on screen, as vector graphics. From 120 mm on, the plots are next to the packing.
+As on screen, as vector graphics. At 120 mm or more, the plots are next to the packing.
 """
 
 

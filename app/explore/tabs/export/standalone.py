@@ -113,7 +113,7 @@ def html(
         script=script,
         command=escape(command),
         link=escape(link),
-        left_out=f"{left} of the networks are left out, evenly, to keep this file small."
+        left_out=f"{left} networks, evenly spaced, are left out to keep this file small."
         if left
         else "",
         style=_script("".join(Player._stylesheets)),

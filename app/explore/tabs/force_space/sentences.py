@@ -17,14 +17,14 @@ MOSTLY = 0.75  # fraction of the dots in the inner half above which they are des
 CROWDED = ": to move far out, many forces have to change together, which is unlikely by chance"
 HEADING = "<b>Every network, and the one on screen.</b> "
 HELP = (
-    "Click a line in the packing to make it the green one. Shown is the shadow "
-    f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: the "
-    f"shaded {term('outline')} holds all of it."
+    "Click a line in the packing to make it the green one. The plot shows the shadow "
+    f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: "
+    f"all of S lies inside the shaded {term('outline')}."
 )
 COMPUTED = (
-    " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} of the mean force. Halfway is the outline shrunk "
-    "to half its lengths about its middle."
+    " The outline is exact to {found.gap:.1g} of the mean force ({found.programs} linear programs, "
+    "one for each direction, in {found.seconds:.1f} s). Halfway means the outline shrunk "
+    "to half its size about its centre."
 )
 
 

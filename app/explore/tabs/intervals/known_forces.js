@@ -14,7 +14,7 @@ export function render({ model, view }) {
 
   function chip([contact, text]) {
     const it = made("span", { className: "chip" })
-    const look = { className: "release", title: "let it go", ariaLabel: `let go: ${text}` }
+    const look = { className: "release", title: "release it", ariaLabel: `release: ${text}` }
     it.append(
       button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),
       button("×", () => tell({ release: contact }), look),

@@ -34,7 +34,7 @@ export function render({ model, view }) {
     const rows = model.rows.map(plain), all = rows.reduce((sum, { megabytes }) => sum + megabytes, 0)
     told.textContent = rows.length
       ? `${rows.length} computed here, ${size(all)} with their packings. They stay until you delete them.`
-      : "Nothing yet: another friction, number of disks or seed is computed and kept here."
+      : "Nothing yet. Results for another friction, number of disks or seed are computed and kept here."
     body.replaceChildren(...rows.map(line))
   }
 
