@@ -47,7 +47,7 @@ _HOME = {
     "Rest": "motion.rest",
     "walk": "explore.random_walk",
     "Walk": "explore.random_walk",
-    "Found": "explore.random_walk",
+    "WalkState": "explore.random_walk",
     "sample_uniform": "explore.uniform",
     "UniformSample": "explore.uniform",
     "Mixing": "explore.mixing",

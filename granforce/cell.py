@@ -87,18 +87,18 @@ class Cell(NamedTuple):
 
     def wrapped(self, x: npt.ArrayLike) -> Floats:
         """Points (…, 2) at their image in the parallelogram, unchanged in open directions."""
-        found = np.array(x, dtype=np.float64)
-        lean = np.zeros(found.shape[:-1])
+        inside = np.array(x, dtype=np.float64)
+        lean = np.zeros(inside.shape[:-1])
         if np.isfinite(self.box[1]):
-            up = _remainder(found[..., 1], self.box[1])
+            up = _remainder(inside[..., 1], self.box[1])
             if self.tilt:
-                crossed = np.round((found[..., 1] - up) / self.box[1])
-                found[..., 0] -= crossed * self.tilt
+                crossed = np.round((inside[..., 1] - up) / self.box[1])
+                inside[..., 0] -= crossed * self.tilt
                 lean = self.tilt * (up / self.box[1])
-            found[..., 1] = up
+            inside[..., 1] = up
         if np.isfinite(self.box[0]):
-            found[..., 0] = _remainder(found[..., 0] - lean, self.box[0]) + lean
-        return found
+            inside[..., 0] = _remainder(inside[..., 0] - lean, self.box[0]) + lean
+        return inside
 
     def nearest(self, branch: npt.ArrayLike) -> Floats:
         """The shortest image (…, 2) of vectors between two points."""

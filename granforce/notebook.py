@@ -44,8 +44,8 @@ def brief(record: type[T]) -> type[T]:
         getattr(record, name).__doc__ = comments[name]
     if fields is not None:  # some may be inherited
         comments = {name: getattr(record, name).__doc__ for name in fields}
-    told = (f"    {name}: {comments[name]}" for name in fields or record.__annotations__)
-    record.__doc__ = "\n".join([(record.__doc__ or "").rstrip(), "", *told])
+    described = (f"    {name}: {comments[name]}" for name in fields or record.__annotations__)
+    record.__doc__ = "\n".join([(record.__doc__ or "").rstrip(), "", *described])
     return record
 
 
@@ -65,8 +65,8 @@ def _comments(record: type) -> dict[str, str]:
             above.append(line.strip("# \n"))
             continue
         if field := _FIELD.fullmatch(line):
-            name, kind, beside = field.groups()
-            comments[name] = " ".join([*above, beside] if beside else above) or kind.strip()
+            name, kind, comment = field.groups()
+            comments[name] = " ".join([*above, comment] if comment else above) or kind.strip()
         above = []
     return comments
 

@@ -211,7 +211,7 @@ class Relaxation(NamedTuple):
 
 
 # The call that makes an argument of a function.
-_MADE_BY = {
+_MAKERS = {
     "CriticalForce": "critical = gf.critical_force(S, contact)",
     "Ensemble": "S = gf.ensemble(packing)",
     "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
@@ -258,7 +258,7 @@ def _check_kind(function: str, given: Any, kind: type) -> None:
     raise InputError(
         f"{function} takes a record of type {kind.__name__}, not "
         f"{brief(given) if plain else type(given).__name__}; make one first: "
-        f"{_MADE_BY[kind.__name__]}"
+        f"{_MAKERS[kind.__name__]}"
     )
 
 
@@ -491,18 +491,20 @@ def make_contacts_at(
     Raises InputError as `make_contacts`, and for normals that point away from body j.
     """
     x = float_array(x, (-1, 2), "centres of mass")
-    made = make_contacts(i, j, normal, np.ones(np.shape(i)), np.ones(len(x)))
-    point = float_array(point, made.normal.shape, "points of contact")
-    gap = np.zeros(len(point)) if gap is None else float_array(gap, made.i.shape, "gaps")
-    from_i, from_j = point - x[made.i], point - x[made.j]
-    arms = [np.sum(from_i * made.normal, axis=1), -np.sum(from_j * made.normal, axis=1)]
+    contacts = make_contacts(i, j, normal, np.ones(np.shape(i)), np.ones(len(x)))
+    point = float_array(point, contacts.normal.shape, "points of contact")
+    gap = np.zeros(len(point)) if gap is None else float_array(gap, contacts.i.shape, "gaps")
+    from_i, from_j = point - x[contacts.i], point - x[contacts.j]
+    arms = [np.sum(from_i * contacts.normal, axis=1), -np.sum(from_j * contacts.normal, axis=1)]
     length = arms[0] + arms[1]
     for c in np.flatnonzero(length <= 0)[:1]:
         raise InputError(
-            f"the normal of contact {c} points away from body {made.j[c]}: give it from i to j"
+            f"the normal of contact {c} points away from body {contacts.j[c]}: give it from i to j"
         )
-    levers = np.stack([np.sum(part * made.tangent, axis=1) for part in (from_i, from_j)], axis=1)
-    return made._replace(length=length, gap=gap, arm_i=arms[0], arm_j=arms[1], levers=levers)
+    levers = np.stack(
+        [np.sum(part * contacts.tangent, axis=1) for part in (from_i, from_j)], axis=1
+    )
+    return contacts._replace(length=length, gap=gap, arm_i=arms[0], arm_j=arms[1], levers=levers)
 
 
 def refuse_shapes(packing: Packing, what: str) -> None:
@@ -644,7 +646,7 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
     place = np.where(contacts.i > contacts.j, -contacts.offsets[:, 1], contacts.offsets[:, 0])
     order = np.lexsort((high, low))
-    found: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for apart in range(1, min(len(order), 9)):
         a, b = order[:-apart], order[apart:]
         same = (low[a] == low[b]) & (high[a] == high[b])
@@ -653,5 +655,5 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
         same &= np.abs(place[a] - place[b]) <= TOUCHING * contacts.length[a]
         alike = np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75))
         for first in alike[np.argsort(b[alike])][:1]:
-            found.append((int(a[first]), int(b[first])))
-    return min(found, key=lambda pair: pair[::-1], default=None)
+            pairs.append((int(a[first]), int(b[first])))
+    return min(pairs, key=lambda pair: pair[::-1], default=None)

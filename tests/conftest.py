@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from granforce.system.compiled import are_kept
+from granforce.system.compiled import are_cached
 
 # The same examples in every run, as all other random numbers here, however long a busy machine
 # takes; HYPOTHESIS_PROFILE=default looks for new ones.
@@ -25,7 +25,7 @@ KERNELS = (
 def pytest_configure(config):
     """Kernels are compiled once, before several workers would compile all of them each."""
     is_worker, count = hasattr(config, "workerinput"), config.getoption("numprocesses", 0)
-    if is_worker or not count or config.option.collectonly or are_kept("flow.until_one_ends"):
+    if is_worker or not count or config.option.collectonly or are_cached("flow.until_one_ends"):
         return
     begin = "from packings import reference\nfrom granforce.study.scan import kinds, warm_up\n"
     paths = os.pathsep.join(str(config.rootpath / folder) for folder in (".", "tests/shared"))

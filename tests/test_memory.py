@@ -102,7 +102,7 @@ def evolved(S, folder):
 
 def measured(S):
     m, states = gf.measures, S.original * np.linspace(0.9, 1.1, 5)[:, None, None]
-    low, high = m.intervals_seen(states)
+    low, high = m.sampled_intervals(states)
     return m.eta1(states), m.eta2(states), m.eta3(low, high), m.distances(states, S.original)
 
 

@@ -117,7 +117,7 @@ def without_scale():
         (without_scale, InputError, "all forces are zero"),
         (lambda: measures.eta1(np.empty((0, 3, 2))), InputError, "nothing to measure"),
         (lambda: measures.eta2(np.empty((4, 0, 2))), InputError, "nothing to measure"),
-        (lambda: measures.intervals_seen(np.empty((0, 3, 2))), InputError, "nothing to measure"),
+        (lambda: measures.sampled_intervals(np.empty((0, 3, 2))), InputError, "nothing to measure"),
     ],
 )
 def test_nothing_to_explore_is_told_in_one_line(make, error, what):

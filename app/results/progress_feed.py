@@ -126,7 +126,7 @@ class Walking:
         self.run += 1
 
     def add(self, found: Any) -> None:
-        """Record a Found state, or only some if not all can be sent."""
+        """Record a WalkState, or only some if not all can be sent."""
         assert self.replay is not None  # set by `restart`
         state = found.forces / self.replay.force_scale
         grown = self._growth.add(state)

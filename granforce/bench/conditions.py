@@ -70,44 +70,44 @@ def _known(S: Ensemble, rng: np.random.Generator) -> Known:
     """Normal forces of some contacts, within a tenth of the packing's own."""
     count = max(1, round(KNOWN_PART * len(S.index)))
     places = np.sort(rng.choice(len(S.index), count, replace=False))
-    own = S.original[places]
-    reach = np.full_like(own, np.inf)
-    reach[:, 0] = KNOWN_WITHIN * own[:, 0]
-    return Known(S.index[places], own - reach, own + reach)
+    forces = S.original[places]
+    reach = np.full_like(forces, np.inf)
+    reach[:, 0] = KNOWN_WITHIN * forces[:, 0]
+    return Known(S.index[places], forces - reach, forces + reach)
 
 
 def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     note(f"knowledge: {task}")
     intervals(S, contacts[:1])  # compiles
     S = replace(S)  # without prepared data
-    ours, found = timed(intervals, S, contacts)
-    theirs, bounds = timed(plain_loop, S, contacts)
+    seconds, exact = timed(intervals, S, contacts)
+    loop_seconds, bounds = timed(plain_loop, S, contacts)
     # The optimum is between the value attained and its bound.
-    beyond = np.abs([bounds[0] - found.low, bounds[1] - found.high]) / S.force_scale
-    outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
-    common = {"task": task, "programs": found.low.size + found.high.size}
+    beyond = np.abs([bounds[0] - exact.low, bounds[1] - exact.high]) / S.force_scale
+    outside = np.maximum(beyond - np.moveaxis(exact.gap, -1, 0), 0.0)
+    common = {"task": task, "programs": exact.low.size + exact.high.size}
     return [
-        common | _times("granforce", ours, theirs) | {"gap": found.max_gap},
-        common | _times("HiGHS", theirs, theirs) | {"off": float(outside.max())},
+        common | _times("granforce", seconds, loop_seconds) | {"gap": exact.max_gap},
+        common | _times("HiGHS", loop_seconds, loop_seconds) | {"off": float(outside.max())},
     ]
 
 
 def _pulls(S: Ensemble, contacts: Integers, repeats: int) -> list[dict[str, Any]]:
     note("knowledge: pulls")
-    found = intervals(S, contacts)
-    ends = zip(contacts, found.low[:, 0], found.high[:, 0], strict=True)
+    exact = intervals(S, contacts)
+    ends = zip(contacts, exact.low[:, 0], exact.high[:, 0], strict=True)
     targets = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
 
-    def ours() -> Floats:
+    def by_granforce() -> Floats:
         return np.concatenate([pull(S, c, values, S.original).states for c, values in targets])
 
-    def theirs() -> Floats:
+    def by_piqp() -> Floats:
         return np.array([_pulled_by_piqp(S, c, v) for c, values in targets for v in values])
 
     def squares(states: Floats) -> Floats:
         return np.sum((states - S.original) ** 2, axis=(1, 2))
 
-    return _beside("pulls", S, ours, theirs, squares, repeats)
+    return _beside("pulls", S, by_granforce, by_piqp, squares, repeats)
 
 
 def _pulled_by_piqp(S: Ensemble, contact: int, value: float) -> Floats:
@@ -134,36 +134,36 @@ def _inferences(
     truth = sample_uniform(S, 8, seed=seed).flat[-1]
     m = truth + sigma * rng.standard_normal(truth.shape)
 
-    def ours() -> Floats:
+    def by_granforce() -> Floats:
         return contact_program(S, m, sigma)[None]
 
-    def theirs() -> Floats:
+    def by_piqp() -> Floats:
         return piqp(S, m, sigma)[None]
 
     def squares(states: Floats) -> Floats:
         return np.sum(((states - m) / sigma) ** 2, axis=(1, 2))
 
-    return _beside("inference, everything measured", S, ours, theirs, squares, repeats)
+    return _beside("inference, everything measured", S, by_granforce, by_piqp, squares, repeats)
 
 
 def _beside(
     task: str,
     S: Ensemble,
-    ours: Callable[[], Floats],
-    theirs: Callable[[], Floats],
+    by_granforce: Callable[[], Floats],
+    by_piqp: Callable[[], Floats],
     squares: Callable[[Floats], Floats],
     repeats: int,
 ) -> list[dict[str, Any]]:
     """Rows for two ways to compute the same networks, after one run that compiles."""
-    ours()
-    taken, found = zip(*(timed(ours) for _ in range(repeats)), strict=True)
-    taken_by, beside = zip(*(timed(theirs) for _ in range(repeats)), strict=True)
-    off = float(np.abs(found[0] - beside[0]).max() / S.force_scale)
-    reached = np.array([squares(found[0]), squares(beside[0])])
+    by_granforce()
+    taken, results = zip(*(timed(by_granforce) for _ in range(repeats)), strict=True)
+    taken_by, reference = zip(*(timed(by_piqp) for _ in range(repeats)), strict=True)
+    off = float(np.abs(results[0] - reference[0]).max() / S.force_scale)
+    reached = np.array([squares(results[0]), squares(reference[0])])
     above = np.max(reached / reached.min(axis=0) - 1, axis=1)
     rows = []
     for k, (name, times, forces) in enumerate(
-        (("granforce", taken, found[0]), ("PIQP", taken_by, beside[0]))
+        (("granforce", taken, results[0]), ("PIQP", taken_by, reference[0]))
     ):
         row = {"task": task, "programs": len(forces), **_times(name, min(times), min(taken_by))}
         errors = {"off": off, "residual": float(np.max(S.residual(forces)))}

@@ -83,8 +83,8 @@ def cobra_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
         for g in np.flatnonzero(row):
             generators[g].add_metabolites({links[k]: float(row[g])})
     model.add_reactions(forces)
-    found = flux_variability_analysis(model, forces, fraction_of_optimum=0.0, processes=1)
-    value = np.stack([found["minimum"].to_numpy(), found["maximum"].to_numpy()])
+    ranges = flux_variability_analysis(model, forces, fraction_of_optimum=0.0, processes=1)
+    value = np.stack([ranges["minimum"].to_numpy(), ranges["maximum"].to_numpy()])
     return tuple(ensemble.to_forces(value * ensemble.force_scale))
 
 
@@ -94,7 +94,7 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
     quick: only the 100-disk files; otherwise 400 disks at μ = 0.1 as well (two minutes).
     """
     names = ["n100_mu0.1_s11", "n100_mu1_s12"] + ([] if quick else ["n400_mu0.1_s13"])
-    found: list[dict[str, Any]] = []
+    table: list[dict[str, Any]] = []
     for name in names:
         system, data = read_reference(Path(folder) / f"{name}.npz")
         intervals(system, system.index[:1])  # compiles
@@ -108,14 +108,14 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
         plain = rows["plain loop"]["seconds"]
         for method, row in rows.items():
             timing = {"packing": name, "method": method, "seconds": row["seconds"]}
-            found.append(timing | {"ratio": plain / row["seconds"]} | row)
-    return found
+            table.append(timing | {"ratio": plain / row["seconds"]} | row)
+    return table
 
 
 def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
-    seconds, found = timed(intervals, system, workers=workers)
-    error = _error(system, data, found.low, found.high)
-    return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": str(found.counts)}
+    seconds, exact = timed(intervals, system, workers=workers)
+    error = _error(system, data, exact.low, exact.high)
+    return {"seconds": seconds, "error": error, "gap": exact.max_gap, "counts": str(exact.counts)}
 
 
 def _timed(method: Callable[..., Any], system: Ensemble, data: Any) -> dict[str, Any]:

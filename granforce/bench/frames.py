@@ -49,11 +49,11 @@ def frames(
     rows = []
     for sigma, missed, wrong in cases:
         seeds = range(1, packings + 1)
-        found = [_one(pack(n, mu, seed), sigma, missed, wrong, seed) for seed in seeds]
+        samples = [_one(pack(n, mu, seed), sigma, missed, wrong, seed) for seed in seeds]
         note(f"frames: σ = {sigma:g}, missed {missed:g}, μ × {wrong:g}")
         row: dict[str, Any] = {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong}
-        for name in found[0]:
-            values = np.array([one[name] for one in found], dtype=float)
+        for name in samples[0]:
+            values = np.array([one[name] for one in samples], dtype=float)
             row[name] = float(np.nanmean(values)) if np.isfinite(values).any() else None
         rows.append(row)
     return rows
@@ -67,15 +67,15 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
         "error": sigma * frame.unit,
         "repair": 0.5,
     }
-    found = read_pegs(frame, **options)
-    S, unit = ensemble(found.packing), frame.unit
-    m, s = found.measured[S.index], found.sigma[S.index]
+    photo = read_pegs(frame, **options)
+    S, unit = ensemble(photo.packing), frame.unit
+    m, s = photo.measured[S.index], photo.sigma[S.index]
     # The spread of two sides is part of the noise: only the true σ counts; contacts with walls have
     # one side.
-    sides = np.where(S.contacts.j < len(found.ids) - len(found.walls), 2.0, 1.0)[:, None]
+    sides = np.where(S.contacts.j < len(photo.ids) - len(photo.walls), 2.0, 1.0)[:, None]
     s = np.where(np.isfinite(m), sigma * unit / np.sqrt(sides), np.nan)
     drawn = remeasured(S, m, s, states=STATES, seed=seed, unmeasured=2.0)
-    true = frame.truth(found)[S.index]
+    true = frame.truth(photo)[S.index]
     inner, listed = np.isfinite(true[:, 0]), np.isfinite(m[:, 0])
     here = inner & listed
     mean = drawn.drawn.flat.mean(axis=0)

@@ -112,12 +112,12 @@ def starts(
         worst = 0.0
         for turn in range(repeats + 1):
             given = kicked(S, 2 * LANES, turn)
-            found = {}
+            networks = {}
             for name, way in ways.items():
                 seconds, reached = timed(way, given)
-                found[name] = np.stack([one.forces for one in reached])
+                networks[name] = np.stack([one.forces for one in reached])
                 spent[name].append(seconds / len(given))
-            worst = max(worst, *(np.abs(one - found["PIQP"]).max() for one in found.values()))
+            worst = max(worst, *(np.abs(one - networks["PIQP"]).max() for one in networks.values()))
         piqp = np.median(spent["PIQP"][1:])
         for name in ways:
             each = float(np.median(spent[name][1:]))  # the first run compiles
@@ -153,17 +153,17 @@ def pushes(
                 S, which, limit_loads=given
             ),
         }
-        seconds, found = {}, {}
+        seconds, results = {}, {}
         for name, way in ways.items():
             way(some[:3], loads[:3])  # compiles
-            seconds[name], found[name] = timed(way, some, loads, clock=time.process_time)
-        alone, beside = ([one.low for one in each] for each in found.values())
+            seconds[name], results[name] = timed(way, some, loads, clock=time.process_time)
+        alone, in_lanes = ([one.low for one in each] for each in results.values())
         for name in ways:
-            systems = sum(one.counts["linear_systems"] for one in found[name])
+            systems = sum(one.counts["linear_systems"] for one in results[name])
             row = {"n": n, "mu": mu, "way": name, "seconds_per_contact": seconds[name] / len(some)}
             row |= {"ms_per_system": 1e3 * seconds[name] / systems}
             row |= {"ratio": seconds["one at a time"] / seconds[name]}
-            rows.append(row | {"differ": float(np.abs(np.subtract(alone, beside)).max())})
+            rows.append(row | {"differ": float(np.abs(np.subtract(alone, in_lanes)).max())})
     return rows
 
 
@@ -181,9 +181,9 @@ def growth(
         start = kicked(S, 1, 0)[0]
         nearest(S, start, max_iterations=1)
         row["relaxation"] = nearest(S, start).seconds
-        seconds, found = timed(intervals, S, S.index[:LANES])
-        row["bound"] = seconds / found.counts["programs"]
-        row["max_gap"] = found.max_gap
+        seconds, exact = timed(intervals, S, S.index[:LANES])
+        row["bound"] = seconds / exact.counts["programs"]
+        row["max_gap"] = exact.max_gap
         row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
         rows.append(row)
     names = ("setup", "relaxation", "bound")

@@ -70,20 +70,20 @@ def compaction_growth(
     return [*rows, {"n": "fit", "mu": mu, "exponent": exponent(jammed)}]
 
 
-def _keys(kept: Sequence[dict[str, float]]) -> Iterable[str]:
-    return kept[0] if kept else ()
+def _keys(jammed: Sequence[dict[str, float]]) -> Iterable[str]:
+    return jammed[0] if jammed else ()
 
 
 def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
     settings = "".join(f", {name} {value:g}" for name, value in options.items())
     note(f"compaction: N = {n}, μ = {mu:g}{settings}")
-    made = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
-    kept = [one for one in made if one]
-    row = {"n": n, "mu": mu, "seeds": seeds, "failed": len(made) - len(kept)}
-    for key in _keys(kept):
-        row[key] = float(np.mean([one[key] for one in kept]))
-    if kept:
-        row["slowest"] = max(one["seconds"] for one in kept)
+    packings = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
+    jammed = [one for one in packings if one]
+    row = {"n": n, "mu": mu, "seeds": seeds, "failed": len(packings) - len(jammed)}
+    for key in _keys(jammed):
+        row[key] = float(np.mean([one[key] for one in jammed]))
+    if jammed:
+        row["slowest"] = max(one["seconds"] for one in jammed)
     return row
 
 

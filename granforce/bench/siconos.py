@@ -56,18 +56,18 @@ def against_siconos(S: Ensemble, start: Floats, tolerance: float) -> dict[str, A
         return None
     note(f"Siconos to {tolerance:g}")
     start = start / S.force_scale
-    theirs = [_siconos(python, S, start, tolerance) for _ in range(REPEATS)]
-    sweeps = int(theirs[0]["sweeps"])
-    ours = [_ours(S, start, sweeps) for _ in range(REPEATS)]
+    siconos_runs = [_siconos(python, S, start, tolerance) for _ in range(REPEATS)]
+    sweeps = int(siconos_runs[0]["sweeps"])
+    runs = [_ours(S, start, sweeps) for _ in range(REPEATS)]
     updates = sweeps * len(S.index)
-    seconds = [float(np.median([float(one["seconds"]) for one in theirs]))]
-    seconds.append(float(np.median([one[1] for one in ours])))
+    seconds = [float(np.median([float(one["seconds"]) for one in siconos_runs]))]
+    seconds.append(float(np.median([one[1] for one in runs])))
     return {
         "sweeps": sweeps,
         "siconos_ns": 1e9 * seconds[0] / updates,
         "ns": 1e9 * seconds[1] / updates,
         "ratio": seconds[0] / seconds[1],
-        "difference": float(np.abs(theirs[0]["forces"] - ours[0][0]).max()),
+        "difference": float(np.abs(siconos_runs[0]["forces"] - runs[0][0]).max()),
     }
 
 
@@ -86,8 +86,8 @@ def _siconos(python: str, S: Ensemble, start: Floats, tolerance: float) -> dict[
         # Isolated: this folder must not shadow the modules that the program imports.
         command = [python, "-I", str(PROGRAM), str(problem), str(result), str(tolerance)]
         subprocess.run(command, check=True, capture_output=True)
-        with np.load(result) as found:
-            return dict(found)
+        with np.load(result) as stored:
+            return dict(stored)
 
 
 def _ours(S: Ensemble, start: Floats, sweeps: int) -> tuple[Floats, float]:

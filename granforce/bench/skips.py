@@ -97,10 +97,10 @@ def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
 
 
 def _programs(S: Ensemble) -> dict[str, Any]:
-    found = intervals(S)
+    exact = intervals(S)
     few = _seconds(lambda: intervals(S), 1)
     every = _seconds(lambda: intervals(S, skip=False), 1)
-    count = found.counts["f_n = 0 seen in a known state"]
+    count = exact.counts["f_n = 0 seen in a known state"]
     return _row("programs for a least f_n seen to be 0", count, few, every)
 
 

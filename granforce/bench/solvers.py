@@ -137,22 +137,24 @@ def contact_updates(
     row = {"n": n, "mu": mu}
     remark = f"{runs[0].iterations} sweeps, box free to dilate"
     alone = {**row, "solver": "granforce sweep", "ns_per_update": each, "note": remark}
-    beside = SideBySide(S, LANES, **options)
+    searches = SideBySide(S, LANES, **options)
     for _ in range(2):  # the first call compiles
         for lane, start in enumerate(kicked(S, LANES, 0)):
-            beside.begin(lane, start)
-        seconds = timed(beside.ended)[0]
-    ns = 1e9 * seconds / (beside.sweeps.sum() * len(S.index))
+            searches.begin(lane, start)
+        seconds = timed(searches.ended)[0]
+    ns = 1e9 * seconds / (searches.sweeps.sum() * len(S.index))
     remark = f"{LANES} relaxations side by side"
     rows = [alone, {**alone, "ns_per_update": ns, "ratio": each / ns, "note": remark}]
     for tolerance in TOLERANCES:
-        found = against_siconos(S, kicked(S, 1, 0)[0], tolerance)
-        if found is None:
+        comparison = against_siconos(S, kicked(S, 1, 0)[0], tolerance)
+        if comparison is None:
             return [*rows, {**row, "solver": "Siconos NSGS", "note": ABSENT}]
-        remark = f"{found['sweeps']} sweeps, forces differ by {found['difference']:.0e} ⟨f_n⟩"
-        both = {"granforce sweep": found["ns"], "Siconos NSGS": found["siconos_ns"]}
+        remark = (
+            f"{comparison['sweeps']} sweeps, forces differ by {comparison['difference']:.0e} ⟨f_n⟩"
+        )
+        both = {"granforce sweep": comparison["ns"], "Siconos NSGS": comparison["siconos_ns"]}
         for name, each in both.items():
-            ratio = found["siconos_ns"] / each
+            ratio = comparison["siconos_ns"] / each
             measured = {"solver": name, "ns_per_update": each, "ratio": ratio}
             rows.append({**row, **measured, "note": remark})
     return rows

@@ -67,13 +67,13 @@ def walks(
     states = states or (50 if quick else 60)
     rows = []
     for mu in frictions:
-        found: dict[Any, list[Any]] = {name: [] for name in ways}
+        results: dict[Any, list[Any]] = {name: [] for name in ways}
         for seed in range(1, packings + 1):
             note(f"walks: N = {n}, μ = {mu:g}, packing {seed} of {packings}")
             S = ensemble(pack(n, mu, seed))
             for name, values in _walked(S, states, seed, ways).items():
-                found[name].append(values)
-        for name, values in found.items():
+                results[name].append(values)
+        for name, values in results.items():
             row = {"n": n, "mu": mu, "solver": name, "packings": packings, "states": states}
             rows.append(row | _over_packings(values))
     return rows
@@ -91,25 +91,25 @@ def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, dict[s
         return {name: {} for name in ways}
     centre = np.mean([measures.mean_network(w.states) for w in done.values()], axis=0)
     size = np.linalg.norm(centre)
-    found: dict[Any, dict[Any, Any]] = {name: {} for name in ways}
+    results: dict[Any, dict[Any, Any]] = {name: {} for name in ways}
     for name, one in done.items():
-        found[name] = {
+        results[name] = {
             "eta1": measures.eta1(one.states),
             "eta2": measures.eta2(one.states),
-            "eta3": measures.eta3(*measures.intervals_seen(one.states)),
+            "eta3": measures.eta3(*measures.sampled_intervals(one.states)),
             "distance": float(measures.distances(one.states, centre).mean() / size),
             "original": float(np.linalg.norm(S.original - centre) / size),
             "acceptance": one.acceptance,
             "seconds": seconds[name],
         }
-    return found
+    return results
 
 
 def _over_packings(values: Sequence[dict[str, float]]) -> dict[str, Any]:
-    kept = [one for one in values if one]
-    row: dict[str, Any] = {"failed": len(values) - len(kept)}
-    for key in kept[0] if kept else ():
-        numbers = np.array([one[key] for one in kept])
+    complete = [one for one in values if one]
+    row: dict[str, Any] = {"failed": len(values) - len(complete)}
+    for key in complete[0] if complete else ():
+        numbers = np.array([one[key] for one in complete])
         row[key] = float(numbers.mean())
         if key.startswith(("eta", "distance")) and len(numbers) > 1:
             row[f"{key}_error"] = float(numbers.std(ddof=1) / np.sqrt(len(numbers)))
@@ -187,7 +187,8 @@ def intervals(
         for name in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
             note(f"intervals: N = {n}, μ = {mu:g}, {name}")
             rows += [
-                {**row, "method": name, **seen} for seen in _growing(S, name, states, eta3, extent)
+                {**row, "method": name, **numbers}
+                for numbers in _growing(S, name, states, eta3, extent)
             ]
     return rows
 
@@ -210,7 +211,7 @@ def _growing(
         progress=lambda count, total: times.append(time.perf_counter() - begin),
     )
     for count in counts:
-        low, high = measures.intervals_seen(done.states[:count])
+        low, high = measures.sampled_intervals(done.states[:count])
         seen_eta3, seen_extent = _extents(S, low, high)
         yield {
             "states": count,

@@ -63,12 +63,12 @@ def uniform(
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
         walls(S)  # compile
-        setup, (polytope, kept) = timed(_set_up, S, clock=time.process_time)
-        runs = [_ours(S, polytope, kept, method, seed) for method in METHODS]
-        runs += _hopsy(S, polytope, kept, rounded)
+        setup, (polytope, stored_rows) = timed(_set_up, S, clock=time.process_time)
+        runs = [_ours(S, polytope, stored_rows, method, seed) for method in METHODS]
+        runs += _hopsy(S, polytope, stored_rows, rounded)
         for run in runs:
             rows.append(_row({"n": n, "mu": mu, "h": polytope.dimension}, S, runs[0], run, setup))
-        rows[-len(runs)]["two_cores"] = _two_cores(polytope, kept, seed)
+        rows[-len(runs)]["two_cores"] = _two_cores(polytope, stored_rows, seed)
         rows[-len(runs)]["null_space_ratio"] = _null_space(S, polytope) / setup
     return rows
 
@@ -97,13 +97,13 @@ def _row(
     return row
 
 
-def _ours(S: Ensemble, polytope: Any, kept: Any, method: str, seed: int) -> _Run:
+def _ours(S: Ensemble, polytope: Any, rows: Any, method: str, seed: int) -> _Run:
     note(f"uniform: h = {polytope.dimension}, {method}")
     for count in (1, STATES // 4):  # the first call compiles
         begin = time.process_time()
-        own = seed + METHODS.index(method)
-        ends, reach, _ = warm_up(polytope, 4, own, [kept], method=method)
-        _, slacks, _ = step(polytope, ends, count=count, reach=reach, rows=kept, method=method)
+        seed_of_method = seed + METHODS.index(method)
+        ends, reach, _ = warm_up(polytope, 4, seed_of_method, [rows], method=method)
+        _, slacks, _ = step(polytope, ends, count=count, reach=reach, rows=rows, method=method)
         seconds = time.process_time() - begin
     states = forces_of(S, polytope, slacks)
     return _Run(method, states, mixing(states, varying(S, polytope)), seconds, 0.0)
@@ -134,8 +134,8 @@ def uniform_growth(
         note(f"uniform: N = {n * k * k}")
         S = ensemble(tile(base, k), prune=False)
         setup, (polytope, _) = timed(_set_up, S, clock=time.process_time)
-        wanted: dict[str, Any] = {"seed": seed, "effective": effective}
-        seconds, sample = timed(sample_uniform, S, effective, clock=time.process_time, **wanted)
+        settings: dict[str, Any] = {"seed": seed, "effective": effective}
+        seconds, sample = timed(sample_uniform, S, effective, clock=time.process_time, **settings)
         row: dict[str, Any] = {
             "n": n * k * k,
             "h": polytope.dimension,
@@ -196,19 +196,19 @@ def _null_space(S: Ensemble, polytope: Any) -> float:
     return timed(linalg.qr, weighted.T, pivoting=True, clock=time.process_time)[0]
 
 
-def _two_cores(polytope: Any, kept: Any, seed: int) -> float:
+def _two_cores(polytope: Any, rows: Any, seed: int) -> float:
     wall = []
-    ends, reach, _ = warm_up(polytope, 2, seed, [kept])
+    ends, reach, _ = warm_up(polytope, 2, seed, [rows])
     for workers in (1, 2):
         begin = time.perf_counter()
         with ThreadPoolExecutor(workers) as pool:
-            on = partial(step, polytope, count=STATES, reach=reach, rows=kept)
+            on = partial(step, polytope, count=STATES, reach=reach, rows=rows)
             list(pool.map(on, [[end] for end in ends]))
         wall.append(time.perf_counter() - begin)
     return wall[0] / wall[1]
 
 
-def _hopsy(S: Ensemble, polytope: Any, kept: Any, rounded: int) -> list[_Run]:
+def _hopsy(S: Ensemble, polytope: Any, rows: Any, rounded: int) -> list[_Run]:
     """Coordinate hit-and-run by hopsy, its best walk, on two roundings.
 
     One is granforce's; the other, up to dimension `rounded`, is hopsy's own. hopsy needs
@@ -219,7 +219,7 @@ def _hopsy(S: Ensemble, polytope: Any, kept: Any, rounded: int) -> list[_Run]:
     except ImportError:
         return [_Run("hopsy", None, None, seconds=0.0, setup=0.0, note="not installed")]
     h, count = polytope.dimension, len(polytope.moving)
-    sides = -np.linalg.eigh(kept.values[:count, :count])[1][:, count - h :]
+    sides = -np.linalg.eigh(rows.values[:count, :count])[1][:, count - h :]
     begin = time.process_time()
     problems = {"hopsy, our rounding": (hopsy.Problem(sides, np.ones(count)), 0.0)}
     if h <= rounded:

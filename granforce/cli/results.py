@@ -167,7 +167,7 @@ def found(
 
 
 def telling_eta(bar: Any) -> Callable[[Any], None]:
-    """watch(Found) of a walk, which shows η1 of all states so far next to the bar."""
+    """watch(WalkState) of a walk, which shows η1 of all states so far next to the bar."""
     growth, lock = measures.Growth(), threading.Lock()
 
     def watch(found: Any) -> None:

@@ -20,28 +20,28 @@ def boundary(x: Floats, r: Floats) -> Integers:
     x (N, 2), r (N,). Uses the edges of the alpha shape of the centres (Edelsbrunner, Kirkpatrick,
     Seidel, IEEE Trans. Inf. Theory 29, 551 (1983)).
     """
-    found = np.ones(len(x), dtype=np.int64)
+    edge = np.ones(len(x), dtype=np.int64)
     try:
         triangles = Delaunay(x).simplices
     except QhullError:  # fewer than three grains, or all collinear
-        return found
+        return edge
     corner = x[triangles]
     sides = np.stack([corner[:, k] - corner[:, k - 1] for k in range(3)], axis=1)
     area = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
     product = np.hypot(*sides.transpose(2, 0, 1)).prod(axis=1)
     triangles = triangles[product <= 4 * area * _CIRCLE * r.mean()]
     if not len(triangles):
-        return found
+        return edge
     edges = np.sort(np.concatenate([triangles[:, [k, k - 1]] for k in range(3)]), axis=1)
     edges, times = np.unique(edges, axis=0, return_counts=True)
     i, j = edges[times == 1].T
     graph = sparse.coo_matrix((np.ones(len(i)), (i, j)), shape=(len(x), len(x)))
     _, ring = csgraph.connected_components(graph, directed=False)
     at = np.unique(np.concatenate([i, j]))
-    found[np.unique(triangles)] = 0
+    edge[np.unique(triangles)] = 0
     width = {one: np.ptp(x[at[ring[at] == one]], axis=0).max() for one in np.unique(ring[at])}
     widest = sorted(width, key=lambda one: -width[one])
-    found[at[ring[at] == widest[0]]] = 1
+    edge[at[ring[at] == widest[0]]] = 1
     if len(widest) > 1 and width[widest[1]] > _HOLE * r.mean():
-        found[at[ring[at] == widest[1]]] = -1
-    return found
+        edge[at[ring[at] == widest[1]]] = -1
+    return edge

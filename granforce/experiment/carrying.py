@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
-from granforce.explore.intervals import Bounds, Key, Seen, solved
+from granforce.explore.intervals import Bounds, Key, SmallestForces, solved
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
@@ -92,13 +92,13 @@ def _least(
     ensemble: Ensemble, places: Integers, forces: Floats, workers: int, progress: Progress | None
 ) -> tuple[Floats, dict[str, int]]:
     """Certified lower bounds (k,) of f_n, in ⟨f_n⟩, and counts."""
-    seen = Seen(ensemble, forces)
-    solver = Solver(make_system(ensemble), workers=workers, seen=lambda key, y: seen.add(y))
+    smallest = SmallestForces(ensemble, forces)
+    solver = Solver(make_system(ensemble), workers=workers, on_state=lambda key, y: smallest.add(y))
     keys: list[Key] = [(int(c), 0, 0) for c in places]
     bounds: Bounds = {}
     waiting = keys
     while waiting:
-        waiting = [key for key in waiting if seen.least[key[0]] > INTERVAL_GAP]
+        waiting = [key for key in waiting if smallest.least[key[0]] > INTERVAL_GAP]
         batch, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
         bounds |= solved(ensemble, solver, batch)
         cancelling.check("exact bounds")

@@ -54,16 +54,16 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
             f"{', '.join(map(str, paths))}: no frames; expected *_solved.mat, or text files with "
             "'positions' (or 'centers') and 'adjacency' in their names"
         )
-    found = [
+    frames = [
         Frame(str(one), None if two is None else str(two), float(number))
         for one, two in pairs
         for number in _numbers(one, two, len(pairs), columns)
     ]
-    found.sort(key=lambda frame: frame.number)
-    for one, two in itertools.pairwise(found):
+    frames.sort(key=lambda frame: frame.number)
+    for one, two in itertools.pairwise(frames):
         if one.number == two.number:
             raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
-    return found
+    return frames
 
 
 def _is_text(path: Path) -> bool:

@@ -182,16 +182,16 @@ def inference_of(
 
 def judged(
     ensemble: Ensemble,
-    found: Floats,
+    forces: Floats,
     worth: Mixing,
     mixed: bool,
     counts: dict[str, Any],
     *seconds: float,
 ) -> Draws:
     """The Draws of states (chains, k, N_c, 2), with their residual, violation and mixing."""
-    residual, violation = ensemble.residual(found), ensemble.violation(found)
+    residual, violation = ensemble.residual(forces), ensemble.violation(forces)
     good = bool(uniform.inside(residual, violation) and mixed)
-    return Draws(found, residual, violation, worth, good, counts, *seconds)
+    return Draws(forces, residual, violation, worth, good, counts, *seconds)
 
 
 def _draws(
@@ -209,14 +209,14 @@ def _draws(
     ends = uniform.begun(polytope, chains, seed)
     ends, _, dropped = uniform.together(stores, ends, partial(on, count=_DROPPED))
     each = -(-states // chains)
-    _, found, done = uniform.drawn(ensemble, polytope, stores, ends, on, 0, each, progress)
+    _, samples, done = uniform.drawn(ensemble, polytope, stores, ends, on, 0, each, progress)
     cancelling.check("inference")
     drawn = time.perf_counter()
-    worth = mixing(found, uniform.varying(ensemble, polytope))
+    worth = mixing(samples, uniform.varying(ensemble, polytope))
     counts = uniform.counted({"turns": 0, "refused": 0}, dropped + done)
     counts |= {"dropped": _DROPPED * chains, "held": len(polytope.centre) - len(polytope.moving)}
     mixed = not polytope.dimension or worth.worst_r_hat <= uniform.MIXED
-    return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
+    return judged(ensemble, samples, worth, mixed, counts, ready - begin, drawn - ready)
 
 
 def step(

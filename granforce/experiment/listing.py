@@ -70,13 +70,13 @@ class Listing(NamedTuple):
 
     def with_grains(self, rows: Integers | Mask) -> Listing:
         """The listing with a selection of its grains, in this order."""
-        kept = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
-        return self._replace(**kept, lines=(self.lines[0][rows], self.lines[1]))
+        columns = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
+        return self._replace(**columns, lines=(self.lines[0][rows], self.lines[1]))
 
     def with_contacts(self, rows: Integers | Mask) -> Listing:
         """The listing with a selection of its contacts, in this order."""
-        kept = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
-        return self._replace(**kept, lines=(self.lines[0], self.lines[1][rows]))
+        columns = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
+        return self._replace(**columns, lines=(self.lines[0], self.lines[1][rows]))
 
 
 class Frames(Protocol):
@@ -100,8 +100,8 @@ class Columns(NamedTuple):
     @property
     def frames(self) -> Floats:
         """Numbers of the frames, ascending; empty without such a column."""
-        found = self.values.get("frame", np.zeros(0))
-        return np.unique(found[np.isfinite(found)])
+        numbers = self.values.get("frame", np.zeros(0))
+        return np.unique(numbers[np.isfinite(numbers)])
 
     def of(self, frame: float) -> Columns:
         """The rows of one frame, or all rows if there is no column for the frame."""
@@ -137,22 +137,22 @@ class TextFrames(NamedTuple):
                 )
             return both
         if len(one) > 1 or len(two) > 1:
-            lone, many = (self.grains, self.contacts) if len(two) > 1 else reversed(self)
+            single, many = (self.grains, self.contacts) if len(two) > 1 else reversed(self)
             raise InputError(
-                f"{many.name} has {len(many.frames)} frames, but {lone.name} has no column for the "
-                "frame; give files with one frame, or add the column"
+                f"{many.name} has {len(many.frames)} frames, but {single.name} has no column for "
+                "the frame; give files with one frame, or add the column"
             )
         return one if len(one) else two if len(two) else np.ones(1)
 
     def listing(self, frame: float | None = None) -> Listing:
         """The Listing of a frame, by default the last."""
-        there = self.frames
+        available = self.frames
         if frame is None:
-            frame = there[-1]
-        if frame not in there:
+            frame = available[-1]
+        if frame not in available:
             raise InputError(
                 f"frame {plain(float(frame))} is not in both files; "
-                f"they have {plain(there[0])} … {plain(there[-1])}"
+                f"they have {plain(available[0])} … {plain(available[-1])}"
             )
         grains, contacts = (one.of(frame) for one in self)
         g, c = grains.values, contacts.values
@@ -200,7 +200,7 @@ def read_frames(
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
     """The columns under the names used here."""
     given = {}
-    for word, theirs in columns.items():
+    for word, header in columns.items():
         name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
         if name is None:
             raise InputError(
@@ -209,7 +209,7 @@ def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
             )
         if name in given:
             raise InputError(f"the column {name} is given twice; give each name once")
-        given[name] = theirs
+        given[name] = header
     return given
 
 
@@ -223,13 +223,13 @@ def _with_frames(grains: Columns, contacts: Columns) -> TextFrames:
     count, numbers = int(parts[-1]), contacts.frames
     if not len(numbers):
         ends = (contacts.values[name] for name in ("id1", "id2"))
-        found = next((some for some in map(_ascending, ends) if some[-1] == count), None)
-        if found is None:
+        frames = next((some for some in map(_ascending, ends) if some[-1] == count), None)
+        if frames is None:
             raise InputError(
                 f"{grains.name}: ids restart {count} times, but in {contacts.name} it is unclear "
                 "where a frame ends; add a column for the frame to both files"
             )
-        contacts = contacts.with_frames(found)
+        contacts = contacts.with_frames(frames)
     elif len(numbers) == count:
         parts = numbers[parts - 1]
     else:
@@ -341,21 +341,21 @@ def _given(
     header = header if header is not None and len(header) == width else [""] * width
     plain_words = [_plain(word) for word in header]
     named = [name if name not in given else "" for name in _known(header, wanted)]
-    for name, theirs in given.items():
-        word = _plain(theirs)
+    for name, header_name in given.items():
+        word = _plain(header_name)
         if word in plain_words:
             column = plain_words.index(word)
         elif word.isdecimal() and 1 <= int(word[:9]) <= width:
             column = int(word) - 1
         else:
-            there = ", ".join(filter(None, header)) or "they have no names"
+            headers = ", ".join(filter(None, header)) or "they have no names"
             raise InputError(
-                f"{file}: no column {theirs[:40]!r} for {name} among {width} ({there}); give a "
-                "header, or a number from 1"
+                f"{file}: no column {header_name[:40]!r} for {name} among {width} ({headers}); "
+                "give a header, or a number from 1"
             )
         if named[column] in given:
             raise InputError(
-                f"{file}: column {theirs[:40]!r} is used twice, for {named[column]} and {name}"
+                f"{file}: column {header_name[:40]!r} is used twice, for {named[column]} and {name}"
             )
         named[column] = name
     missing = sorted(_needed(wanted) - set(named))
@@ -367,10 +367,10 @@ def _given(
 def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[str]:
     """Names of the columns from their number and contents."""
     width = numbers.shape[1]
-    found = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
+    names = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
     if (
-        found
-        and found[0] == "id1"
+        names
+        and names[0] == "id1"
         and width == 5
         and len(np.unique(numbers[:, 0])) == 1 < len(numbers)
     ):
@@ -378,13 +378,13 @@ def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[s
             f"{name}: the third of five columns is 0 throughout, so the column of "
             "the second grain is unknown: name the columns (--columns i=…,j=…,f_t=…,f_n=…)"
         )
-    if found is None:
+    if names is None:
         raise InputError(
             f"{name}: {width} fields in a line, which are not "
             f"{', '.join(wanted)} (the first and the last may be missing); is it a PeGS file? "
             "Give a header line that names the columns"
         )
-    return found
+    return names
 
 
 def _as_contacts(numbers: Floats) -> Sequence[str] | None:
@@ -423,10 +423,10 @@ def _as_grains(numbers: Floats) -> Sequence[str] | None:
 
 def _whole(column: Floats) -> bool:
     """Whether nearly all are whole numbers; exceptions may be damaged lines."""
-    seen = column[np.isfinite(column)]
-    return len(seen) > 0 and bool(np.mean(seen == np.round(seen)) > 0.9)
+    finite = column[np.isfinite(column)]
+    return len(finite) > 0 and bool(np.mean(finite == np.round(finite)) > 0.9)
 
 
 def _flags(column: Floats) -> bool:
-    seen = column[np.isfinite(column)]
-    return len(seen) > 0 and bool(np.mean(np.isin(seen, (-1, 0, 1))) > 0.9)
+    finite = column[np.isfinite(column)]
+    return len(finite) > 0 and bool(np.mean(np.isin(finite, (-1, 0, 1))) > 0.9)

@@ -77,10 +77,10 @@ class _Reader:
         kind, shape, _, at = self.head(matrix)
         if kind not in _NUMBERS:
             return np.zeros(0)
-        found = self.values(self.element(at, matrix.start + matrix.size))
-        if len(found) != np.prod(shape, dtype=float):
+        numbers = self.values(self.element(at, matrix.start + matrix.size))
+        if len(numbers) != np.prod(shape, dtype=float):
             raise ValueError("dimensions")
-        return found
+        return numbers
 
     def parts(self, matrix: _Element, wanted: Collection[str]) -> list[dict[str, npt.NDArray[Any]]]:
         """Parts of a struct array: a list of {field: flat numbers} of the wanted fields."""
@@ -96,7 +96,7 @@ class _Reader:
             raise ValueError("names of the fields")
         text, at = self.text(names), names.end
         fields = [text[k : k + width].split("\0")[0] for k in range(0, len(text), width)]
-        found = []
+        parts = []
         for _ in range(int(count) if fields else 0):
             part = {}
             for field in fields:
@@ -106,8 +106,8 @@ class _Reader:
                 if field in wanted:
                     part[field] = self.numbers(element)
                 at = element.end
-            found.append(part)
-        return found
+            parts.append(part)
+        return parts
 
 
 def read_struct(

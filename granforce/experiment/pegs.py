@@ -161,20 +161,20 @@ def read_pegs(
     notes = [] if note is None else [note]
     if saved > WORTH_REVERSING:
         notes.append(worth_reversing(saved, reverse))
-    found = wall_contacts(listing, x, r, at_wall, walls, reach)
-    if found is not None and found.outline is not None:
-        note = bad_fit(found.outline, x, r, at_wall)
+    touching = wall_contacts(listing, x, r, at_wall, walls, reach)
+    if touching is not None and touching.outline is not None:
+        note = bad_fit(touching.outline, x, r, at_wall)
         notes += [] if note is None else [note]
-    if wall_forces and found is None:
+    if wall_forces and touching is None:
         raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
-    made = None if found is None else bodies(found, x, r, wall_forces or {})
-    alone = _packing(x, r, listed, np.zeros((0, 2), int), at_wall, mu, made)
+    wall_bodies = None if touching is None else bodies(touching, x, r, wall_forces or {})
+    alone = _packing(x, r, listed, np.zeros((0, 2), int), at_wall, mu, wall_bodies)
     still_open = at_wall.copy()
-    if found is not None:
-        still_open[found.grain] = False
+    if touching is not None:
+        still_open[touching.grain] = False
     pairs = _candidates(x, r, listed, still_open, reach)
-    packing = _packing(x, r, listed, pairs, at_wall, mu, made)
-    measured, sigma, factor, added = _measurement(listed, len(pairs), made)
+    packing = _packing(x, r, listed, pairs, at_wall, mu, wall_bodies)
+    measured, sigma, factor, added = _measurement(listed, len(pairs), wall_bodies)
     unit = float(np.nanmean(np.abs(listed.forces[:, 0])))
     if not unit > 0:
         raise InputError(f"{listing.names[1]}: all measured normal forces are 0")
@@ -187,7 +187,7 @@ def read_pegs(
     packing = packing._replace(load=load)
     best, sigma = _inferred(packing, measured, sigma, factor, listed.spread, error, unit)
     packing = packing._replace(forces=best.forces)
-    names = () if made is None else made.names
+    names = () if wall_bodies is None else wall_bodies.names
     ids = np.concatenate([listing.ids, -1.0 - np.arange(len(names))])
     change = np.nanmean(np.abs(best.forces - measured), axis=0) / unit
     gap = packing.contacts.gap
@@ -205,7 +205,7 @@ def read_pegs(
         "contacts_with_a_wall": int(with_wall.sum()),
         **account.counts,
         "walls": ", ".join(names) or "open",
-        "wall_contacts": 0 if found is None else len(found.grain),
+        "wall_contacts": 0 if touching is None else len(touching.grain),
         "unbalance_saved_if_tangential_forces_were_reversed": saved,
         "mean_measured_normal_force": unit,
         "median_gap_in_mean_radii": float(np.median(gap[:first]) / r.mean()),
@@ -371,12 +371,12 @@ def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
         return np.zeros(len(packing.r))
     A, T = S.cone_form
     m = S.to_vector(m) / unit
-    seen = np.flatnonzero(np.isfinite(m))
+    measured = np.flatnonzero(np.isfinite(m))
     rows, columns = A.shape[0], A.shape[1]
-    both = sparse.vstack([A, sparse.csr_matrix(T)[seen]])
-    slack = sparse.identity(rows + len(seen))
-    cost = np.concatenate([np.ones(rows), np.full(len(seen), _CHANGE)])
-    right = np.concatenate([np.zeros(rows), m[seen]])
+    both = sparse.vstack([A, sparse.csr_matrix(T)[measured]])
+    slack = sparse.identity(rows + len(measured))
+    cost = np.concatenate([np.ones(rows), np.full(len(measured), _CHANGE)])
+    right = np.concatenate([np.zeros(rows), m[measured]])
     # Five times as fast as the simplex method here; its crossover also ends in a vertex.
     model = highs.standard_form(sparse.hstack([both, slack, -slack]), right, solver="ipm")
     model.setOptionValue("ipm_iteration_limit", _ITERATIONS)
@@ -402,12 +402,12 @@ def _inferred(
     """The Likeliest network, and σ (N_c, 2): as given for load cells, else from the factors."""
     S = ensemble(packing, prune=False)
     relative = np.sqrt(factor)[:, None] * np.ones(2)
-    own = np.isnan(sigma)
+    unmeasured = np.isnan(sigma)
     if error is None:
         # With one σ for all, the network does not depend on it, and χ² σ² is the residual.
-        best = likeliest(S, np.where(own, m, np.nan), unit * relative)
+        best = likeliest(S, np.where(unmeasured, m, np.nan), unit * relative)
         error = unit * np.sqrt(max(best.chi_square, _BALANCED) / max(best.freedom, 1))
-    sigma = np.where(own, positive(error, "error") * relative, sigma)
+    sigma = np.where(unmeasured, positive(error, "error") * relative, sigma)
     sigma[: len(spread)] = np.hypot(sigma[: len(spread)], spread)
     sigma[np.isnan(m)] = np.nan
     return likeliest(S, m, sigma), sigma

@@ -82,11 +82,11 @@ def remeasured(
     m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
-    found = _again(ensemble, best.forces, width, *numbers, seed, progress)
+    repeated = _again(ensemble, best.forces, width, *numbers, seed, progress)
     # The draws are independent, so mixing is not diagnosed.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
-    draws = judged(ensemble, found, worth, True, counts, 0.0, time.perf_counter() - ready)
+    draws = judged(ensemble, repeated, worth, True, counts, 0.0, time.perf_counter() - ready)
     return inference_of(Remeasured, ensemble, best, draws, begin)
 
 
@@ -106,11 +106,11 @@ def _again(
     errors = np.stack([rng.standard_normal((each, *s.shape)) for rng in streams])
     again = (forces + s * errors).reshape(-1, *s.shape)
     batches = [again[k : k + LANES] for k in range(0, len(again), LANES)]
-    done, found = 0, []
+    done, draws = 0, []
     with cancelling.threads(workers) as pool:
         for networks in pool.map(lambda batch: fitted_many(ensemble, batch, s), batches):
-            found.append(networks)
+            draws.append(networks)
             done += len(networks)
             if progress is not None:
                 progress(done, len(again))
-    return np.concatenate(found).reshape(chains, each, *s.shape)
+    return np.concatenate(draws).reshape(chains, each, *s.shape)

@@ -139,10 +139,10 @@ def rows_of(listing: Listing) -> Integers:
 
 def gaps_of(listing: Listing, rows: Integers) -> Floats:
     """Gaps (k,) of the disks joined by contacts; NaN if one is a wall or missing."""
-    there = np.all(rows >= 0, axis=1)
-    i, j = np.where(there[:, None], rows, 0).T
+    listed = np.all(rows >= 0, axis=1)
+    i, j = np.where(listed[:, None], rows, 0).T
     gap = np.hypot(*(listing.x[j] - listing.x[i]).T) - listing.r[i] - listing.r[j]
-    return np.where(there, gap, np.nan)
+    return np.where(listed, gap, np.nan)
 
 
 def _fitting(listing: Listing) -> float:
@@ -274,8 +274,8 @@ def _without_false_detections(listing: Listing, account: Account) -> Listing:
             for g in those
         ]
         account.note(kind, texts, x[those])
-    kept = np.setdiff1d(np.arange(len(r)), list(dropped))
-    return listing._replace(ends=ends).with_grains(kept)
+    rows = np.setdiff1d(np.arange(len(r)), list(dropped))
+    return listing._replace(ends=ends).with_grains(rows)
 
 
 def _fits(listing: Listing) -> Floats:
@@ -321,10 +321,10 @@ def _without_unreadable_contacts(listing: Listing, account: Account) -> Listing:
 
 
 def _without_missing_grains(listing: Listing, account: Account) -> Listing:
-    own = np.flatnonzero(listing.ends[:, 0] == listing.ends[:, 1])
-    texts = [f"{listing.place(1, k)}: the grain touches itself" for k in own]
-    account.note("contacts_with_themselves", texts, _places(listing, own))
-    listing = listing.with_contacts(np.setdiff1d(np.arange(len(listing.ends)), own))
+    loops = np.flatnonzero(listing.ends[:, 0] == listing.ends[:, 1])
+    texts = [f"{listing.place(1, k)}: the grain touches itself" for k in loops]
+    account.note("contacts_with_themselves", texts, _places(listing, loops))
+    listing = listing.with_contacts(np.setdiff1d(np.arange(len(listing.ends)), loops))
     rows = rows_of(listing)
     bad = np.flatnonzero((rows == -2).any(axis=1) | (rows < 0).all(axis=1))
     texts = []
@@ -381,8 +381,8 @@ def _note_friction(listing: Listing, account: Account, mu: float) -> None:
 def _places(listing: Listing, contacts: Integers) -> Floats:
     """(k, 2) places of contacts: between their grains, or at the only existing one."""
     rows = rows_of(listing)[contacts]
-    there = rows >= 0
-    x = np.where(there[..., None], listing.x[np.where(there, rows, 0)], np.nan)
+    listed = rows >= 0
+    x = np.where(listed[..., None], listing.x[np.where(listed, rows, 0)], np.nan)
     with np.errstate(invalid="ignore"):
-        count = there.sum(axis=1)[:, None]
+        count = listed.sum(axis=1)[:, None]
         return np.where(count, np.nansum(x, axis=1) / np.maximum(count, 1), np.nan)

@@ -58,7 +58,7 @@ def read_solved(source: Source) -> SolvedFrame:
     """
     name, content = _content(source)
     hdf5 = content[:8] == b"\x89HDF\r\n\x1a\n" or content[:15] == b"MATLAB 7.3 MAT-"
-    wanted = f"{name}: a MATLAB file of version 7.3 (HDF5)" if hdf5 else name
+    label = f"{name}: a MATLAB file of version 7.3 (HDF5)" if hdf5 else name
     try:
         if hdf5:
             particles = _version_73(name, content)
@@ -70,13 +70,13 @@ def read_solved(source: Source) -> SolvedFrame:
     except Exception:
         # Reading a damaged file may fail in zlib, in the tags, or on inconsistent shapes.
         raise InputError(
-            f"{wanted} that is damaged; save it again in MATLAB with save(…, '-v7')"
+            f"{label} that is damaged; save it again in MATLAB with save(…, '-v7')"
             if hdf5
             else f"{name}: not a MATLAB file with a struct array, or damaged"
         ) from None
     if columns is None:
         raise InputError(
-            f"{wanted}: no struct array `particle` with {', '.join(_NEEDED)}; is it a *_solved.mat "
+            f"{label}: no struct array `particle` with {', '.join(_NEEDED)}; is it a *_solved.mat "
             "of PeGS 2 (after diskSolve)?"
         )
     digits = re.findall(r"\d+", re.sub(r"\.mat$", "", name))
@@ -106,10 +106,10 @@ def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
             "MATLAB with save(…, '-v7')"
         ) from None
     with h5py.File(io.BytesIO(content), "r") as file:
-        if "particle" not in file or not hasattr(_own(file, "particle"), "keys"):
+        if "particle" not in file or not hasattr(_member(file, "particle"), "keys"):
             return []
         group = file["particle"]
-        fields = {field: _own(group, field) for field in set(_FIELDS) & set(group)}
+        fields = {field: _member(group, field) for field in set(_FIELDS) & set(group)}
         # A single particle is stored without references.
         stored = {
             field: [file[one] for one in np.ravel(_value(values))]
@@ -126,7 +126,7 @@ def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
         return [{field: columns[field][k] for field in columns} for k in range(*counts)]
 
 
-def _own(group: Any, name: str) -> Any:
+def _member(group: Any, name: str) -> Any:
     """The member of the group with this name; ValueError for a link to another file."""
     if hasattr(group.get(name, getlink=True), "filename"):
         raise ValueError("link")
@@ -150,10 +150,10 @@ def _columns(particles: Sequence[Mapping[str, Any]]) -> dict[str, list[Floats]] 
     """{field: per particle, a flat float array}, or None if a required field is missing."""
     if not particles:
         return None
-    there = [field for field in _FIELDS if all(field in one for one in particles)]
-    if not set(_NEEDED) <= set(there):
+    fields = [field for field in _FIELDS if all(field in one for one in particles)]
+    if not set(_NEEDED) <= set(fields):
         return None
-    return {field: [_numbers(one[field]) for one in particles] for field in there}
+    return {field: [_numbers(one[field]) for one in particles] for field in fields}
 
 
 def _numbers(value: Any) -> Floats:

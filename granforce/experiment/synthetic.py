@@ -38,12 +38,12 @@ class SyntheticFrame(NamedTuple):
             raise InputError(f"this is frame {self.only.frame:g}, not frame {frame:g}")
         return self.only
 
-    def truth(self, found: Photoelastic) -> Floats:
+    def truth(self, photo: Photoelastic) -> Floats:
         """True forces (N_c, 2) of a Photoelastic's contacts.
 
         0 for pairs that do not touch, NaN for contacts with walls.
         """
-        c, ids = found.packing.contacts, found.ids
+        c, ids = photo.packing.contacts, photo.ids
         known = {tuple(sorted(pair)): k for k, pair in enumerate(self.pairs.tolist())}
         true = np.zeros((len(c.i), 2))
         for row, (i, j) in enumerate(zip(ids[c.i].tolist(), ids[c.j].tolist(), strict=True)):

@@ -149,16 +149,16 @@ def flagged(
             at_hole = (boundary(listing.x, listing.r) < 0) & (given != 0)
             return np.where(at_hole, -1.0, given), None
         return given, None
-    found: Floats = (
+    marks: Floats = (
         _nearest_side(listing, walls)
         if isinstance(walls, WallOutline)
         else (boundary(listing.x, listing.r).astype(np.float64))
     )
     if flag == "ignore" or not given.any():
-        return found, None
-    return found, (
+        return marks, None
+    return marks, (
         f"{np.sum(given != 0)} of {len(given)} grains are flagged as touching a wall, so the flag "
-        f"is ignored, and the {np.sum(found != 0)} grains at the boundary of the frame count as "
+        f"is ignored, and the {np.sum(marks != 0)} grains at the boundary of the frame count as "
         "those at walls (as with --flag ignore); --walls annulus, box or auto makes walls of the "
         "boundary"
     )
@@ -321,32 +321,32 @@ class Bodies(NamedTuple):
 
 
 def bodies(
-    found: WallContacts, x: Floats, r: Floats, forces: Mapping[str, Sequence[float]]
+    touching: WallContacts, x: Floats, r: Floats, forces: Mapping[str, Sequence[float]]
 ) -> Bodies:
     """The Bodies of WallContacts; forces: {name: (f_x, f_y, σ)} of load cells.
 
     Raises InputError for a force on a missing wall, or on one that is not straight.
     """
-    straight = found.outline is not None and found.outline.shape == "box"
+    straight = touching.outline is not None and touching.outline.shape == "box"
     for name in forces:
-        if name not in found.names or not straight:
+        if name not in touching.names or not straight:
             raise InputError(
-                f"no straight wall is called {name[:40]!r}; walls: {', '.join(found.names)} "
+                f"no straight wall is called {name[:40]!r}; walls: {', '.join(touching.names)} "
                 "(a force on a wall needs --walls box)"
             )
-    count, radius, cells = len(found.names), r.mean(), list(forces)
-    if found.outline is None:
+    count, radius, cells = len(touching.names), r.mean(), list(forces)
+    if touching.outline is None:
         places = [x.mean(axis=0)] * count
     else:
-        places = [found.outline.place(k, 2 * radius) for k in range(count)]
-    walls = np.array([found.names.index(name) for name in cells], dtype=np.int64)
+        places = [touching.outline.place(k, 2 * radius) for k in range(count)]
+    walls = np.array([touching.names.index(name) for name in cells], dtype=np.int64)
     ground = places + [np.add(places[k], 3 * radius * _NORMALS[k]) for k in walls]
     total = np.array(ground)
     load = np.full((len(total), 3), np.nan)
     load[walls] = 0.0
-    i = np.concatenate([found.grain, len(x) + walls])
-    j = np.concatenate([len(x) + found.wall, len(x) + count + np.arange(len(cells))])
-    normal = np.concatenate([found.normal, _NORMALS[walls]])
+    i = np.concatenate([touching.grain, len(x) + walls])
+    j = np.concatenate([len(x) + touching.wall, len(x) + count + np.arange(len(cells))])
+    normal = np.concatenate([touching.normal, _NORMALS[walls]])
     radii = np.concatenate([r, np.full(len(total), radius)])
     contacts = make_contacts(i, j, normal, radii[i] + radii[j], radii)
     arm = np.where(i < len(x), radii[i], 0.0)
@@ -354,14 +354,14 @@ def bodies(
     values = np.array([forces[name] for name in cells]).reshape(-1, 3)
     held = components(values[:, :2], _NORMALS[walls])
     sigma = np.full((len(i), 2), np.nan)
-    sigma[len(found.grain) :] = values[:, 2:]
+    sigma[len(touching.grain) :] = values[:, 2:]
     return Bodies(
         x=total,
         r=radii[len(x) :],
         load=load,
         contacts=contacts,
-        measured=np.concatenate([found.forces, held]),
+        measured=np.concatenate([touching.forces, held]),
         sigma=sigma,
-        factor=np.concatenate([found.factor, np.ones(len(cells))]),
-        names=(*found.names, *(f"cell of the {name} wall" for name in cells)),
+        factor=np.concatenate([touching.factor, np.ones(len(cells))]),
+        names=(*touching.names, *(f"cell of the {name} wall" for name in cells)),
     )

@@ -82,12 +82,12 @@ def room_for_rows(walls: int, part: float = 1.0) -> RowStore:
     return RowStore(cache, threading.Lock())
 
 
-def make_rows(rows_of: RowsOf, rows: RowCache, wanted: Sequence[int]) -> None:
+def make_rows(rows_of: RowsOf, rows: RowCache, walls: Sequence[int]) -> None:
     """Compute rows for these walls in place of the least recently used; cached rows stay."""
-    wanted = [wall for wall in wanted if rows.place[wall] < 0]
-    if not wanted:
+    walls = [wall for wall in walls if rows.place[wall] < 0]
+    if not walls:
         return
-    for wall, row in zip(wanted, rows_of(np.array(wanted, dtype=int)), strict=True):
+    for wall, row in zip(walls, rows_of(np.array(walls, dtype=int)), strict=True):
         while rows.used[rows.hand[0]]:
             rows.used[rows.hand[0]] = False
             rows.hand[0] = (rows.hand[0] + 1) % len(rows.owner)

@@ -178,14 +178,14 @@ def _shape(slopes: Floats, inner: Floats) -> _Shape:
         meeting = _on(walls, w, 1.0)
         if np.linalg.matrix_rank(_unit(walls[meeting]), _SINGULAR) == h:
             corners.setdefault(meeting.tobytes(), (w, meeting))
-    found = [
+    sides = [
         (
             np.reshape([w for w, _ in ends], (len(ends), h)),
             np.reshape([at for _, at in ends], (len(ends), n)).astype(np.bool_),
         )
         for ends in (list(corners.values()), list(rays.values()))
     ]
-    return _Shape(walls, stretch, found[0][0], found[1][0], found[0][1], found[1][1])
+    return _Shape(walls, stretch, sides[0][0], sides[1][0], sides[0][1], sides[1][1])
 
 
 def _unit(vectors: Floats) -> Floats:
@@ -222,11 +222,11 @@ def _meetings(walls: Floats) -> list[tuple[Floats, float, list[int]]]:
     slope = rows @ across.T
     if h == 1:
         facets = [[int(np.argmax(slope))], [int(np.argmin(slope))]]
-        found = -1 / slope[np.ravel(facets)]
+        corners = -1 / slope[np.ravel(facets)]
     else:
         met = HalfspaceIntersection(np.column_stack([-slope, -np.ones(len(slope))]), np.zeros(h))
-        found, facets = met.intersections, met.dual_facets
-    ends = np.append(np.zeros(h), 1.0) + found @ across
+        corners, facets = met.intersections, met.dual_facets
+    ends = np.append(np.zeros(h), 1.0) + corners @ across
     defining = [[int(which[k]) for k in facet if k < len(which)] for facet in facets]
     return [(end[:-1], float(end[-1]), some) for end, some in zip(ends, defining, strict=True)]
 

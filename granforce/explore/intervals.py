@@ -119,16 +119,16 @@ def intervals(
     tangential = [] if frictionless else [(c, 1, side) for c in widest for side in (0, 1)]
     lower = [(c, 0, 0) for c in widest]
     every = upper + tangential + lower
-    known = Seen(ensemble, states)
+    known = SmallestForces(ensemble, states)
     system = make_system(ensemble)
 
-    def seen(key: Key, y: Floats) -> None:
+    def record_state(key: Key, y: Floats) -> None:
         # Networks that attain lower bounds are not used here: only the others decide which programs
         # are needed.
         if key[1:] != (0, 0):
             known.add(y)
 
-    def found(key: Key, attained: float, bound: float) -> None:
+    def report_bound(key: Key, attained: float, bound: float) -> None:
         if watch and abs(attained - bound) <= INTERVAL_GAP:
             value = (-attained if key[2] else attained) * ensemble.force_scale
             watch(Bound(int(ensemble.index[key[0]]), *key[1:], float(value)))
@@ -137,9 +137,9 @@ def intervals(
     if progress:
         progress(len(given), len(every))
     for key, value in given.items():
-        found(key, *value)
+        report_bound(key, *value)
     report: dict[str, Any] = {"progress": progress, "total": len(every), "done": len(given)}
-    solver = Solver(system, workers=workers, seen=seen, found=found, **report)
+    solver = Solver(system, workers=workers, on_state=record_state, on_value=report_bound, **report)
 
     def zero(key: Key) -> bool:
         """Whether a state with f_n = 0 is known for this key."""
@@ -152,12 +152,12 @@ def intervals(
     # With watch, lower bounds are computed early and replaced afterwards if f_n = 0 is seen: the
     # result is the same, for one or two more programs in a hundred.
     bounds |= solve([key for key in lower if not zero(key)] + tangential)
-    seen_zero = [key for key in lower if zero(key)]
-    for key in seen_zero:
+    zero_keys = [key for key in lower if zero(key)]
+    for key in zero_keys:
         bounds[key] = (max(0.0, float(known.least[key[0]])), 0.0)
-        found(key, *bounds[key])
+        report_bound(key, *bounds[key])
     counts = solver.counts | {
-        "f_n = 0 seen in a known state": len(seen_zero),
+        "f_n = 0 seen in a known state": len(zero_keys),
         "frictionless contact": 2 * len(places) if frictionless else 0,
     }
     if ensemble.known is not None:
@@ -194,11 +194,11 @@ def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     rows = cancelling.apart(np.linalg.pinv, A)
     left = np.abs(np.eye(len(rows)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
     follows, row = rows @ b, np.cumsum(free) - 1
-    found = _pinned(ensemble, keys)
-    for c, component, side in (key for key in keys if key not in found):
+    bounds = _pinned(ensemble, keys)
+    for c, component, side in (key for key in keys if key not in bounds):
         k, sign = size * c + component, -1.0 if side else 1.0
-        found[c, component, side] = sign * x[k], sign * follows[row[k]] - left[row[k]]
-    return found
+        bounds[c, component, side] = sign * x[k], sign * follows[row[k]] - left[row[k]]
+    return bounds
 
 
 def _intervals(
@@ -299,7 +299,7 @@ def solved(
     return solver.solve(keys, [bound_of(ensemble, *key) for key in keys], points)
 
 
-class Seen:
+class SmallestForces:
     """The smallest f_n (N_c,) of any known state of S, in ⟨f_n⟩."""
 
     def __init__(self, ensemble: Ensemble, states: Floats | None) -> None:

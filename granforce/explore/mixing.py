@@ -123,5 +123,5 @@ def _effective(x: Floats) -> Floats:
     before = np.where(end > 0, summed[each, end - 1], 0.0)
     rest = np.where(pairs[each, end] < 0, np.maximum(even[each, end], 0.0), even[each, end])
     size = chains * n
-    found = size / np.maximum(2 * before + rest - 1, 1 / np.log10(size))
-    return np.where(np.ptp(x, axis=(1, 2)) < np.finfo(float).resolution, size, found)
+    effective = size / np.maximum(2 * before + rest - 1, 1 / np.log10(size))
+    return np.where(np.ptp(x, axis=(1, 2)) < np.finfo(float).resolution, size, effective)

@@ -115,9 +115,9 @@ def supports(
     solver = Solver(make_system(ensemble), workers=workers)
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    _, found = solved(solver, plane, directions)
-    reached = (found.point * found.d).sum(axis=1)
-    return reached, np.abs(found.bound - reached)
+    _, solutions = solved(solver, plane, directions)
+    reached = (solutions.point * solutions.d).sum(axis=1)
+    return reached, np.abs(solutions.bound - reached)
 
 
 def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:

@@ -69,7 +69,7 @@ class Walk(NamedTuple):
 
 
 @notebook.brief
-class Found(NamedTuple):
+class WalkState(NamedTuple):
     """One accepted state of a running walk, as passed to `watch` of `walk`."""
 
     chain: int
@@ -104,7 +104,7 @@ def walk(
     begun: Walk | None = None,
     enough: Callable[[], bool] | None = None,
     progress: Progress | None = None,
-    watch: Callable[[Found], object] | None = None,
+    watch: Callable[[WalkState], object] | None = None,
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Walk:
@@ -117,7 +117,7 @@ def walk(
     begun: a Walk of one chain with the same arguments and fewer states, which is continued; its
     last state is computed again and must agree.
     enough(): called after each state of a single chain; True ends it with the states so far.
-    progress(done, total); watch(Found) receives each state as it is accepted, from the worker
+    progress(done, total); watch(WalkState) receives each state as it is accepted, from the worker
     thread; neither changes the result. cancel() returning True raises Cancelled.
 
     If S is a single point (h = 0), every state is that point and no relaxation is done, unless skip
@@ -137,8 +137,8 @@ def walk(
     if chains > 1 and not (begun is None and enough is None):
         raise InputError("begun and enough require a single chain")
     all_chains = [
-        _Chain(ensemble, k, states // chains + (k < states % chains), own, max_attempts, whole)
-        for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
+        _Chain(ensemble, k, states // chains + (k < states % chains), child, max_attempts, whole)
+        for k, child in enumerate(np.random.SeedSequence(seed).spawn(chains))
     ]
 
     def tell() -> None:
@@ -189,17 +189,17 @@ def _run(
     group: list[_Chain],
     relax: Relax,
     tell: Callable[[], None],
-    watch: Callable[[Found], object] | None,
+    watch: Callable[[WalkState], object] | None,
     enough: Callable[[], bool] | None,
     options: dict[str, Any],
 ) -> None:
     """Run all chains of a group."""
     at_own_pace = relax is gauss_seidel and len(group) > 1
-    found = _each_at_its_pace(group, options) if at_own_pace else _in_step(group, relax, options)
-    for chain, relaxation in found:
+    results = _each_at_its_pace(group, options) if at_own_pace else _in_step(group, relax, options)
+    for chain, relaxation in results:
         accepted = chain.take(relaxation, options)
         if accepted and watch is not None:
-            watch(chain.found())
+            watch(chain.accepted_state())
         if accepted and enough is not None:
             chain.ended = enough()
         tell()
@@ -216,26 +216,26 @@ def _in_step(
     while left := [chain for chain in chains if not chain.done]:
         starts = [chain.kicked() for chain in left]
         if relax is nearest:
-            found = nearest_of_many(S, starts, **options)
+            relaxations = nearest_of_many(S, starts, **options)
         else:
-            found = [relax(S, start, **options) for start in starts]
-        yield from zip(left, found, strict=True)
+            relaxations = [relax(S, start, **options) for start in starts]
+        yield from zip(left, relaxations, strict=True)
 
 
 def _each_at_its_pace(
     chains: list[_Chain], options: dict[str, Any]
 ) -> Iterator[tuple[_Chain, Relaxation]]:
-    beside = SideBySide(chains[0].ensemble, len(chains), **options)
+    searches = SideBySide(chains[0].ensemble, len(chains), **options)
     for lane, chain in enumerate(chains):
-        beside.begin(lane, chain.kicked())
+        searches.begin(lane, chain.kicked())
     going_on = len(chains)
     while going_on:
-        for lane, relaxation in beside.ended():
+        for lane, relaxation in searches.ended():
             yield chains[lane], relaxation
             if chains[lane].done:
                 going_on -= 1
             else:
-                beside.begin(lane, chains[lane].kicked())
+                searches.begin(lane, chains[lane].kicked())
 
 
 class _Chain:
@@ -274,7 +274,7 @@ class _Chain:
         self,
         begun: Walk,
         relaxed: Callable[[Floats], Relaxation],
-        watch: Callable[[Found], object] | None,
+        watch: Callable[[WalkState], object] | None,
     ) -> None:
         """Continue from the states of an earlier walk, at its position in the random stream."""
         tried, count = int(begun.attempts.sum()), len(begun.states)
@@ -297,7 +297,7 @@ class _Chain:
         self.forces = begun.states[-1]
         if watch is not None:
             for k in range(len(begun.states)):
-                watch(self.found(k))
+                watch(self.accepted_state(k))
 
     def kicked(self) -> Floats:
         """The start of the next attempt: a number uniform in ±⟨F_n⟩ is added to every component.
@@ -330,10 +330,10 @@ class _Chain:
         walk.residual[k], walk.violation[k] = relaxation.residual, relaxation.violation
         return True
 
-    def found(self, k: int = -1) -> Found:
+    def accepted_state(self, k: int = -1) -> WalkState:
         """An accepted state, by default the last one."""
         k %= self.counts["accepted"]
-        return Found(
+        return WalkState(
             chain=self.number,
             number=k,
             forces=self.walk.states[k].copy(),

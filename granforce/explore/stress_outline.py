@@ -35,7 +35,7 @@ class StressOutline(NamedTuple):
     outer: Floats  # (m, 2) corners of a polygon outside, of certified half planes
     friction: float  # largest shear stress over pressure of any network in S
     friction_bound: float  # certified upper bound of it
-    own: Floats  # (2,) the stress of the packing's own network
+    original: Floats  # (2,) the stress of the packing's own network
     converged: bool  # the polygons agree within the tolerance
     counts: dict[str, int]  # as in `Outline`
 
@@ -43,7 +43,7 @@ class StressOutline(NamedTuple):
         """HTML for notebooks."""
         lines = {
             "largest shear stress / pressure": self.friction,
-            "of the packing's own network": float(np.hypot(*self.own)),
+            "of the packing's own network": float(np.hypot(*self.original)),
             "certified upper bound": self.friction_bound,
             **self.counts,
         }
@@ -75,21 +75,21 @@ def stress_outline(
     if not len(angles):
         raise InputError("give at least one angle")
     support, gap = supports(ensemble, axes, angles, workers=workers)
-    found = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
-    reached = np.hypot(*found.inner.T).max(initial=0.0)
-    bound = np.hypot(*found.outer.T).max(initial=0.0) if len(found.outer) else np.inf
-    own = stress_plane(ensemble, ensemble.original)
+    polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
+    reached = np.hypot(*polygons.inner.T).max(initial=0.0)
+    bound = np.hypot(*polygons.outer.T).max(initial=0.0) if len(polygons.outer) else np.inf
+    original = stress_plane(ensemble, ensemble.original)
     return StressOutline(
         angles,
         support,
         gap,
-        found.inner,
-        found.outer,
+        polygons.inner,
+        polygons.outer,
         float(reached),
         float(bound),
-        own,
-        found.converged,
-        found.counts,
+        original,
+        polygons.converged,
+        polygons.counts,
     )
 
 
@@ -119,8 +119,8 @@ def admissible_stress(
     Raises InputError as `stress_outline`.
     """
     axes = stress_axes(ensemble)
-    found = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
-    return stress_inside(found.inner, ensemble.packing.pressure)
+    polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
+    return stress_inside(polygons.inner, ensemble.packing.pressure)
 
 
 def stress_inside(corners: Floats, pressure: float) -> Floats:

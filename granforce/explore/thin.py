@@ -68,13 +68,13 @@ def basis(balance: Floats, dimension: int) -> Basis:
     return Basis(right[len(right) - dimension :].T, inverse)
 
 
-def thin_matrix(found: Basis, y: Floats, levers: Floats, weight: Floats, count: int) -> ThinMatrix:
+def thin_matrix(basis: Basis, y: Floats, levers: Floats, weight: Floats, count: int) -> ThinMatrix:
     """The ThinMatrix at y (w,), which may be as small as FLAT; weight (2 N_c,): W on levers."""
-    null = cancelling.apart(_orthonormal, found.free / y[:, None])
+    null = cancelling.apart(_orthonormal, basis.free / y[:, None])
     along = levers @ null
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
     root = np.linalg.solve(np.linalg.cholesky(H), null.T).T
-    return ThinMatrix(null, root, levers, found.inverse / y[:, None], count)
+    return ThinMatrix(null, root, levers, basis.inverse / y[:, None], count)
 
 
 def _orthonormal(columns: Floats) -> Floats:

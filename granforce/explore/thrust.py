@@ -54,10 +54,10 @@ def thrust(ensemble: Ensemble) -> Thrust:
         a, b = ends[active].T
         directions, rows = np.zeros((len(active), 2 * size)), np.arange(len(active))
         directions[rows, a], directions[rows, b] = -part[active], 1 - part[active]
-        found = solved(solver, plane, directions, keys)[1]
+        supports = solved(solver, plane, directions, keys)[1]
         keys += len(active)
-        gap[active] = np.maximum(found.bound, 0.0) / LOADED_JOINT
-        force = np.maximum(found.point, 0.0)
+        gap[active] = np.maximum(supports.bound, 0.0) / LOADED_JOINT
+        force = np.maximum(supports.point, 0.0)
         total = force[rows, a] + force[rows, b]
         farther = force[rows, b] / np.where(total > 0, total, 1.0)
         going = (gap[active] > JOINT_GAP) & (farther > part[active])

@@ -163,15 +163,15 @@ def walked(
     """
     ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
     counts = np.zeros((len(ends), 2), dtype=int)
-    found: list[Floats] = []
+    states: list[Floats] = []
     while left and polytope.dimension:
         ends, outs, done = on(ends, left)
-        found.append(outs)
+        states.append(outs)
         counts += done
         left -= outs.shape[1]
-    if not found:
+    if not states:
         return ends, np.ones((len(ends), count, polytope.count)), counts
-    slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
+    slacks = np.concatenate(states, axis=1)[:, paths - 1 :: paths]
     return ends, np.stack([polytope.on_hull(s) for s in slacks]), counts
 
 
@@ -287,7 +287,7 @@ def _check_same(previous: UniformSample, chains: int, seed: int, method: str) ->
 
 def begun(polytope: Walls, chains: int, seed: int) -> list[ChainState]:
     """Initial states of the chains, each with its own random stream."""
-    return [init(polytope, own) for own in np.random.SeedSequence(seed).spawn(chains)]
+    return [init(polytope, child) for child in np.random.SeedSequence(seed).spawn(chains)]
 
 
 def warm_up(
@@ -346,18 +346,18 @@ def drawn(
     Each chain has `have` states, and gets more up to the target, or until the work is cancelled.
     on(some chains, rows, count=…): as `step`.
     """
-    found = [np.zeros((len(ends), 0, len(ensemble.index), 2))]
+    chunks = [np.zeros((len(ends), 0, len(ensemble.index), 2))]
     counts = np.zeros((len(ends), 2), dtype=int)
     with suppress(Cancelled):
         while have < target:
             cancelling.check("uniform sample")
             count = min(ROUND, target - have)
             ends, slacks, done = together(stores, ends, partial(on, count=count))
-            found.append(forces_of(ensemble, polytope, slacks))
+            chunks.append(forces_of(ensemble, polytope, slacks))
             counts, have = counts + done, have + count
             if progress is not None:
                 progress(have * len(ends), target * len(ends))
-    return ends, np.concatenate(found, axis=1), counts
+    return ends, np.concatenate(chunks, axis=1), counts
 
 
 def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:

@@ -135,18 +135,18 @@ def volume(
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
-        wanted = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
-        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, wanted), progress)
+        allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
+        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, allowed), progress)
     ladders += polytope.units + log_top
-    found, own = float(ladders.mean()), 2 * np.sqrt(variance.sum())
-    agree = abs(ladders[1] - ladders[0]) <= AGREE * own
+    log_volume, two_errors = float(ladders.mean()), 2 * np.sqrt(variance.sum())
+    agree = abs(ladders[1] - ladders[0]) <= AGREE * two_errors
     counts = {"rungs": len(rungs[0]), "paths": int(sum(len(r.q) for way in rungs for r in way))}
     counts |= {name: sum(getattr(r, name) for way in rungs for r in way) for name in _COUNTS}
     return Volume(
-        log_volume=found,
+        log_volume=log_volume,
         error=float(error),
         dimension=polytope.dimension,
-        per_grain=found / grains,
+        per_grain=log_volume / grains,
         ladders=ladders,
         reached=bool(error <= accuracy and agree),
         counts=counts,
@@ -233,7 +233,7 @@ def _settled(
 
 def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
     """The rung with this many more paths, in whole batches."""
-    h, beta, end, found, drawn = polytope.dimension, rung.beta, rung.end, [rung.q], [rung.x]
+    h, beta, end, slack_sums, drawn = polytope.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)
     middle = np.ones((1 if beta > 0 else 0, polytope.count))
     for _ in range(0, count, _BATCH):
@@ -245,11 +245,11 @@ def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) ->
             speeds /= np.sqrt(beta)
             lengths = np.minimum(lengths * np.sqrt(beta / h), 0.5 * np.pi)
         (end,), outs, done = uniform.flown(polytope, rows, [end], [(speeds, lengths, middle)])
-        found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
+        slack_sums.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
     return rung._replace(
         end=end,
-        q=np.concatenate(found),
+        q=np.concatenate(slack_sums),
         x=np.concatenate(drawn),
         turns=rung.turns + int(counts[0]),
         refused=rung.refused + int(counts[1]),
@@ -328,7 +328,7 @@ def _extended(
     parts = uniform.shared(
         stores, tasks, lambda some, rows: [_flown(polytope, rows, *task) for task in some]
     )
-    found = [list(way) for way in rungs]
+    longer = [list(way) for way in rungs]
     for (way, k), rung in zip(order, itertools.chain(*parts), strict=True):
-        found[way][k] = rung
-    return found
+        longer[way][k] = rung
+    return longer

@@ -152,19 +152,19 @@ def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float)
     stiff, target = np.empty((2, contacts, 2))
     stiff[:], target[:] = weight * unit**2, measured / unit
     stiff = np.maximum(stiff, hull.pinned_stiffness(ensemble))
-    problem, found = independent_problem_of(ensemble), ensemble.hull
+    problem, affine_hull = independent_problem_of(ensemble), ensemble.hull
     contact, normal = hull.normals(ensemble)
     setup = _Setup(
         ensemble=ensemble,
         problem=problem,
         contact=contact,
         normal=normal,
-        held=found.held,
+        held=affine_hull.held,
         stiff=stiff,
         target=target,
     )
-    if found.held.any():
-        C, _, _ = setup.conductances(_barrier(setup, found.inner), stiff)
+    if affine_hull.held.any():
+        C, _, _ = setup.conductances(_barrier(setup, affine_hull.inner), stiff)
         _, out = wall_matrix.factored(problem.network, C, problem.diagonal, DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
         setup = setup._replace(problem=without)
@@ -180,14 +180,14 @@ def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
     """(K at y, positions of its walls in y)."""
     curvature = _barrier(setup, y)
     C, _, free = setup.conductances(curvature, setup.stiff)
-    own, _, _ = setup.conductances(curvature, setup.known)
+    conductances, _, _ = setup.conductances(curvature, setup.known)
     moving = np.flatnonzero(~setup.held & (free[setup.contact] > 0))
     padding = -len(moving) % BLOCK
     contact = np.append(setup.contact[moving], np.zeros(padding, dtype=np.int64))
     normal = np.vstack([setup.normal[moving] / y[moving, None], np.zeros((padding, 2))])
     problem = setup.problem
     factors, _ = wall_matrix.factored(problem.network, C, problem.diagonal, 0.0)
-    return WallMatrix(problem.network, contact, normal, C, own, factors), moving
+    return WallMatrix(problem.network, contact, normal, C, conductances, factors), moving
 
 
 def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:

@@ -45,15 +45,15 @@ def displacement(
     if whole:
         low, high = packing.cell.extent
     else:
-        seen = [*(outlines[k] for k in np.flatnonzero(free)), x[known] + arrow * field[known]]
-        low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
+        corners = [*(outlines[k] for k in np.flatnonzero(free)), x[known] + arrow * field[known]]
+        low, high = (end(np.concatenate(corners), axis=0) for end in (np.min, np.max))
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     shape = {"data_aspect": 1} if backend == "bokeh" else {"aspect": "equal"}
     words = {f"{axis}label": style.typeset(axis, backend) for axis in "xy"}
     return hv.Overlay(drawn).opts(
         title="First motion",
         **words,
-        legend_position=style.beside("top_right", backend),
+        legend_position=style.legend_position("top_right", backend),
         backend=backend,
         **limits,
         **shape,

@@ -23,14 +23,14 @@ _MEASURES = (
 def indeterminacy(
     rows: Rows | Store,
     *,
-    beside: Mapping[str, Rows] | None = None,
+    compare: Mapping[str, Rows] | None = None,
     outside: Rows = (),
     backend: str = "bokeh",
 ) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
     rows: dicts with mu, coordination (z), and any of eta1, eta2, eta3, extent (the width of S per
-    free dimension, in ⟨f_n⟩); or the store of a scan. beside: {name: rows} from other sources of
+    free dimension, in ⟨f_n⟩); or the store of a scan. compare: {name: rows} from other sources of
     the same measures, such as exact η3; missing values are not drawn. outside: rows whose states
     are outside S, so that their spread is not η: grey crosses.
     """
@@ -41,10 +41,10 @@ def indeterminacy(
         points = statistics.means(rows, name, factor=factor)
         if points:
             curves.append((points, label, style.COLOURS[k], "solid", k))
-    beside = beside or {}
-    for source, dash in zip(beside, ("dashed", "dotted"), strict=False):
+    compare = compare or {}
+    for source, dash in zip(compare, ("dashed", "dotted"), strict=False):
         for k, (name, label, factor) in enumerate(_MEASURES):
-            points = statistics.means(beside[source], name, factor=factor)
+            points = statistics.means(compare[source], name, factor=factor)
             if points:
                 curves.append((points, f"{label}, {source}", style.COLOURS[k], dash, k))
     # Leave room for the inset above the curves.
@@ -55,7 +55,7 @@ def indeterminacy(
         x="μ",
         y="η",
         ylim=(0, 2.4 * top) if backend == "matplotlib" else (0, 1.1 * top),
-        legend=style.beside("top_right", backend),
+        legend=style.legend_position("top_right", backend),
         marks=_crosses(outside, backend),
     )
     words: dict[str, Any] = {"title": "the same, log–log", "x": "μ", "y": "η"}
@@ -154,14 +154,14 @@ def _densities(
 def correlations(
     rows: Rows,
     *,
-    beside: Mapping[str, Rows] | None = None,
+    compare: Mapping[str, Rows] | None = None,
     chance: Mapping[float, float] | None = None,
     backend: str = "bokeh",
 ) -> hv.Overlay:
     """Figure 6: corr(f_n, ΔF_n) against μ with the paper's error bars.
 
     rows: dicts with mu, correlation, correlation_low and correlation_high (the least and largest
-    with any other sampled network in place of the original); means over rows of one μ. beside:
+    with any other sampled network in place of the original); means over rows of one μ. compare:
     {name: rows} with mu and correlation. chance: {μ: the largest |mean| that shuffled forces in as
     many packings give by chance}, dotted.
     """
@@ -172,7 +172,7 @@ def correlations(
     )
     reach = [(mu, middle[mu], middle[mu] - low[mu], high[mu] - middle[mu]) for mu in middle]
     drawn = [style.bars(reach, style.COLOURS[0], backend)]
-    sources = {"walk": rows, **(beside or {})}
+    sources = {"walk": rows, **(compare or {})}
     for k, (label, dash) in enumerate(zip(sources, style.DASHES, strict=False)):
         points = [p[:2] for p in statistics.means(sources[label], "correlation") if p[0] > 0]
         drawn.append(style.line(points, label, style.COLOURS[k], backend, dash))
@@ -188,5 +188,5 @@ def correlations(
         x="μ",
         y="corr(f_n, ΔF_n)",
         logx=True,
-        legend=style.beside("top_right", backend),
+        legend=style.legend_position("top_right", backend),
     )

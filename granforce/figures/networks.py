@@ -176,7 +176,7 @@ def overlaid(
                 drawn + outline(packing, backend),
                 backend,
                 title=f"μ = {mu:g}: {strong.sum()} strong, {loose.sum()} undetermined",
-                legend=style.beside("top_right", backend) if last else None,
+                legend=style.legend_position("top_right", backend) if last else None,
                 **_axes(packing, backend),
             )
         )

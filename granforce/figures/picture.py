@@ -62,9 +62,9 @@ def plot(
     several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
     if isinstance(colour, str) and colour in ("force", "spread"):
-        unit, told = _unit(packing, mean)
+        unit, scale = _unit(packing, mean)
     else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
-        unit, told = mean[:, 0].mean() or 1.0, ""
+        unit, scale = mean[:, 0].mean() or 1.0, ""
     friction = packing.contacts.friction(packing.mu)[numbers]
     values, label, look = _coloured(friction, several, mean, colour, unit)
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
@@ -75,7 +75,7 @@ def plot(
     sides = style.equal_scales(high - low, backend)
     count = int((~left_open_in(packing)).sum())
     kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
-    title = f"{counted(count, *kind)}, μ = {packing.mu:g}{told}"
+    title = f"{counted(count, *kind)}, μ = {packing.mu:g}{scale}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
 
 
@@ -125,8 +125,13 @@ def _lines(
     across = cell.across(begin), cell.across(end)
     rows = []
     width = np.minimum(force[pressing], WIDEST) * (2.5 if backend == "bokeh" else 1.5)
-    for moved, seen in cell.images(np.minimum(*across), np.maximum(*across)):
-        given = (begin[seen] + moved, end[seen] + moved, values[pressing][seen], width[seen])
+    for moved, visible in cell.images(np.minimum(*across), np.maximum(*across)):
+        given = (
+            begin[visible] + moved,
+            end[visible] + moved,
+            values[pressing][visible],
+            width[visible],
+        )
         rows.append(np.column_stack(given))
     table = np.concatenate(rows) if rows else np.empty((0, 6))
     segments = hv.Segments(
@@ -168,8 +173,8 @@ def _bodies(packing: Packing, backend: str) -> list[Any]:
         ]
     x, r, cell = packing.cell.wrapped(packing.x[disks]), packing.r[disks], packing.cell
     at, shapes = cell.across(x), []
-    for moved, seen in cell.images(at - r[:, None], at + r[:, None]):
-        shapes += [x[k] + moved + r[k] * CIRCLE for k in seen]
+    for moved, visible in cell.images(at - r[:, None], at + r[:, None]):
+        shapes += [x[k] + moved + r[k] * CIRCLE for k in visible]
     return [_polygons(shapes, backend, FILL)]
 
 

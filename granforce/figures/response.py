@@ -35,7 +35,7 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
         drawn: list[Any] = []
         for name, word, dash in names:
             drawn += _joined(_points(rows, name), word, dash, looks, backend)
-        legend = style.beside("top_left", backend) if label.startswith("α") else None
+        legend = style.legend_position("top_left", backend) if label.startswith("α") else None
         frames.append(style.frame(drawn, backend, title=title, x="η2", y=label, legend=legend))
     return style.page(frames, backend, columns=2)
 

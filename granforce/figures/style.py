@@ -131,7 +131,7 @@ def curves(
         yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
-def beside(corner: str, backend: str) -> str:
+def legend_position(corner: str, backend: str) -> str:
     """Place of a legend that would cover data: next to the frame, or in web pages in this corner.
 
     A web page has no room next to its frames, but data can be moved out from under the legend.
@@ -156,7 +156,7 @@ def frame(
         options = {"frame_width": width, "frame_height": height, "toolbar": "above"} | options
     else:
         options = {"aspect": "auto", "fontscale": 0.9} | options
-        options["hooks"] = [_legend_of(elements), _bar_beside]
+        options["hooks"] = [_legend_of(elements), _place_colour_bar]
     if legend is not None:
         options["legend_position"] = legend
     words = {"title": title, "xlabel": x, "ylabel": y}
@@ -202,9 +202,11 @@ def inset(
         axes = plot.handles["axis"].inset_axes(place)
         small = inner.opts(backend=backend, clone=True, title="", fontscale=0.65, show_legend=False)
         kind = hv.Store.registry[backend][hv.Overlay]
-        made = kind(small, fig=axes.figure, axis=axes)
-        made._close_figures = False  # otherwise Matplotlib would close the unfinished outer frame
-        made.initialize_plot()
+        artists = kind(small, fig=axes.figure, axis=axes)
+        artists._close_figures = (
+            False  # otherwise Matplotlib would close the unfinished outer frame
+        )
+        artists.initialize_plot()
 
     hooks = [_legend_of(outer.values()), draw]
     return [outer.opts(backend=backend, clone=True, hooks=hooks)]
@@ -232,7 +234,7 @@ def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
     return finish
 
 
-def _bar_beside(plot: Any, _: Any) -> None:
+def _place_colour_bar(plot: Any, _: Any) -> None:
     """A hook that keeps a colour bar next to its frame, as high as that is drawn.
 
     HoloViews places it before the scales of the frame are made equal.

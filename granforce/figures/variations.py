@@ -54,12 +54,12 @@ def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
     return style.page(frames, backend, columns=2)
 
 
-def opened(rows: Rows, own: Rows, *, backend: str = "bokeh") -> hv.Layout:
+def opened(rows: Rows, packed: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """η2 and 0.15 η3 of frictionless packings whose cones are opened to μ.
 
     rows: dicts with mu (of the cones), eta2, eta3; own: the same for packings made at that μ.
     """
-    sources = (("made at μ = 0", rows, "solid"), ("made at μ", own, "dashed"))
+    sources = (("made at μ = 0", rows, "solid"), ("made at μ", packed, "dashed"))
     names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
     return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
 
@@ -111,7 +111,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     largest in their packing. rows: dicts with mu, seed, friction (the largest) and own_shear (of
     the original network); uniform: with mu, seed, mean_shear and largest_shear of uniform states.
     """
-    own, states = (
+    original, states = (
         [
             {"mu": row["mu"], **{name: row[name] / most["friction"] for name in names}}
             for row, most in statistics.paired(some, rows)
@@ -125,7 +125,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
         (
             "in parts of the largest",
             "shear stress / largest",
-            (("own_shear", own), ("largest_shear", states), ("mean_shear", states)),
+            (("own_shear", original), ("largest_shear", states), ("mean_shear", states)),
         ),
     )
     words = {
@@ -143,7 +143,11 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
             if shown == name and some
         ]
         # In the left frame there is room above the curves at small μ.
-        legend = "top_left" if title == "Shear stress" else style.beside("bottom_right", backend)
+        legend = (
+            "top_left"
+            if title == "Shear stress"
+            else style.legend_position("bottom_right", backend)
+        )
         axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "ylim": (0, None)}
         frames.append(style.graph(series, backend, title=title, legend=legend, **axes))
     return style.page(frames, backend, columns=2)
@@ -198,8 +202,8 @@ def tails(groups: Mapping[str, Mapping[float, Points]], *, backend: str = "bokeh
             drawn.append(style.line(some, f"μ = {mu:g}", colour, backend))
             drawn.append(style.dots(some, f"μ = {mu:g}", colour, backend, marker, size=4))
         for law, (dash, density) in laws.items():
-            seen = density >= least
-            ends = list(zip(f[seen], density[seen], strict=True))
+            dense = density >= least
+            ends = list(zip(f[dense], density[dense], strict=True))
             drawn.append(style.line(ends, law, style.GREY, backend, dash))
         legend = None if last else "right"
         axes: dict[str, Any] = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}

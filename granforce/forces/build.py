@@ -98,8 +98,8 @@ def with_idle(S: Ensemble) -> Ensemble:
         bounds[S.index] = S.bounds
     conditions = _Conditions(S.mu, held, None, bounds)
     full = _assemble(S.packing, conditions, np.flatnonzero(~held))
-    found = starting_network(S)
-    return replace(full, found=S.expand(found)[full.index], force_scale=S.force_scale)
+    network = starting_network(S)
+    return replace(full, computed=S.expand(network)[full.index], force_scale=S.force_scale)
 
 
 def ensemble_at(packing: Packing | Ensemble, **conditions: Any) -> Ensemble:
@@ -131,20 +131,22 @@ def _pruned(full: Ensemble, conditions: _Conditions) -> Ensemble:
     such values): if no network balances without them, contacts that press in the known network
     stay.
     """
-    carrying, found = backbone.carrying(full)
-    S = _picked(full, conditions, carrying, found)
-    if found is None or S.member is not None:
+    carrying, network = backbone.carrying(full)
+    S = _picked(full, conditions, carrying, network)
+    if network is None or S.member is not None:
         return S
     near = nearest(S, S.original).forces
     if S.admits(near):
-        return replace(S, found=near)
-    pressing = found[:, 0] > BALANCED / 10 * full.force_scale
-    return _picked(full, conditions, carrying | pressing, found)
+        return replace(S, computed=near)
+    pressing = network[:, 0] > BALANCED / 10 * full.force_scale
+    return _picked(full, conditions, carrying | pressing, network)
 
 
-def _picked(full: Ensemble, conditions: _Conditions, kept: Mask, found: Floats | None) -> Ensemble:
-    S = full if kept.all() else _assemble(full.packing, conditions, full.index[kept])
-    return replace(S, found=None if found is None else found[kept])
+def _picked(
+    full: Ensemble, conditions: _Conditions, chosen: Mask, network: Floats | None
+) -> Ensemble:
+    S = full if chosen.all() else _assemble(full.packing, conditions, full.index[chosen])
+    return replace(S, computed=None if network is None else network[chosen])
 
 
 def _check_frozen_and_known(

@@ -70,7 +70,7 @@ class Ensemble:
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
     find_hull: Callable[[Ensemble], Hull]  # computes `hull`, by programs that import this file
-    found: Floats | None = None  # (N_c, 2) a network found while the backbone was determined
+    computed: Floats | None = None  # (N_c, 2) a network computed while the backbone was determined
 
     @property
     def per_contact(self) -> int:
@@ -211,7 +211,7 @@ class Ensemble:
 
         It certifies that S is not empty, whatever a solver reports.
         """
-        at_hand = (forces for forces in (self.original, self.found) if forces is not None)
+        at_hand = (forces for forces in (self.original, self.computed) if forces is not None)
         return next((forces for forces in at_hand if self.admits(forces)), None)
 
     @cached_property
@@ -339,7 +339,7 @@ class Ensemble:
     def with_bounds(self, bounds: Floats, network: Floats) -> Ensemble:
         """The same with other `bounds`; network (N_c, 2): a network of S, force."""
         known = knowledge.polygons(bounds, self.slopes, self.force_scale, self.index)
-        return replace(self, known=known, found=network)
+        return replace(self, known=known, computed=network)
 
     def with_normal(self, position: int, network: Floats) -> Ensemble:
         """The same with f_n of the contact at `position` known as well.

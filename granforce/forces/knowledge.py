@@ -68,9 +68,9 @@ def bounds_of(known: Known | None, count: int) -> Floats:
             "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
             "f_n and f_t"
         ) from None
-    there = are_whole(contacts, count - 1)
-    if not there.all():
-        first = contacts[~there][0]
+    valid = are_whole(contacts, count - 1)
+    if not valid.all():
+        first = contacts[~valid][0]
         raise InputError(
             f"known contact {first:g} does not exist; the packing's contacts are 0 … {count - 1}"
         )
@@ -195,7 +195,7 @@ def extended(
     """
     parts, T, unit = T.shape[0] // len(known.pinned), sparse.csr_matrix(T), units(mu)
     at, size = parts * known.contact + known.component, unit[known.contact, known.component]
-    beside = sparse.diags(known.sign / size) @ T[at]
+    bounds = sparse.diags(known.sign / size) @ T[at]
     contact, component = pins(known, mu)
     held = sparse.diags(1 / unit[contact, component]) @ T[parts * contact + component]
     sides = len(at)
@@ -203,7 +203,7 @@ def extended(
     whole = sparse.vstack(
         [
             sparse.hstack([sparse.csr_matrix(A), empty[0]]),
-            sparse.hstack([beside, sparse.identity(sides)]),
+            sparse.hstack([bounds, sparse.identity(sides)]),
             sparse.hstack([held, empty[1]]),
         ],
         format="csc",

@@ -146,8 +146,8 @@ def fitted_many(
     for _ in range(_MOST_STEPS):
         cancelling.check("inference")
         interior_point.look(problem, False, at, work, lanes)
-        there = (work.unbalance[0] <= _BALANCE) & (work.product[0] <= closed)
-        work.going[0, there] = 0.0
+        solved = (work.unbalance[0] <= _BALANCE) & (work.product[0] <= closed)
+        work.going[0, solved] = 0.0
         if not work.going[0].any():
             break
         interior_point.advance(problem, False, OPTIMUM, at, work, lanes)
@@ -161,10 +161,10 @@ def _otherwise(
     ensemble: Ensemble, forces: Floats, m: Floats, s: Floats, unmeasured: float
 ) -> Floats:
     """The most likely network if the steps ended just outside S, or did not converge."""
-    found = nearest(ensemble, forces) if np.isfinite(forces).all() else None
-    if found is not None and found.converged and found.residual <= BALANCED:
-        if np.abs(found.forces - forces).max() <= _NEAR * ensemble.force_scale:
-            return found.forces
+    relaxed = nearest(ensemble, forces) if np.isfinite(forces).all() else None
+    if relaxed is not None and relaxed.converged and relaxed.residual <= BALANCED:
+        if np.abs(relaxed.forces - forces).max() <= _NEAR * ensemble.force_scale:
+            return relaxed.forces
     spread = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
     forces = likeliest_piqp(ensemble, 1 / spread, m)
     if ensemble.admits(forces):
@@ -197,13 +197,13 @@ def _rank(rows: sparse.csr_matrix) -> int:
     """
     square = rows @ rows.T
     diagonal = square.diagonal()
-    there = np.flatnonzero(diagonal > 0)
-    if not len(there):
+    positive = np.flatnonzero(diagonal > 0)
+    if not len(positive):
         return 0
-    scale, unit = sparse.diags(1 / np.sqrt(diagonal[there])), sparse.identity(len(there))
-    square = scale @ square[there][:, there] @ scale
+    scale, unit = sparse.diags(1 / np.sqrt(diagonal[positive])), sparse.identity(len(positive))
+    square = scale @ square[positive][:, positive] @ scale
     less, more = (cancelling.apart(_log_determinant, square + shift * unit) for shift in _SHIFTS)
-    return len(there) - round((more - less) / np.log(_SHIFTS[1] / _SHIFTS[0]))
+    return len(positive) - round((more - less) / np.log(_SHIFTS[1] / _SHIFTS[0]))
 
 
 def _log_determinant(square: sparse.csc_matrix) -> float:

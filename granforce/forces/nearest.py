@@ -202,7 +202,7 @@ class Search:
         self._begin(targets, start)
         self.steps, self.short = [0] * width, [0] * width
         self.ended = [False] * width
-        self.found = self.at.y[:-1].copy()
+        self.solution = self.at.y[:-1].copy()
 
     def _begin(self, targets: Floats, start: Floats | None) -> None:
         """y and z of each contact's own projection, moved inside; pinned ones stay."""
@@ -236,8 +236,8 @@ class Search:
             product, unbalance, slackness = self._look()
             ready, going = [], []
             for k in active:
-                there = unbalance[k] <= tolerance and slackness[k] <= near[k]
-                if there and product[k] <= near[k] ** 2:
+                solved = unbalance[k] <= tolerance and slackness[k] <= near[k]
+                if solved and product[k] <= near[k] ** 2:
                     self._end(k, True)
                 elif product[k] < attempt[k]:  # once only where it is 0
                     ready.append(k)
@@ -260,7 +260,7 @@ class Search:
 
     def forces(self) -> Floats:
         """Forces (W, N_c, 2) found, in ⟨f_n⟩."""
-        pairs = self.found[: len(self.problem.w)].reshape(-1, 2, self.found.shape[1])
+        pairs = self.solution[: len(self.problem.w)].reshape(-1, 2, self.solution.shape[1])
         normal, tangential = 0.5 * (pairs[:, 0] + pairs[:, 1]), 0.5 * (pairs[:, 0] - pairs[:, 1])
         return np.moveaxis(np.stack([normal, self.problem.mu[:, None] * tangential], axis=1), -1, 0)
 
@@ -271,7 +271,7 @@ class Search:
         return work.product[0].tolist(), work.unbalance[0].tolist(), work.slackness[0].tolist()
 
     def _end(self, lane: int, reached: bool) -> None:
-        self.found[:, lane] = self.at.y[:-1, lane]
+        self.solution[:, lane] = self.at.y[:-1, lane]
         self.ended[lane] = reached
 
     def _advance(self, going: Sequence[int], mode: int) -> None:

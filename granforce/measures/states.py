@@ -101,13 +101,13 @@ def eta3(low: Floats, high: Floats | None = None) -> float:
     if high is None:
         raise InputError(
             "eta3 takes two arrays (N_c, 2): eta3(exact.low, exact.high) of exact intervals, "
-            "eta3(*intervals_seen(states)) of states"
+            "eta3(*sampled_intervals(states)) of states"
         )
     low, high = _bounds(low, high)
     return float((high - low).mean() / ((high + low) / 2).mean())
 
 
-def intervals_seen(states: Floats) -> tuple[Floats, Floats]:
+def sampled_intervals(states: Floats) -> tuple[Floats, Floats]:
     """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
     states = _some(states)
     return states.min(axis=0), states.max(axis=0)

@@ -76,12 +76,12 @@ def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dic
 
     rows: dicts with μ (or another key to group by) and the name; rows without it are skipped.
     """
-    found: dict[Any, list[float]] = {}
+    groups: dict[Any, list[float]] = {}
     for row in rows:
         value = row.get(name)
         if value is not None and np.isfinite(value):
-            found.setdefault(row[by], []).append(value)
-    return {key: np.array(found[key]) for key in sorted(found)}
+            groups.setdefault(row[by], []).append(value)
+    return {key: np.array(groups[key]) for key in sorted(groups)}
 
 
 def paired(rows: Rows, others: Rows) -> list[tuple[dict[str, Any], dict[str, Any]]]:
@@ -251,8 +251,10 @@ def tail_exponent(values: npt.ArrayLike, quantile: float = 0.5) -> float:
         excess = np.expm1(b * logs).sum()
         return np.log(excess) - log_b - b * logs.mean()
 
-    found = optimize.minimize_scalar(minus_likelihood, bounds=np.log([0.02, 50]), method="bounded")
-    return float(np.exp(found.x))
+    optimum = optimize.minimize_scalar(
+        minus_likelihood, bounds=np.log([0.02, 50]), method="bounded"
+    )
+    return float(np.exp(optimum.x))
 
 
 def _finite(values: Iterable[float]) -> Floats:

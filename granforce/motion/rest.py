@@ -70,14 +70,14 @@ def rest(
         raise InputError("noise must be standard deviations ≥ 0")
     if not S.original.any():
         raise InputError("the packing has no forces to check for rest")
-    step, own = make_step(S), S.original / S.force_scale
-    first = relax(step, _from(own))
+    step, forces = make_step(S), S.original / S.force_scale
+    first = relax(step, _from(forces))
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)
         return Rest(False, np.nan, noise, none, _on_all(S, first.forces))
     rng = np.random.default_rng(random_seed(seed))
     starts = [
-        first.forces + level * rng.standard_normal(own.shape)
+        first.forces + level * rng.standard_normal(forces.shape)
         for level in noise
         for _ in range(draws)
     ]
@@ -88,7 +88,7 @@ def rest(
     outcomes = [ends[k] for k in range(len(starts))]
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)
-    distance = float(np.abs(first.forces - own).max())
+    distance = float(np.abs(first.forces - forces).max())
     return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, moving))
 
 

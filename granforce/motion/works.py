@@ -42,9 +42,9 @@ def relax(step: Step, push: Push) -> Outcome:
     def one() -> Generator[Push, Outcome, Outcome]:
         return (yield push)
 
-    found: list[Outcome] = []
-    follow(step, [one()], lambda _, outcome: found.append(outcome))
-    return found[0]
+    outcomes: list[Outcome] = []
+    follow(step, [one()], lambda _, outcome: outcomes.append(outcome))
+    return outcomes[0]
 
 
 def follow(

@@ -136,20 +136,20 @@ class Solver:
         system: System,
         *,
         workers: int = 1,
-        seen: Callable[[Any, Floats], object] | None = None,
+        on_state: Callable[[Any, Floats], object] | None = None,
         progress: Progress | None = None,
         total: int = 0,
         done: int = 0,
-        found: Callable[[Any, float, float], object] | None = None,
+        on_value: Callable[[Any, float, float], object] | None = None,
     ) -> None:
-        """seen(key, y): called with each load-free y (n,) of S at which a value is attained.
+        """on_state(key, y): called with each load-free y (n,) of S at which a value is attained.
 
-        found(key, attained, bound) is called as each program ends, progress(done, total) counts
+        on_value(key, attained, bound) is called as each program ends, progress(done, total) counts
         from `done`. All are called from one thread at a time.
         """
         self.system, self.workers = system, worker_count(workers)
-        self.seen, self.progress, self.total, self.done = seen, progress, total, done
-        self.found = found or (lambda key, attained, bound: None)
+        self.on_state, self.progress, self.total, self.done = on_state, progress, total, done
+        self.on_value = on_value or (lambda key, attained, bound: None)
         self.counts = {"programs": 0, "again": 0, "iterations": 0}
         self.lock = threading.Lock()
 
@@ -207,12 +207,12 @@ class Solver:
                 before = bounds.get(key, (np.inf, -np.inf))
                 least = max(before[1], bound[k])
                 bounds[key] = _nearer(before[0], attained[k], least), least
-                self.found(key, *bounds[key])
+                self.on_value(key, *bounds[key])
                 if points is not None and (key not in points or bounds[key][0] != before[0]):
                     points[key] = outcome.y
                 self.counts["iterations"] += outcome.steps
-                if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):
-                    self.seen(key, outcome.y)
+                if self.on_state and outcome.loaded < 0 and np.isfinite(attained[k]):
+                    self.on_state(key, outcome.y)
 
 
 def _nearer(one: float, other: float, bound: float) -> float:

@@ -97,15 +97,17 @@ def solve(model: highspy.Highs) -> tuple[highspy.HighsModelStatus, Floats]:
 def solutions(model: highspy.Highs) -> Iterator[tuple[highspy.HighsModelStatus, Floats]]:
     """Yield status and point y (n,) of the model as set up, then of other methods in turn."""
     yield solve(model)
-    own = {name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options}
+    options_before = {
+        name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options
+    }
     try:
         for options in _OTHER_WAYS:
             model.clearSolver()
-            for name, value in (own | options).items():
+            for name, value in (options_before | options).items():
                 model.setOptionValue(name, value)
             yield solve(model)
     finally:
-        for name, value in own.items():
+        for name, value in options_before.items():
             model.setOptionValue(name, value)
 
 
@@ -119,18 +121,18 @@ def points(A: sparse.csr_matrix, b: Floats) -> Iterator[Floats]:
     model = standard_form(A, b, solver="simplex")
     for _, y in solutions(model):
         yield np.maximum(y, 0.0)
-        found = basis(model)
-        if found is not None:
+        optimal = basis(model)
+        if optimal is not None:
             with suppress(RuntimeError):  # singular basis
-                yield np.maximum(vertex(A, b, np.zeros(A.shape[1]), *found)[0], 0.0)
+                yield np.maximum(vertex(A, b, np.zeros(A.shape[1]), *optimal)[0], 0.0)
 
 
 def multipliers(model: highspy.Highs, A: sparse.csr_matrix, cost: Floats) -> Floats:
     """Multipliers λ (m,) of the rows of a solved model, to rounding if it has a basis."""
-    found = basis(model)
-    if found is not None:
+    optimal = basis(model)
+    if optimal is not None:
         try:
-            return vertex(A, np.zeros(A.shape[0]), cost, *found)[1]
+            return vertex(A, np.zeros(A.shape[0]), cost, *optimal)[1]
         except RuntimeError:  # singular basis
             pass
     return np.array(model.getSolution().row_dual)
@@ -169,11 +171,11 @@ def basis(model: highspy.Highs) -> tuple[Integers, Integers] | None:
 
     Rows whose logical variable is basic are implied by the others and left out.
     """
-    found = model.getBasis()
+    optimal = model.getBasis()
     basic = highspy.HighsBasisStatus.kBasic
-    columns = np.flatnonzero([status == basic for status in found.col_status])
-    rows = np.flatnonzero([status != basic for status in found.row_status])
-    return (rows, columns) if found.valid and len(rows) == len(columns) else None
+    columns = np.flatnonzero([status == basic for status in optimal.col_status])
+    rows = np.flatnonzero([status != basic for status in optimal.row_status])
+    return (rows, columns) if optimal.valid and len(rows) == len(columns) else None
 
 
 def least_unbalanced(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Floats]:

@@ -57,7 +57,7 @@ def inner_point(A: sparse.csr_matrix, b: Floats) -> InnerPoint:
 def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -> InnerPoint:
     """The InnerPoint reached by programs in this unit, from one in a larger unit."""
     held, resolution = start.held.copy(), start.resolution
-    found: list[Floats] = []
+    points: list[Floats] = []
     wanted, untried, last = held, held, unit == _UNITS[-1]
     while wanted.any():
         point = _raised(A, b, unit, start, wanted)
@@ -69,7 +69,7 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
         least = resolution if last else max(resolution, _AWAY * _UNITS[-1])
         if last and point.min() < -least:
             break
-        found.append(point)
+        points.append(point)
         newly = held & (point > least)
         if newly.any():
             held = held & ~newly
@@ -81,7 +81,7 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
         untried = untried & ~wanted if wanted.sum() == 1 else untried
         rest = np.where(untried, point, 0.0)
         wanted = (np.arange(len(rest)) == np.argmax(rest)) & (rest.sum() > least)
-    y = np.mean(found, axis=0) if found else start.y
+    y = np.mean(points, axis=0) if points else start.y
     return InnerPoint(y, held, resolution)
 
 

@@ -105,13 +105,13 @@ def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int
     key = np.minimum(contacts.i, contacts.j) * n + np.maximum(contacts.i, contacts.j)
     order = np.argsort(key, kind="stable")
     first, last = (np.searchsorted(key[order], i * n + j, side) for side in ("left", "right"))
-    found = np.zeros(len(i), bool)
+    listed = np.zeros(len(i), bool)
     # Two grains touch twice only through different images, with normals at 60° or more.
     for k in range(int((last - first).max(initial=0))):
         some = np.flatnonzero(first + k < last)
         same = direction[order[first[some] + k]]
-        found[some] |= np.sum(normal[some] * same, axis=1) >= 0.75
-    return found
+        listed[some] |= np.sum(normal[some] * same, axis=1) >= 0.75
+    return listed
 
 
 def _on_backbone(packing: Packing, **conditions: Any) -> Packing | None:

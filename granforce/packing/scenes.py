@@ -80,9 +80,11 @@ def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
         raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(EVERY)}")
     kind = EVERY[name]
     mu = kind.mu if mu is None else friction(mu)
-    there = list(inspect.signature(kind.make).parameters)[1:]
-    for unknown in sorted(options.keys() - set(there)):
-        has = f"its options are {', '.join(there)}" if there else "it has no options"
+    known_options = list(inspect.signature(kind.make).parameters)[1:]
+    for unknown in sorted(options.keys() - set(known_options)):
+        has = (
+            f"its options are {', '.join(known_options)}" if known_options else "it has no options"
+        )
         raise InputError(f"the scene {name} has no option {brief(unknown)}: {has}")
     sketch = kind.make(mu, **options)
     if isinstance(sketch, Sketch):
@@ -273,15 +275,17 @@ def _pyramid(mu: float, angle: float = 30.0) -> Sketch:
 
 def _press(mu: float) -> Sketch:
     """The close pyramid without weight, under a wall that presses with force 1."""
-    made = _pyramid(mu)
+    pyramid = _pyramid(mu)
     lid = 2 + np.sqrt(3)
-    walls = [*made.walls.tolist(), [-1.6, lid, 1.6, lid]]
-    return made._replace(walls=np.array(walls), load=0 * made.load, pressing=np.array([0, 1.0]))
+    walls = [*pyramid.walls.tolist(), [-1.6, lid, 1.6, lid]]
+    return pyramid._replace(
+        walls=np.array(walls), load=0 * pyramid.load, pressing=np.array([0, 1.0])
+    )
 
 
 def _leaning(mu: float) -> Sketch:
-    made = _pyramid(mu)
-    return made._replace(walls=np.array([[-2, 4.2, -2, 0], [-2, 0, 2.8, 0]], dtype=float))
+    pyramid = _pyramid(mu)
+    return pyramid._replace(walls=np.array([[-2, 4.2, -2, 0], [-2, 0, 2.8, 0]], dtype=float))
 
 
 def _column(mu: float, disks: int = 10, angle: float = 30.0) -> Sketch:
@@ -298,9 +302,9 @@ def _pressed(mu: float, disks: int, packed_mu: float, dimension: int) -> Packing
     """A number of disks compressed in a periodic box: the first seed with this dimension h."""
     for seed in range(1, MOST_SEEDS):
         try:
-            made = pack(disks, mu=packed_mu, seed=seed)
-            if ensemble(made).dimension == dimension:
-                return made._replace(mu=mu, info=made.info | {"packed_mu": packed_mu})
+            packing = pack(disks, mu=packed_mu, seed=seed)
+            if ensemble(packing).dimension == dimension:
+                return packing._replace(mu=mu, info=packing.info | {"packed_mu": packed_mu})
         except (NotJammedError, UndecidedError):
             continue
     raise InputError(f"no {disks} disks of {MOST_SEEDS} seeds have h = {dimension}")

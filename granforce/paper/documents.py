@@ -1,7 +1,7 @@
 """The study's tables in documents, written between two marks, so that no number is copied by hand.
 
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
-against μ), "beside" (other measures at each μ), "highlights" (ten findings, one sentence each),
+against μ), "others" (other measures at each μ), "highlights" (ten findings, one sentence each),
 "headlines" (the first four of them), "claims" (all claims), "findings" (numbers beyond the claims),
 "sweeps" (the residual of the paper's sweeps, and their excess over S), "preparation" (how results
 depend on the packing), "counts" (number of packings in each part).
@@ -61,7 +61,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     """
     known = {
         "measures": lambda: measures(table),
-        "beside": lambda: beside(table),
+        "others": lambda: others(table),
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "claims": lambda: claim_table(claims),
@@ -119,7 +119,7 @@ def measures(table: StudyTable) -> str:
     return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def beside(table: StudyTable) -> str:
+def others(table: StudyTable) -> str:
     """Intervals seen by walks, states of contacts, and the width of S against μ, as a table.
 
     Means ± standard errors over packings; ratios are of the same packing.
@@ -217,12 +217,14 @@ def preparation(table: StudyTable) -> str:
         ("exact η3", "exact", "eta3"),
         ("η2", "walk", "eta2"),
     )
-    made = [part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")]
-    made = list(dict.fromkeys(made))
+    variants = [
+        part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")
+    ]
+    variants = list(dict.fromkeys(variants))
     lines, differences = [], []
-    for mu in sorted({row["mu"] for row in table.part(*made)}):
-        seeds = {row["seed"] for row in table.part(*made) if row["mu"] == mu}
-        for name in ("", *made):
+    for mu in sorted({row["mu"] for row in table.part(*variants)}):
+        seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
+        for name in ("", *variants):
             parts = {"exact": f"{name}_exact" if name else "exact", "walk": name or "walk"}
             cells, counted = [], set()
             for _, source, measure in columns:
@@ -265,8 +267,8 @@ def _apart(rows: Rows, others: Rows, name: str) -> float:
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """The first highlights as a list."""
-    found = highlights(table, claims, findings)[:HEADLINES]
-    return "".join(f"- {one.sentence}\n" for one in found)
+    chosen = highlights(table, claims, findings)[:HEADLINES]
+    return "".join(f"- {one.sentence}\n" for one in chosen)
 
 
 def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
@@ -293,7 +295,7 @@ def finding_table(findings: Rows) -> str:
         else:
             others.append([statement, number])
     words = [word for word, _ in RANGES]
-    lines = [[name, *(found.get(word, "") for word in words)] for name, found in ranged.items()]
+    lines = [[name, *(numbers.get(word, "") for word in words)] for name, numbers in ranged.items()]
     first = markdown_table(["finding", *(f"{word} μ" for word in words)], lines) if lines else ""
     second = markdown_table(["finding", "number"], others) if others else ""
     return "\n".join(part for part in (first, second) if part)
@@ -315,13 +317,13 @@ def counts(table: StudyTable) -> str:
         for n in sorted({row["n"] for row in rows}):
             some = [row for row in rows if row["n"] == n]
             # Several packings may have the same friction of cones.
-            made: dict[Any, set[int]] = {}
+            seeds_at: dict[Any, set[int]] = {}
             for row in some:
-                made.setdefault(row.get("packing_mu", row["mu"]), set()).add(row["seed"])
-            each = sorted({len(seeds) for seeds in made.values()})
+                seeds_at.setdefault(row.get("packing_mu", row["mu"]), set()).add(row["seed"])
+            each = sorted({len(seeds) for seeds in seeds_at.values()})
             span = f"{each[0]}" if len(each) == 1 else f"{each[0]} to {each[-1]}"
             versions = [_version(some, name) for name in ("version", "packing_version")]
-            lines.append([part, str(n), str(len(made)), span, *versions])
+            lines.append([part, str(n), str(len(seeds_at)), span, *versions])
     heads = ("part", "disks", "μ", "packings at each", "version", "version of packings")
     return markdown_table(heads, lines)
 
@@ -331,10 +333,10 @@ def _version(rows: Rows, name: str) -> str:
 
 
 def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
-    found: dict[float, list[dict[str, Any]]] = {}
+    groups: dict[float, list[dict[str, Any]]] = {}
     for row in rows:
-        found.setdefault(row["mu"], []).append(row)
-    return dict(sorted(found.items()))
+        groups.setdefault(row["mu"], []).append(row)
+    return dict(sorted(groups.items()))
 
 
 def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
@@ -342,15 +344,15 @@ def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
     return [row for row in drawn(table, sampler) if not skipped(row)]
 
 
-def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -> str:
+def _cell(rows: Rows, name: str, factor: float, form: str | None, expected: int) -> str:
     """Mean ± standard error over rows, and their number if it is not the wanted one."""
-    found = np.array([row[name] for row in rows if name in row], dtype=float)
-    values = factor * found[np.isfinite(found)]
+    numbers = np.array([row[name] for row in rows if name in row], dtype=float)
+    values = factor * numbers[np.isfinite(numbers)]
     if not len(values):
         return ""
     mean = values.mean()
     text = form.format(mean) if form else with_error(values)
-    return text if len(values) == wanted else f"{text} ({len(values)})"
+    return text if len(values) == expected else f"{text} ({len(values)})"
 
 
 def claim_table(claims: Rows) -> str:
@@ -360,9 +362,9 @@ def claim_table(claims: Rows) -> str:
         key = claim["statement"], claim["source"], claim["criterion"]
         lines.setdefault(key, {})[claim["sampler"]] = claim
     rows = []
-    for (statement, source, criterion), found in lines.items():
+    for (statement, source, criterion), by_sampler in lines.items():
         criterion = criterion.replace("[", "(").replace("]", ")")
-        cells = [_verdict(found[name]) if name in found else "" for name in _HEADS]
+        cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in _HEADS]
         rows.append([statement, source, criterion, *cells])
     return markdown_table(["claim", "from", "criterion", *_HEADS.values()], rows)
 

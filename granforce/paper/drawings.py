@@ -92,8 +92,8 @@ _RELAXED = {
 def paper_sampler(table: StudyTable) -> str:
     """Sampler of Figures 1 to 6: the paper's if the table has it at every μ of its plan."""
     known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
-    wanted = set(table.plan.get("frictions", ()))
-    return "gauss_seidel" if wanted and wanted <= known else "nearest"
+    frictions = set(table.plan.get("frictions", ()))
+    return "gauss_seidel" if frictions and frictions <= known else "nearest"
 
 
 def captions(table: StudyTable) -> dict[str, str]:
@@ -185,12 +185,12 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
         drawings["effort"] = _later(figures.effort, efforts)
     if walk and exact:
         sources = {"exact": exact, "volume": table.part("volume")}
-        drawings["figure1_exact"] = _later(figures.indeterminacy, walk, beside=sources)
+        drawings["figure1_exact"] = _later(figures.indeterminacy, walk, compare=sources)
         both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
-        drawings["figure6_exact"] = _later(figures.correlations, walk, beside=both)
+        drawings["figure6_exact"] = _later(figures.correlations, walk, compare=both)
     if walk and uniform:
         drawings["figure1_uniform"] = _later(
-            figures.indeterminacy, walk, beside={"uniform": uniform}
+            figures.indeterminacy, walk, compare={"uniform": uniform}
         )
     groups = _some(_loose(_in_S(table, part)))
     if groups:

@@ -29,7 +29,7 @@ from granforce.types import Floats, Rows
 Values = Mapping[float, Any]  # {μ: a number of each packing}
 
 
-def found(table: StudyTable) -> list[Claim]:
+def measured(table: StudyTable) -> list[Claim]:
     """All findings about a `tables.StudyTable`, without those that lack data."""
     return [finding for family in FAMILIES for finding in family(table)]
 

@@ -86,7 +86,7 @@ def _maximum(of: _Numbers) -> Highlight:
     )
 
 
-def _seen(of: _Numbers) -> Highlight:
+def _coverage(of: _Numbers) -> Highlight:
     return Highlight(
         "A random walk of 1000 states covers only part of S: at intermediate μ its intervals are "
         f"{of.judged(WALK_OVER_EXACT)} times as long as the exact ones, and those of a uniform "
@@ -172,7 +172,7 @@ def _volume(of: _Numbers) -> Highlight:
 
 
 SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
-    *(_maximum, _free_forces, _seen, _strong, _wider, _alike, _critical, _stability, _shear),
+    *(_maximum, _free_forces, _coverage, _strong, _wider, _alike, _critical, _stability, _shear),
     _volume,
 )
 

@@ -57,17 +57,17 @@ def main(arguments: argparse.Namespace) -> int:
         folder = make_folder(arguments.out)
     else:
         plan = plan_of(arguments)
-        wanted = plans.chosen(plan, _parts(arguments))
+        tasks = plans.chosen(plan, _parts(arguments))
         folder = make_folder(arguments.out)
         store = open_store(folder / "cells.zarr")
-        failed = compute(store.path, wanted, arguments)
-        reduced = tables.reduce(store.path, plan, wanted)
+        failed = compute(store.path, tasks, arguments)
+        reduced = tables.reduce(store.path, plan, tasks)
         tables.save(reduced, folder / "study.zarr")
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
     results: dict[str, Any] = {
         "claims": [claim._asdict() for claim in claims.judged(reduced)],
-        "findings": [finding._asdict() for finding in findings.found(reduced)],
+        "findings": [finding._asdict() for finding in findings.measured(reduced)],
         "skipped": reduced.skipped,
     }
     with written(folder / "claims.json") as file:
@@ -80,18 +80,19 @@ def main(arguments: argparse.Namespace) -> int:
 def _check_apart(arguments: argparse.Namespace) -> None:
     """InputError if a store to be written in the folder is also read."""
     if arguments.reduce is not None:
-        own = "the reduced study", Path(arguments.out) / "study.zarr"
+        written_store = "the reduced study", Path(arguments.out) / "study.zarr"
         read = [("--reduce", arguments.reduce), ("--table", arguments.table)]
         check_apart(
-            replaced=[own], read=[(typed, path) for typed, path in read if path is not None]
+            replaced=[written_store],
+            read=[(typed, path) for typed, path in read if path is not None],
         )
 
 
 def status(arguments: argparse.Namespace) -> int:
     """Print the progress of the parts of the plan on stdout; returns 0."""
     path = Path(arguments.out) / "cells.zarr"
-    wanted = plans.chosen(plan_of(arguments), _parts(arguments))
-    rows = plans.remaining(open_store(path, readonly=True).path, wanted)
+    tasks = plans.chosen(plan_of(arguments), _parts(arguments))
+    rows = plans.remaining(open_store(path, readonly=True).path, tasks)
     print_list(rows, ("part", "cells", "done", "minutes", "minutes left"), arguments.json)
     return 0
 
@@ -151,7 +152,7 @@ def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, .
 
 
 def compute(
-    path: str | Path, wanted: list[Task], arguments: argparse.Namespace
+    path: str | Path, tasks: list[Task], arguments: argparse.Namespace
 ) -> list[tuple[StudyCell, str]]:
     """Compute the tasks, with a bar on stderr; return the failures."""
     begin = time.monotonic()
@@ -163,7 +164,7 @@ def compute(
     with Bar("cells", "cell") as progress:
         failed = plans.compute(
             path,
-            wanted,
+            tasks,
             workers=arguments.workers,
             scheduler=arguments.scheduler,
             dtypes={"states": "float32"},

@@ -172,17 +172,17 @@ def tasks(plan: Plan) -> list[Task]:
     return list(itertools.chain(*by_part.values()))
 
 
-def packings(wanted: Iterable[Task]) -> list[StudyCell]:
+def packings(tasks_of_plan: Iterable[Task]) -> list[StudyCell]:
     """The packing cells that tasks need, each once."""
     unique: dict[Any, Any] = {}
-    for task in wanted:
+    for task in tasks_of_plan:
         named = task.cell.parameters["packing"]
         unique.setdefault(canonical(named), StudyCell(kinds.PACKING, named))
     return list(unique.values())
 
 
 def compute(
-    path: str | Path, wanted: Sequence[Task], **options: Any
+    path: str | Path, chosen_tasks: Sequence[Task], **options: Any
 ) -> list[tuple[StudyCell, str]]:
     """Compute tasks into the store at path, in their order; options as for `scan.run`.
 
@@ -191,7 +191,7 @@ def compute(
     packings are not tried.
     """
     cells: dict[str, StudyCell] = {}
-    for task in wanted:
+    for task in chosen_tasks:
         for cell in (*packings([task]), task.cell):
             cells.setdefault(f"{cell.kind.name} {canonical(cell.parameters)}", cell)
     return scan.run(path, list(cells.values()), **options)
@@ -205,12 +205,12 @@ def _task(
     mu: float,
     *arguments: Any,
     packing_mu: float | None = None,
-    made: dict[str, Any] | None = None,
+    packing_options: dict[str, Any] | None = None,
     **how: Any,
 ) -> Task:
     """The Task of a kind with the kind's arguments after the packing, and the packing's options."""
     packed = kinds.PACKING.parameters(
-        n, mu if packing_mu is None else packing_mu, seed, **made or {}
+        n, mu if packing_mu is None else packing_mu, seed, **packing_options or {}
     )
     return Task(
         part, StudyCell(kind, kind.parameters(packed, *arguments, mu=mu, **how)), n, mu, seed
@@ -335,9 +335,11 @@ def _prepared(plan: Plan, seed: int) -> list[Task]:
         return []
     family = []
     for mu in plan.prepared_frictions:
-        for name, made in variations(mu).items():
-            family.append(_nearest(f"prepared_{name}", seed, mu, plan, made=made))
-            family.append(_exact(f"prepared_{name}_exact", plan.n, seed, mu, made=made))
+        for name, options in variations(mu).items():
+            family.append(_nearest(f"prepared_{name}", seed, mu, plan, packing_options=options))
+            family.append(
+                _exact(f"prepared_{name}_exact", plan.n, seed, mu, packing_options=options)
+            )
     return family
 
 
@@ -435,8 +437,8 @@ def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
     unknown = set(parts or ()) - set(PARTS)
     if unknown:
         raise InputError(f"unknown part {min(unknown)!r}; choose from {', '.join(PARTS)}")
-    wanted = tasks(plan)
-    return wanted if parts is None else [task for task in wanted if _family(task.part) in parts]
+    every = tasks(plan)
+    return every if parts is None else [task for task in every if _family(task.part) in parts]
 
 
 def _family(part: str) -> str:
@@ -468,8 +470,8 @@ def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
                 took.setdefault(key, []).append(float(dataset["seconds"]) / 60)
     rows = []
     for part, tasks_of in counts.items():
-        done = [task for task, there in tasks_of if there]
-        left = [task for task, there in tasks_of if not there]
+        done = [task for task, finished in tasks_of if finished]
+        left = [task for task, finished in tasks_of if not finished]
         known = [
             took.get((part, t.n, t.mu)) or took.get((part, t.n)) or took.get(_like(t)) for t in left
         ]

@@ -62,21 +62,21 @@ class StudyTable(NamedTuple):
 
     def contacts(self, part: str) -> list[tuple[Any, ...]]:
         """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
-        found = []
+        contacts = []
         # Samples are sorted by row.
         edges = np.searchsorted(self.samples["row"], np.arange(len(self.rows) + 1))
         for k, row in enumerate(self.rows):
             chosen = slice(edges[k], edges[k + 1])
             if row["part"] == part:
-                found.append((row, *(self.samples[name][chosen] for name in SAMPLES[1:])))
-        return found
+                contacts.append((row, *(self.samples[name][chosen] for name in SAMPLES[1:])))
+        return contacts
 
     def extents(self, part: str) -> dict[float, list[Floats]]:
         """{μ: list of ΔF_n (N_c,) of each packing} of a sampled part."""
-        found: dict[Any, Any] = {}
+        extents: dict[Any, Any] = {}
         for row, *_, extent in self.contacts(part):
-            found.setdefault(row["mu"], []).append(extent)
-        return found
+            extents.setdefault(row["mu"], []).append(extent)
+        return extents
 
     def responses(self) -> list[dict[str, Any]]:
         """Rows of the perturbation with loads raised in tenths of the way, else of the other."""
@@ -169,9 +169,9 @@ def _decay(store: Store, task: Task, dataset: xr.Dataset) -> Floats:
     packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
     inner, outer = json.loads(dataset.attrs["fit_range"])
     radius, profile = dataset["shell_radius"].values, dataset["profile"].values
-    kept = (radius >= inner) & (radius <= outer) & np.isfinite(profile).all(axis=0)
+    fitted = (radius >= inner) & (radius <= outer) & np.isfinite(profile).all(axis=0)
     diameter = 2 * float(packing.r.mean())
-    return np.column_stack([radius[kept] / diameter, profile[:, kept].mean(axis=0)])
+    return np.column_stack([radius[fitted] / diameter, profile[:, fitted].mean(axis=0)])
 
 
 def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
@@ -284,9 +284,9 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
                 f"combined with {_version_words(_named(task))}: leave --table out"
             )
     known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
-    kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
-    place = {k: len(new.rows) + at for at, k in enumerate(kept)}
-    lacked = np.isin(old.samples["row"], kept)
+    old_rows = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
+    place = {k: len(new.rows) + at for at, k in enumerate(old_rows)}
+    lacked = np.isin(old.samples["row"], old_rows)
     samples = {
         field: np.concatenate([new.samples[field], values[lacked]])
         for field, values in old.samples.items()
@@ -294,11 +294,12 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
     moved = [place[k] for k in old.samples["row"][lacked].astype(int)]
     samples["row"][len(new.samples["row"]) :] = moved
     return new._replace(
-        rows=[older.get(_name(row), {}) | row for row in new.rows] + [old.rows[k] for k in kept],
+        rows=[older.get(_name(row), {}) | row for row in new.rows]
+        + [old.rows[k] for k in old_rows],
         samples=samples,
         shown=new.shown + [(place[k], counts) for k, counts in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
-        skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
+        skipped={"missing_cells": new.skipped["missing_cells"] - len(old_rows)},
         tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
         decays=dict(new.decays) | {place[k]: d for k, d in old.decays.items() if k in place},
     )
@@ -368,8 +369,8 @@ def load(path: str | Path) -> StudyTable:
     store = open_store(path, readonly=True)
     for entry in store.find("study"):
         if entry.version == VERSION:
-            found = store.load("study", entry.params, version=VERSION)
-            return _table(store, entry, cast("xr.Dataset", found))
+            dataset = store.load("study", entry.params, version=VERSION)
+            return _table(store, entry, cast("xr.Dataset", dataset))
     raise InputError(f"the store at {path} contains no reduced study")
 
 

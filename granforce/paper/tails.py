@@ -36,12 +36,12 @@ class Tail(NamedTuple):
 
 def counts(table: StudyTable) -> dict[str, dict[float, list[Floats]]]:
     """{words: {μ: [counts of f_n in the bins with edges FORCES, of each packing]}}."""
-    found: dict[Any, Any] = {}
+    counts_by_part: dict[Any, Any] = {}
     for k, counted in table.tails.items():
         row = table.rows[k]
-        known = found.setdefault(PRESCRIBED[row["part"]], {})
+        known = counts_by_part.setdefault(PRESCRIBED[row["part"]], {})
         known.setdefault(row["mu"], []).append(counted)
-    return {word: dict(sorted(known.items())) for word, known in found.items()}
+    return {word: dict(sorted(known.items())) for word, known in counts_by_part.items()}
 
 
 def densities(packings: Sequence[Floats]) -> list[tuple[float, float]]:

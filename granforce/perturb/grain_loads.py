@@ -96,7 +96,7 @@ def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LoadFactor:
         forces = forces_of(S, y)
     elif np.isfinite(bound):  # the optimum was not balanced to rounding: project it
         value = bound + 0.5 * INTERVAL_GAP
-        under = replace(S, b=S.b + value * S.force_scale * direction, found=None)
+        under = replace(S, b=S.b + value * S.force_scale * direction, computed=None)
         forces = some_network(under, starting_network(S))
         value = value if under.admits(forces) else np.inf
     if not abs(value - bound) <= INTERVAL_GAP:

@@ -69,7 +69,7 @@ def loaded_networks(
     states = np.empty((len(loads), *state.shape))
     for k, load in enumerate(loads):
         cancelling.check()
-        under = replace(ensemble, b=ensemble.b - load * turned, found=None)
+        under = replace(ensemble, b=ensemble.b - load * turned, computed=None)
         # Beyond this, the rounding error of the load alone exceeds the tolerance of the balance.
         possible = abs(load) * np.finfo(float).eps <= BALANCED * ensemble.force_scale
         if possible:

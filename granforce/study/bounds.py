@@ -96,7 +96,7 @@ def stress_dataset(S: Ensemble, outline: StressOutline, *, seconds: float = 0.0)
             "stress_gap": outline.gap,
             "stress_inner": outline.inner,
             "stress_outer": outline.outer,
-            "stress_own": outline.own,
+            "stress_own": outline.original,
             "friction": outline.friction,
             "friction_bound": outline.friction_bound,
             **extension(S),

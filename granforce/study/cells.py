@@ -66,9 +66,9 @@ def get(
     options: further arguments of the kind's compute; if they end it early, the result is stored
     under the parameters that it has `reached`. Raises the errors of compute.
     """
-    found = load(store, kind, parameters)
-    if found is not None:
-        return found, True
+    stored = load(store, kind, parameters)
+    if stored is not None:
+        return stored, True
     store.refuse_unwritable()
     dataset = kind.compute(store, parameters, workers=workers, progress=progress, **options)
     named = kind.reached(parameters, dataset)
@@ -102,8 +102,8 @@ def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:
 
 def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
     """Entries of a kind with these parameters, of its current version, as Store.find."""
-    found = store.find(kind.name, **parameters)
-    return [entry for entry in found if is_current(kind, entry)]
+    matching = store.find(kind.name, **parameters)
+    return [entry for entry in matching if is_current(kind, entry)]
 
 
 def is_current(kind: Kind, entry: Entry) -> bool:

@@ -187,8 +187,8 @@ def read_attributes(folder: Path) -> dict[str, Any] | None:
         attrs = json.loads((folder / "zarr.json").read_bytes())["attributes"]
         params = json.loads(attrs["parameters"])
         versions = attrs["algorithm_version"], attrs["schema_version"]
-        ours = folder.name == keys.entry_name(attrs["kind"], params, *versions)
-        return attrs if ours and {"created", "checksum"} <= attrs.keys() else None
+        name_matches = folder.name == keys.entry_name(attrs["kind"], params, *versions)
+        return attrs if name_matches and {"created", "checksum"} <= attrs.keys() else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -205,20 +205,20 @@ def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
     """
     while True:
         before = _identity(folder)
-        found, reason = (None, "") if before is None else look(folder)
+        content, reason = (None, "") if before is None else look(folder)
         if not reason or _identity(folder) == before:
-            return found, reason
+            return content, reason
 
 
 def _identity(folder: Path) -> tuple[int, int, int] | None:
     """Identity of the folder that has this name at present, or None; it changes on renaming."""
     try:
-        found = (
+        status = (
             folder.stat() if folder.exists() else folder.lstat()
         )  # a dangling link is not an entry
     except OSError:
         return None
-    return found.st_dev, found.st_ino, found.st_ctime_ns
+    return status.st_dev, status.st_ino, status.st_ctime_ns
 
 
 def described(folder: Path) -> Look[dict[str, Any]]:
@@ -245,14 +245,14 @@ def _metadata(folder: Path) -> Look[_Metadata]:
             names = sorted(item.name for item in items if item.is_dir())
     except (OSError, ValueError):
         return None, UNREADABLE
-    found = _Metadata(group, {})
+    metadata = _Metadata(group, {})
     for name in names:
         try:
-            found.arrays[name] = json.loads((folder / name / "zarr.json").read_bytes())
-            ArrayV3Metadata.from_dict(dict(found.arrays[name]))
+            metadata.arrays[name] = json.loads((folder / name / "zarr.json").read_bytes())
+            ArrayV3Metadata.from_dict(dict(metadata.arrays[name]))
         except Exception:  # the exception depends on zarr
             return None, f"the metadata of its array {name} cannot be read"
-    return found, ""
+    return metadata, ""
 
 
 def opened(folder: Path) -> Look[xr.Dataset]:

@@ -103,9 +103,9 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
         arrays["forces"][k, into] = snapshot.packing.forces[here]
         for name in ("low", "high"):
             # Contacts outside the backbone carry no force in any network.
-            own = np.zeros_like(snapshot.packing.forces)
-            own[bounds["backbone"].values] = bounds[name].values
-            arrays[name][k, into] = own[here]
+            forces = np.zeros_like(snapshot.packing.forces)
+            forces[bounds["backbone"].values] = bounds[name].values
+            arrays[name][k, into] = forces[here]
     rows = [_scalars(number, snapshot.packing, *results) for number, snapshot, results in done]
     variables: dict[str, Any] = {}
     for name, meaning in _FORCES.items():

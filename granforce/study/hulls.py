@@ -62,9 +62,9 @@ def bounds(packing: Packing) -> Floats | None:
     S = ensemble(packing)
     if certificates.recession(S.scaled_form[0]) is not None:
         return None
-    found = intervals(S)
+    exact = intervals(S)
     both = np.zeros((len(packing.contacts.i), 2))
-    both[S.index] = np.column_stack([found.low[:, 0], found.high[:, 0]])
+    both[S.index] = np.column_stack([exact.low[:, 0], exact.high[:, 0]])
     return both
 
 
@@ -96,8 +96,8 @@ def outline(packing: Packing, plane: Sequence[Any], most: float | None = None) -
 
 def thrust(packing: Packing, mu: float) -> tuple[Integers, Floats, Floats]:
     """Joints (2, k), and the parts low and high (k,) between which resultants can pass."""
-    found = bands.thrust(ensemble(packing, mu))
-    return found.contacts.T, found.low, found.high
+    lines = bands.thrust(ensemble(packing, mu))
+    return lines.contacts.T, lines.low, lines.high
 
 
 def stress_axes(packing: Packing, mu: float) -> Floats:

@@ -91,8 +91,8 @@ class Puller:
 
         Raises the errors of `pull`.
         """
-        found = pull(self._S, contact, [value], state)
-        return found.states[0], float(found.residual[0])
+        pulled = pull(self._S, contact, [value], state)
+        return pulled.states[0], float(pulled.residual[0])
 
     def loaded(self, contact: int, load: float) -> Loaded:
         """Networks under force pairs on a contact, from none to `load` (force), with some between.

@@ -46,22 +46,22 @@ def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> x
 def perturbation_dataset(S: Ensemble, parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """The datasets of single contacts as one, with ⟨F_crit⟩, ⟨|u|⟩(r) and α."""
     whole = xr.concat(parts, "contact", data_vars="minimal", coords="minimal", compat="override")
-    found = decay.decay(S.packing, whole["shell_radius"].values, whole["profile"].values)
+    fit = decay.decay(S.packing, whole["shell_radius"].values, whole["profile"].values)
     scalars = labelled(
         {
             "critical_force": float(whole["critical_low"].mean()) / S.force_scale,
-            "decay_exponent": found.exponent,
-            "decay_low": found.low,
-            "decay_high": found.high,
-            "fit_inner": found.ranges[:, 0],
-            "fit_outer": found.ranges[:, 1],
-            "fit_exponent": found.exponents,
+            "decay_exponent": fit.exponent,
+            "decay_low": fit.low,
+            "decay_high": fit.high,
+            "fit_inner": fit.ranges[:, 0],
+            "fit_outer": fit.ranges[:, 1],
+            "fit_exponent": fit.exponents,
             **extension(S),
             "force_scale": S.force_scale,
             **S.skipped,
             "seconds": float(whole["contact_seconds"].sum()),
         },
-        {"fit_range": json.dumps(found.fit)},
+        {"fit_range": json.dumps(fit.fit)},
     )
     return whole.merge(scalars, combine_attrs="drop_conflicts")
 

@@ -68,7 +68,7 @@ def uniform_dataset(
 
 def inference_dataset(
     S: Ensemble,
-    found: Inference,
+    inference: Inference,
     measured: Floats,
     sigma: Floats,
     certain: Any = None,
@@ -85,11 +85,11 @@ def inference_dataset(
         "original": S.original,
         "measured": measured,
         "sigma": sigma,
-        "inferred": found.forces,
-        "deviation": found.deviation,
-        "suspect": found.suspects,
-        "chi_square": found.chi_square,
-        "freedom": found.freedom,
+        "inferred": inference.forces,
+        "deviation": inference.deviation,
+        "suspect": inference.suspects,
+        "chi_square": inference.chi_square,
+        "freedom": inference.freedom,
         "force_scale": S.force_scale,
         **extension(S),
         **S.skipped,
@@ -98,10 +98,10 @@ def inference_dataset(
     if certain is not None:
         arrays["least_normal"] = np.full(len(S.index), np.nan)
         arrays["least_normal"][S.positions(certain.contacts)] = certain.least
-    if found.draws is not None:
-        pick = _picked(len(found.draws.flat), keep)
-        arrays |= {"states": found.draws.flat[pick], **_drawn(found.draws, pick)}
-        arrays |= {"expected": found.mean, "standard_error": found.error}
+    if inference.draws is not None:
+        pick = _picked(len(inference.draws.flat), keep)
+        arrays |= {"states": inference.draws.flat[pick], **_drawn(inference.draws, pick)}
+        arrays |= {"expected": inference.mean, "standard_error": inference.error}
     return labelled(arrays)
 
 
@@ -142,7 +142,7 @@ def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, 
         unknown = np.full(S.original.shape, np.nan)
         return known | {"distance_to_centre": [], "low": unknown, "high": unknown}
     centre = measures.mean_network(states)
-    low, high = measures.intervals_seen(states)
+    low, high = measures.sampled_intervals(states)
     extent = measures.normal_extent(low, high)
     in_error = measures.correlation_range(states, extent)
     distance = measures.distances(states, centre) / S.force_scale

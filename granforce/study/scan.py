@@ -207,12 +207,12 @@ class Waits(NamedTuple):
 
 def _needs(cells: Mapping[int, StudyCell]) -> dict[int, int]:
     """{cell: the cell among them that makes its packing}."""
-    made = {
+    makers = {
         canonical(cell.parameters): k for k, cell in cells.items() if cell.kind == kinds.PACKING
     }
     named = {k: cell.parameters.get("packing") for k, cell in cells.items()}
-    wanted = {k: canonical(packing) for k, packing in named.items() if packing is not None}
-    return {k: made[name] for k, name in wanted.items() if name in made}
+    needed = {k: canonical(packing) for k, packing in named.items() if packing is not None}
+    return {k: makers[name] for k, name in needed.items() if name in makers}
 
 
 def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
@@ -347,15 +347,15 @@ def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None
     """Compute one cell into the store at path, in a worker; return whether it was stored."""
     if not Path(path, "zarr.json").exists():
         raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
-    seen = 0.0
+    reported = 0.0
 
     def count(done: float, total: float | None) -> None:  # None: for a compaction
-        nonlocal seen
+        nonlocal reported
         if _counter is not None and total:
             part = min(done / total, 1.0)
             with _counter.get_lock():
-                _counter.value += part - seen
-            seen = part
+                _counter.value += part - reported
+            reported = part
 
     store = open_store(path)
     _, cached = get(store, *cell, workers=1, dtypes=dtypes, progress=count)
@@ -431,12 +431,12 @@ class _Workers:
 
     def __init__(self, scheduler: str) -> None:
         self._scheduler = scheduler
-        self._since, self._told = time.monotonic(), False
+        self._since, self._reported = time.monotonic(), False
 
     def count(self, workers: Collection[Any]) -> None:
         """Update with its present workers; InputError after GIVEN_UP without any."""
         if workers:
-            self._since, self._told = time.monotonic(), False
+            self._since, self._reported = time.monotonic(), False
             return
         missed, minutes = time.monotonic() - self._since, f"{GIVEN_UP / 60:g} minutes"
         if missed >= GIVEN_UP:
@@ -444,8 +444,8 @@ class _Workers:
                 f"the dask scheduler {self._scheduler} had no worker for {minutes}: start one with "
                 f"dask worker {self._scheduler}; finished entries are saved"
             )
-        if missed >= WORKERLESS and not self._told:
-            self._told = True
+        if missed >= WORKERLESS and not self._reported:
+            self._reported = True
             warnings.warn(
                 f"no worker at the dask scheduler {self._scheduler}: waiting up to {minutes} for "
                 "one (Ctrl-C ends)",

@@ -271,13 +271,13 @@ Pair: TypeAlias = tuple[float, float]
 
 def pair_names(ids: Floats, i: Integers, j: Integers) -> list[Pair | None]:
     """Ids of a frame's contacts: pairs, or None for a second contact of one pair."""
-    seen: set[Pair] = set()
+    pairs: set[Pair] = set()
     names: list[Pair | None] = []
     for a, b in zip(ids[i].tolist(), ids[j].tolist(), strict=True):
         # Grains before walls, whose ids are below 0.
         pair = (a, b) if b < 0 or (a >= 0 and a <= b) else (b, a)
-        names.append(None if pair in seen else pair)
-        seen.add(pair)
+        names.append(None if pair in pairs else pair)
+        pairs.add(pair)
     return names
 
 

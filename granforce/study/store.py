@@ -143,8 +143,8 @@ def _refuse_foreign(path: Path) -> None:
         visible = [item.name for item in path.iterdir() if not item.name.startswith(".")]
     except OSError as error:
         raise InputError(f"the folder {path} cannot be read: {error.strerror}") from None
-    ours = {name for name in visible if keys.ENTRY.fullmatch(name)}
-    others = set(visible) - ours - ({"zarr.json"} if ours else set())
+    entry_names = {name for name in visible if keys.ENTRY.fullmatch(name)}
+    others = set(visible) - entry_names - ({"zarr.json"} if entry_names else set())
     if others:
         raise InputError(
             f"{path} is not a store: it contains {min(others)!r}; give an empty or a new folder"
@@ -281,11 +281,11 @@ class Store(Mapping[str, xr.Dataset]):
     def refuse_unwritable(self) -> None:
         """Raise InputError if nothing can be saved, before a long computation."""
         with self._writing():
-            own = os.access in os.supports_effective_ids
-            there = next(path for path in (self.path, *self.path.parents) if path.exists())
-            if not there.is_dir():
+            effective = os.access in os.supports_effective_ids
+            existing = next(path for path in (self.path, *self.path.parents) if path.exists())
+            if not existing.is_dir():
                 raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-            if not os.access(there, os.W_OK | os.X_OK, effective_ids=own):
+            if not os.access(existing, os.W_OK | os.X_OK, effective_ids=effective):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     def make(self) -> None:
@@ -324,18 +324,18 @@ class Store(Mapping[str, xr.Dataset]):
         return self._read(self._names())
 
     def _read(self, names: list[str]) -> list[Entry]:
-        found = []
+        entries_read = []
         for name in names:
             attrs, reason = entries.described(self.path / name)
             if reason:
                 self._warn(name, reason)
             elif attrs is not None:
-                found.append(self._entry(name, attrs))
-        return found
+                entries_read.append(self._entry(name, attrs))
+        return entries_read
 
     def find(self, kind: str | None = None, **params: Any) -> list[Entry]:
         """The entries of a kind whose parameters include the given ones (compared as in keys)."""
-        wanted = {key: keys.canonical(value) for key, value in params.items()}
+        parameters = {key: keys.canonical(value) for key, value in params.items()}
 
         def fits(name: str) -> bool:
             attrs = self._attrs(name)
@@ -344,7 +344,7 @@ class Store(Mapping[str, xr.Dataset]):
             known = json.loads(attrs["parameters"])
             return all(
                 key in known and keys.canonical(known[key]) == value
-                for key, value in wanted.items()
+                for key, value in parameters.items()
             )
 
         of_kind = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]

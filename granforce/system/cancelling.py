@@ -58,7 +58,7 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
     scope = _Scope(np.array([_ending.is_set() or interrupted()]), request)
     ears, mouth = socket.socketpair()
     mouth.setblocking(False)
-    ours = main and _wake_by_signals(mouth)
+    installed = main and _wake_by_signals(mouth)
     thread = threading.Thread(
         target=_watch, args=(scope, ears, cancel is not None), name="granforce-cancel", daemon=True
     )
@@ -68,7 +68,7 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
         yield
     finally:
         _scope.reset(token)
-        if ours:
+        if installed:
             signal.set_wakeup_fd(-1)
         with suppress(BlockingIOError):
             mouth.send(b"\0")

@@ -15,5 +15,5 @@ def timed(
 ) -> tuple[float, T]:
     """Seconds that action(…) takes, by a clock, and its return value."""
     begin = clock()
-    found = action(*arguments, **options)
-    return clock() - begin, found
+    result = action(*arguments, **options)
+    return clock() - begin, result

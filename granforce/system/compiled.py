@@ -56,7 +56,7 @@ def tell_when_compiling(
     event.register("numba:compile", Listener())
 
 
-def are_kept(last: str) -> bool:
+def are_cached(last: str) -> bool:
     """Whether kernels are in the cache; last: the "module.kernel" that is compiled last."""
     places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
     return any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place)
@@ -65,10 +65,10 @@ def are_kept(last: str) -> bool:
 def compile_ahead(statement: str, last: str) -> bool:
     """Run a statement that compiles kernels in a separate process if none are cached yet.
 
-    last: as for `are_kept`. The process ends with this one at the latest. Returns whether there was
-    nothing to do.
+    last: as for `are_cached`. The process ends with this one at the latest. Returns whether there
+    was nothing to do.
     """
-    if are_kept(last):
+    if are_cached(last):
         return True
     called = [sys.executable, "-c", f"import os; getattr(os, 'nice', int)(10); {statement}"]
     process = subprocess.Popen(called, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -124,9 +124,9 @@ def temporary_place(folder: str | None = None) -> str:
     place = Path(folder or tempfile.gettempdir()) / f"granforce-kernels-{os.getuid()}"
     try:
         place.mkdir(mode=0o700, exist_ok=True)
-        found = place.lstat()
-        ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
-        if ours and not found.st_mode & 0o077:
+        status = place.lstat()
+        usable = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+        if usable and not status.st_mode & 0o077:
             return str(place)
     except OSError:
         pass

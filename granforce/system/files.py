@@ -21,7 +21,7 @@ MOST_STREAMED = 2**30  # bytes read from a device or a pipe, which may never end
 ASIDE = ".granforce-{}.part"  # a file being written
 
 
-def beside(path: Path) -> Path:
+def sibling(path: Path) -> Path:
     """A separate path for a file that will be moved to `path`, short enough for any name."""
     return path.with_name(ASIDE.format(secrets.token_hex(8)))
 
@@ -36,13 +36,13 @@ def written(path: str | Path) -> Iterator[IO[bytes]]:
     """
     path = expanded(path)
     with _refusing(path):
-        kept = _regular(path)
-        if kept is None:
+        regular = _regular(path)
+        if regular is None:
             with open(path, "wb") as file:
                 yield file
             return
-        target, mode = kept
-        aside = beside(target)
+        target, mode = regular
+        aside = sibling(target)
         try:
             with open(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
                 yield file
@@ -81,11 +81,11 @@ def check_file(path: str | Path) -> None:
     """
     path = expanded(path)
     with _refusing(path):
-        kept = _regular(path)
-        if kept is not None and not _may_write(kept[0].parent):
-            raise PermissionError(errno.EACCES, f"the folder {kept[0].parent} is not writable")
-        if kept is not None:
-            aside = beside(kept[0])
+        regular = _regular(path)
+        if regular is not None and not _may_write(regular[0].parent):
+            raise PermissionError(errno.EACCES, f"the folder {regular[0].parent} is not writable")
+        if regular is not None:
+            aside = sibling(regular[0])
             os.close(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             os.unlink(aside)
 
@@ -138,10 +138,10 @@ def _places(path: str | Path) -> list[object]:
 
 def _place(path: Path) -> object:
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return str(path)
-    return found.st_dev, found.st_ino
+    return status.st_dev, status.st_ino
 
 
 def make_folder(path: str | Path) -> Path:
@@ -157,19 +157,19 @@ def make_folder(path: str | Path) -> Path:
 def expanded(path: str | Path) -> Path:
     """The path with ~ and ~user expanded; InputError for an invalid path."""
     try:
-        found = Path(path).expanduser()
+        full = Path(path).expanduser()
     except RuntimeError:
         raise InputError(f"{path}: there is no such user, or none with a home folder") from None
-    if "\0" in str(found):
-        raise InputError(f"{str(found)!r} cannot be a path: it holds a null character")
-    if not found.is_absolute():
+    if "\0" in str(full):
+        raise InputError(f"{str(full)!r} cannot be a path: it holds a null character")
+    if not full.is_absolute():
         try:
             os.getcwd()
         except FileNotFoundError:
             raise InputError(
                 f"{path}: the working folder was removed; change to another one"
             ) from None
-    return found
+    return full
 
 
 def _regular(path: str | Path) -> tuple[Path, int | None] | None:
@@ -179,17 +179,17 @@ def _regular(path: str | Path) -> tuple[Path, int | None] | None:
         return None  # even if it leads to a file: another program has it open
     target = Path(os.path.realpath(path))
     try:
-        found = target.stat()
+        status = target.stat()
     except FileNotFoundError:
         target.parent.stat()  # reveals a missing folder
         return target, None
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a folder")
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return None
     if not _may_write(target):
         raise PermissionError(errno.EACCES, "Permission denied")
-    return target, stat.S_IMODE(found.st_mode)
+    return target, stat.S_IMODE(status.st_mode)
 
 
 def _may_write(path: Path) -> bool:

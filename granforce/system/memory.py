@@ -8,11 +8,11 @@ from granforce.records import InputError
 def check_memory(needed: float, what: str) -> None:
     """InputError if a computation needs more bytes than this machine has memory."""
     try:
-        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        available = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return  # unknown on this system: an allocation will fail instead
-    if needed > there:
+    if needed > available:
         raise InputError(
             f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, but this machine has "
-            f"{there / 1e9:.3g} GB; choose smaller values"
+            f"{available / 1e9:.3g} GB; choose smaller values"
         )

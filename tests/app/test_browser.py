@@ -404,7 +404,7 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
     expected = {
         "eta1": measures.eta1(states),
         "eta2": measures.eta2(states),
-        "eta3": measures.eta3(*measures.intervals_seen(states)),
+        "eta3": measures.eta3(*measures.sampled_intervals(states)),
     }
     for name, value in expected.items():
         assert float(page.locator(f"b.{name}").text_content()) == pytest.approx(value, abs=6e-4)

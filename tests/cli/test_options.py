@@ -157,7 +157,7 @@ def here(place, monkeypatch):
         "tables.save": None,
         "drawings.draw": None,
         "claims.judged": [],
-        "findings.found": [],
+        "findings.measured": [],
     }.items():
         monkeypatch.setattr(f"granforce.paper.main.{name}", lambda *a, value=value, **k: value)
     for name in commands.packings.READERS:

@@ -75,7 +75,7 @@ def test_bounds_where_some_contacts_can_do_nothing_but_slide():
 def test_a_network_at_hand_that_is_hardly_balanced_costs_no_second_solver():
     """Its residual once passed for that of S: every program was solved again, in seconds each."""
     S = ensemble(packed(30, 0.3, 1))
-    near = replace(S, found=None)
+    near = replace(S, computed=None)
     near.__dict__["reference"] = S.original * (1 + 1.6 * BALANCED)
     given = intervals(near)
     assert given.converged and given.counts["again"] == 0

@@ -44,13 +44,13 @@ def test_own_network_and_uniform_states_lie_inside(S, found):
     states = gf.sample_uniform(S, 40, seed=2).flat
     points = gf.stress_plane(S, states)
     assert points.shape == (40, 2)
-    assert beyond(found, points) < 0 and beyond(found, found.own[None]) < 0
+    assert beyond(found, points) < 0 and beyond(found, found.original[None]) < 0
 
 
 def test_each_point_is_the_stress_of_its_network(S, found):
     (xx, yy, xy) = np.load(REFERENCE / f"{NAME}.known.npz")["stress"]
     pressure = 0.5 * (xx + yy)
-    assert found.own == pytest.approx([(xx - yy) / 2 / pressure, xy / pressure], abs=1e-9)
+    assert found.original == pytest.approx([(xx - yy) / 2 / pressure, xy / pressure], abs=1e-9)
 
 
 def test_a_stress_on_the_outline_can_be_prescribed_and_none_beyond(S, found):
@@ -69,8 +69,8 @@ def test_a_stress_on_the_outline_can_be_prescribed_and_none_beyond(S, found):
 def test_without_friction_there_is_one_stress():
     found = gf.stress_outline(gf.ensemble(packed(40, 0.0)), 8)
     directions = np.stack([np.cos(found.angles), np.sin(found.angles)])
-    assert found.support == pytest.approx(found.own @ directions, abs=1e-6)
-    assert found.friction == pytest.approx(np.hypot(*found.own), abs=1e-6)
+    assert found.support == pytest.approx(found.original @ directions, abs=1e-6)
+    assert found.friction == pytest.approx(np.hypot(*found.original), abs=1e-6)
 
 
 def test_a_square_lattice_carries_any_difference_of_normal_stresses():

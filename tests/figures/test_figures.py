@@ -74,7 +74,7 @@ ROWS = [
 @pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
 def test_indeterminacy_averages_over_packings(backend):
     exact = [{"mu": 0.1, "eta3": 9.0}]
-    figure = figures.indeterminacy(ROWS, beside={"exact": exact}, backend=backend)
+    figure = figures.indeterminacy(ROWS, compare={"exact": exact}, backend=backend)
     if backend == "matplotlib":  # the logarithmic frame is an inset
         contacts, linear = (curves(frame) for frame in frames(figure))
         (inner,) = style.rendered(figure).axes[1].child_axes
@@ -130,7 +130,7 @@ def test_correlations_carry_the_range_over_networks():
         for c in (mu, mu + 0.2)
     ]
     beside = {"exact": [{"mu": 0.1, "correlation": 0.5}]}
-    figure = figures.correlations(rows, beside=beside, chance={0.1: 0.02, 1: 0.05})
+    figure = figures.correlations(rows, compare=beside, chance={0.1: 0.02, 1: 0.05})
     drawn = curves(figure)
     np.testing.assert_allclose(drawn["walk"], ([0.1, 1], [0.2, 1.1]))
     np.testing.assert_allclose(drawn["exact"], ([0.1], [0.5]))

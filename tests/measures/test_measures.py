@@ -45,7 +45,7 @@ def test_one_state_is_fully_determined(states):
     one = np.repeat(states[:1], 4, axis=0)
     assert measures.eta1(one) == measures.eta2(one) == 0
     assert measures.eta2(states[:1]) == 0
-    assert measures.eta3(*measures.intervals_seen(one)) == 0
+    assert measures.eta3(*measures.sampled_intervals(one)) == 0
 
 
 def test_measures_do_not_depend_on_the_unit_of_force(states):
@@ -58,7 +58,7 @@ def test_growing_measures_are_those_of_the_first_states(states):
     for count in (1, 2, 7, len(states)):
         first = states[:count]
         wanted = measures.eta1(first), measures.eta2(first)
-        wanted += (measures.eta3(*measures.intervals_seen(first)),)
+        wanted += (measures.eta3(*measures.sampled_intervals(first)),)
         assert [growing[name][count - 1] for name in ("eta1", "eta2", "eta3")] == pytest.approx(
             wanted, rel=1e-9, abs=1e-15
         )
@@ -70,7 +70,7 @@ def test_growing_measures_of_one_state_are_zero(states):
 
 
 def test_correlation_and_its_range(states):
-    low, high = measures.intervals_seen(states)
+    low, high = measures.sampled_intervals(states)
     extent = measures.normal_extent(low, high)
     forces = states[0, :, 0]
     expected = np.corrcoef(forces, extent)[0, 1]
@@ -143,6 +143,6 @@ def test_arrays_of_other_shapes_are_refused_in_one_line(states, call, words):
 
 def test_intervals_seen_in_lists_are_those_in_arrays(states):
     for one, other in zip(
-        measures.intervals_seen(states.tolist()), measures.intervals_seen(states), strict=True
+        measures.sampled_intervals(states.tolist()), measures.sampled_intervals(states), strict=True
     ):
         np.testing.assert_array_equal(one, other)

@@ -311,7 +311,7 @@ def test_findings_compare_the_same_packings():
         for row in table.part(SWEEPS):
             copied = row | {"part": part, "eta3": eta3 * row["eta3"], "eta2": eta2 * row["eta2"]}
             table.rows.append(copied | {"walk_ratio": 1.5, "original_ratio": 0.5})
-    told = {finding.statement: finding for finding in findings.found(table)}
+    told = {finding.statement: finding for finding in findings.measured(table)}
     for word in ("small", "intermediate", "large"):
         ratio = told[f"η3 of the walk's states over exact η3, {word} μ"]
         assert (ratio.value, ratio.low, ratio.high) == pytest.approx((0.5, 0.5, 0.5))
@@ -329,7 +329,7 @@ def test_findings_compare_the_same_packings():
     table.rows[:] = table.part(SWEEPS)
     for values in table.samples.values():
         values.resize(0, refcheck=False)
-    assert not [f for f in findings.found(table) if "sweeps_1e" not in f.statement]
+    assert not [f for f in findings.measured(table) if "sweeps_1e" not in f.statement]
 
 
 def peak_of(heights):

@@ -368,10 +368,10 @@ def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
 
 def test_tables_in_documents_are_renewed(table, tmp_path):
     told = [claim._asdict() for claim in claims.judged(table)]
-    found = [finding._asdict() for finding in findings.found(table)]
+    found = [finding._asdict() for finding in findings.measured(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
-    names = ("measures", "beside", "sweeps", "preparation", "counts", "claims", "findings")
+    names = ("measures", "others", "sweeps", "preparation", "counts", "claims", "findings")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = documents.named(str(page))
     documents.renew([path], table, told, found)

@@ -147,7 +147,7 @@ def functions():
         "positions": (S.positions, {"contacts": [c]}),
         "eta1": (gf.measures.eta1, {"states": walk.states}),
         "eta2": (gf.measures.eta2, {"states": walk.states}),
-        "intervals_seen": (gf.measures.intervals_seen, {"states": walk.states}),
+        "sampled_intervals": (gf.measures.sampled_intervals, {"states": walk.states}),
     }  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def judged(table: StudyTable) -> list[Claim]:
     known = [name for name, part in SAMPLERS.items() if table.part(part)]
     samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
     beyond = {name: outside(table, SAMPLERS[name]) for name in BY_SWEEPS}
-    found = []
+    claims = []
     for family, takes in FAMILIES.items():
         for sampler in samplers if takes else [""]:
             if takes and sampler not in takes:
@@ -93,8 +93,8 @@ def judged(table: StudyTable) -> list[Claim]:
                 lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
                 verdict = FEW if lacking else claim.verdict
                 claim = claim._replace(sampler=sampler, verdict=verdict)
-                found.append(without(claim, beyond.get(sampler, [])))
-    return found
+                claims.append(without(claim, beyond.get(sampler, [])))
+    return claims
 
 
 def without(claim: Claim, beyond: Sequence[float]) -> Claim:

@@ -53,16 +53,16 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The first motion falls with distance as a power law, not exponentially."""
-    found: dict[float, list[tuple[int, Any]]] = {}
+    groups: dict[float, list[tuple[int, Any]]] = {}
     part = {row["part"] for row in table.responses()}
     for k, decay in table.decays.items():
         row = table.rows[k]
         if row["part"] in part and len(decay) >= FEWEST_SHELLS:
-            found.setdefault(row["mu"], []).append((row["n"], decay))
+            groups.setdefault(row["mu"], []).append((row["n"], decay))
     yield at_each(
         "the first motion |u|(r) decays as a power law, not exponentially",
         "misfit of the best power law over that of the best exponential, rms of ln |u|",
-        {mu: found[mu] for mu in sorted(found)},
+        {mu: groups[mu] for mu in sorted(groups)},
         good=(-np.inf, 1),
         interval=_misfits,
     )

@@ -22,14 +22,14 @@ from granforce.types import Mask
 
 def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Groups:
     """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
-    found: dict[Any, Any] = {}
+    marked: dict[Any, Any] = {}
     judged = may_be_judged(table, sampler)
     for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
         if judged(row) and row["mu"] > 0 and len(extent):
             value = measure(normal > 2 * normal.mean(), extent > extent.mean())
             if np.isfinite(value):
-                found.setdefault(row["mu"], []).append((row["n"], value))
-    return dict(sorted(found.items()))
+                marked.setdefault(row["mu"], []).append((row["n"], value))
+    return dict(sorted(marked.items()))
 
 
 def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:

@@ -66,17 +66,17 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
 def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The correlation comes from intervals alone: the position of f_n in them does not matter."""
     judged = may_be_judged(table, sampler)
-    found: dict[float, list[tuple[int, float]]] = {}
+    groups: dict[float, list[tuple[int, float]]] = {}
     for row, _, normal, least, extent in table.contacts(SAMPLERS[sampler]):
         if judged(row) and len(extent) > 1 and extent.mean() > DETERMINED:
             apart = beyond_place(normal, least, extent)
             if np.isfinite(apart):
-                found.setdefault(row["mu"], []).append((row["n"], apart))
+                groups.setdefault(row["mu"], []).append((row["n"], apart))
     yield at_each(
         "corr(f_n, ΔF_n) at intermediate μ is of statistical origin",
         "its remainder when contacts exchange the positions of f_n in their intervals: the "
         "correlation minus that of permuted positions",
-        within({mu: found[mu] for mu in sorted(found)}, MIDDLE),
+        within({mu: groups[mu] for mu in sorted(groups)}, MIDDLE),
         good=(-0.1, 0.1),
         fair=(-0.2, 0.2),
     )

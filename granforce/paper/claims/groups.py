@@ -83,24 +83,24 @@ def items(
 
     Rows with an unknown value, or without a positive value of given names, are left out.
     """
-    found: dict[Any, Any] = {}
+    groups: dict[Any, Any] = {}
     for row in rows:
         if not all(row.get(name, 0) > 0 for name in positive):
             continue
         value = row.get(what, np.nan) if isinstance(what, str) else what(row)
         if np.all(np.isfinite(value)):
-            found.setdefault(row[by], []).append((row["n"], value))
-    return {key: found[key] for key in sorted(found)}
+            groups.setdefault(row[by], []).append((row["n"], value))
+    return {key: groups[key] for key in sorted(groups)}
 
 
 def sampled(table: StudyTable, sampler: str) -> Groups:
     """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
-    found: dict[Any, Any] = {}
+    groups: dict[Any, Any] = {}
     judged = may_be_judged(table, sampler)
     for row, *_, extent in table.contacts(SAMPLERS[sampler]):
         if judged(row) and len(extent) and extent.mean() > DETERMINED:
-            found.setdefault(row["mu"], []).append((row["n"], extent))
-    return {mu: found[mu] for mu in sorted(found)}
+            groups.setdefault(row["mu"], []).append((row["n"], extent))
+    return {mu: groups[mu] for mu in sorted(groups)}
 
 
 def each(groups: Groups, measure: Callable[..., Any]) -> Groups:

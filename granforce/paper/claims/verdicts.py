@@ -108,16 +108,16 @@ def over_all(
         return claim
     claim = claim._replace(value=value)
     drawn = statistics.resampled_means(values, seed)
-    found = np.array([statistic(keys, draw) for draw in drawn])
+    values_drawn = np.array([statistic(keys, draw) for draw in drawn])
     single = max(map(len, values)) < 2
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
-    if single or few or np.isfinite(found).mean() < 0.9:
+    if single or few or np.isfinite(values_drawn).mean() < 0.9:
         claim = claim._replace(verdict=FEW)
         if single:
             return claim
-        low, high = statistics.percentile_ends(found)[0]
+        low, high = statistics.percentile_ends(values_drawn)[0]
         return claim._replace(low=low, high=high)
-    (low, high), farthest = statistics.percentile_ends(found[np.isfinite(found)])
+    (low, high), farthest = statistics.percentile_ends(values_drawn[np.isfinite(values_drawn)])
     verdict = ranges.verdict(low, high)
     claim = claim._replace(low=low, high=high, verdict=verdict)
     if verdict == UNDECIDED:
@@ -187,15 +187,15 @@ def at_each(
     if not groups:
         return claim
     level = 1 - (1 - statistics.LEVEL) / len(groups)
-    found, verdicts = {}, {}
+    estimates, verdicts = {}, {}
     for mu, group in groups.items():
         value, low, high = interval([value for _, value in group], level)
-        found[mu] = float(value), float(low), float(high)
-        few = sum(n for n, _ in group) < LEAST_DISKS or not np.isfinite(found[mu][1])
-        verdicts[mu] = FEW if few else ranges.verdict(*found[mu][1:])
-    place = max(found, key=lambda mu: _beyond(found[mu][0], ranges.good))
-    where = f"{measured}, at the worst μ ({place:g})" if len(found) > 1 else measured
-    value, low, high = found[place]
+        estimates[mu] = float(value), float(low), float(high)
+        few = sum(n for n, _ in group) < LEAST_DISKS or not np.isfinite(estimates[mu][1])
+        verdicts[mu] = FEW if few else ranges.verdict(*estimates[mu][1:])
+    place = max(estimates, key=lambda mu: _beyond(estimates[mu][0], ranges.good))
+    where = f"{measured}, at the worst μ ({place:g})" if len(estimates) > 1 else measured
+    value, low, high = estimates[place]
     verdict, why = _together(verdicts)
     return claim._replace(measured=where, value=value, low=low, high=high, verdict=verdict, why=why)
 

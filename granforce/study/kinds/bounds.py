@@ -137,11 +137,11 @@ def _outline(
     S = ensemble_of(store, parameters)
     plane = _component_axes(S, parameters["components"]) if axes is None else axes
     options = {"tolerance": parameters["tolerance"], "workers": workers, "progress": progress}
-    seconds, found = timed(outline, S, plane, **options)
+    seconds, polygons = timed(outline, S, plane, **options)
     cancelling.check("outline")
-    if not found.converged:
-        raise InputError(f"outline not closed: a gap of {found.gap:.1e} ⟨f_n⟩ is left")
-    return outline_dataset(S, plane, found, seconds=seconds)
+    if not polygons.converged:
+        raise InputError(f"outline not closed: a gap of {polygons.gap:.1e} ⟨f_n⟩ is left")
+    return outline_dataset(S, plane, polygons, seconds=seconds)
 
 
 def _component_axes(S: Ensemble, components: Sequence[Sequence[int]]) -> Floats:
@@ -170,11 +170,11 @@ def _stress(
     """Dataset of the outline of stresses."""
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = {"workers": workers, "progress": progress}
-    seconds, found = timed(stress_outline, S, parameters["angles"], **options)
+    seconds, polygons = timed(stress_outline, S, parameters["angles"], **options)
     cancelling.check("outline of stresses")
-    if not found.converged:
+    if not polygons.converged:
         raise InputError("the outline of stresses did not close")
-    return stress_dataset(S, found, seconds=seconds)
+    return stress_dataset(S, polygons, seconds=seconds)
 
 
 INTERVALS = Kind(

@@ -163,10 +163,14 @@ def _longest_begun(store: Store, parameters: Parameters) -> Walk | None:
     ]
     shorter.sort(key=lambda entry: entry.params["states"], reverse=True)
     for entry in shorter:
-        found = load(store, WALK, entry.params)
+        stored = load(store, WALK, entry.params)
         # Walks with rounded states cannot be resumed exactly.
-        if found is not None and found["states"].dtype == np.float64 and found["accepted"].item():
-            return walk_of(found)
+        if (
+            stored is not None
+            and stored["states"].dtype == np.float64
+            and stored["accepted"].item()
+        ):
+            return walk_of(stored)
     return None
 
 
@@ -241,8 +245,8 @@ def _volume(
     """Dataset of the volume of S; an error above the requested one is marked in `reached`."""
     S = ensemble_of(store, parameters)
     options = {name: parameters[name] for name in ("accuracy", "seed")}
-    found = volume(S, **options, workers=workers, progress=progress)
-    return volume_dataset(S, found)
+    result = volume(S, **options, workers=workers, progress=progress)
+    return volume_dataset(S, result)
 
 
 def _inference_parameters(
@@ -292,7 +296,7 @@ def _inference(
     S = ensemble_of(store, parameters)
     forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
     again = parameters.get("again") and parameters["states"]
-    found = (remeasured.remeasured if again else infer)(
+    result = (remeasured.remeasured if again else infer)(
         *(S, forces, sigma),
         states=parameters["states"],
         seed=parameters["seed"],
@@ -307,7 +311,7 @@ def _inference(
         certain = carrying(S, forces, sigma, progress=progress, **options)
         cancelling.check("inference")
     options = {"keep": parameters["keep"], "seconds": time.perf_counter() - begin}
-    return inference_dataset(S, found, forces, sigma, certain, **options)
+    return inference_dataset(S, result, forces, sigma, certain, **options)
 
 
 def _informative_parameters(
@@ -343,9 +347,9 @@ def _informative(
     S = ensemble_of(store, parameters)
     options = {name: parameters[name] for name in ("k", "check", "states", "seed")}
     options |= {"workers": workers, "watch": watch, "progress": progress}
-    seconds, found = timed(informative, S, **options)
+    seconds, ranking = timed(informative, S, **options)
     cancelling.check("which measurement next")
-    return informative_dataset(S, found, seconds=seconds)
+    return informative_dataset(S, ranking, seconds=seconds)
 
 
 WALK = Kind(
