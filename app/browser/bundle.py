@@ -32,8 +32,8 @@ def module(path: Path) -> str:
     """
     parts: dict[Path, str] = {}
     _gather(path.resolve(), parts, ())
-    own = _bound(path.resolve(), parts.pop(path.resolve()))
-    return "\n".join([*(_inside(*part) for part in parts.items()), own])
+    text = _bound(path.resolve(), parts.pop(path.resolve()))
+    return "\n".join([*(_inside(*part) for part in parts.items()), text])
 
 
 def imported(path: Path, text: str) -> list[tuple[str, Path]]:

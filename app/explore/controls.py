@@ -34,16 +34,18 @@ def offered(state: AppState) -> dict[str, Any]:
     series: dict[str, set[float]] = {}
     for cell in [*state.catalogue, *on_screen]:
         series.setdefault(cell.series, set()).add(cell.mu)
-    options = {f"{name} — {_frictions(sorted(found))}": name for name, found in series.items()}
+    options = {
+        f"{name} — {_frictions(sorted(frictions))}": name for name, frictions in series.items()
+    }
     if state.missing:  # no such states: those on screen are of another packing
         return {"options": {f"none with {differs(state)}": "", **options}, "value": ""}
     return {"options": options, "value": state.cell.series if state.cell else ""}
 
 
-def _frictions(found: list[float]) -> str:
-    if len(found) > 2:
-        return f"{len(found)} μ from {found[0]:g} to {found[-1]:g}"
-    return "μ = " + ", ".join(f"{mu:g}" for mu in found)
+def _frictions(frictions: list[float]) -> str:
+    if len(frictions) > 2:
+        return f"{len(frictions)} μ from {frictions[0]:g} to {frictions[-1]:g}"
+    return "μ = " + ", ".join(f"{mu:g}" for mu in frictions)
 
 
 def differs(state: AppState) -> str:
@@ -147,8 +149,8 @@ class Controls:
 
     def _selection(self) -> Selection:
         now, packing = self.state.selection, self.state.selection.packing
-        own = self.packed.value.strip()
-        packed_mu = None if own in ("", SAME) else friction(own)
+        packing_mu = self.packed.value.strip()
+        packed_mu = None if packing_mu in ("", SAME) else friction(packing_mu)
         details = {
             "kind": self.kind.value,
             "relax": self.relax.value,
@@ -157,9 +159,9 @@ class Controls:
         }
         if now.imported:
             return now._replace(mu=friction(self.mu.mu), **details)
-        made = select(self.n.value, self.mu.mu, self.seed.value, packed_mu, **details)
+        selection = select(self.n.value, self.mu.mu, self.seed.value, packed_mu, **details)
         same = {name: value for name, value in unusual(packing).items() if name != "radii"}
-        return made._replace(packing=made.packing | same)
+        return selection._replace(packing=selection.packing | same)
 
     def _choose(self, event: Any) -> None:
         if not self._following and event.new:

@@ -24,18 +24,18 @@ def summary_html(replay: Replay) -> str:
     summary = replay.summary
     n, free = summary["n"], summary["dimension"]
     if free == 0:
-        found = f"These {n} disks never move, and the forces between them are fixed."
+        statement = f"These {n} disks never move, and the forces between them are fixed."
         text = f"No number is free: there is just one {term('network', 'force network')}."
         text += " Choose μ > 0 to see more." if summary["mu"] == 0 else ""
     else:
-        found = f"These {n} disks never move, yet the forces between them can vary."
+        statement = f"These {n} disks never move, yet the forces between them can vary."
         text = (
             "Lines are the forces between touching disks: the thicker, the stronger. Balance "
             f"leaves {term('h', f'{free} numbers')} free, so infinitely many sets of forces hold "
             f"the same disks in place. Play shows some of these {term('network', 'networks')}, "
             "sampled at random: alternatives, not moments in time."
         )
-    return worded(replay, f"<h2>{found}</h2><p>{text}</p>")
+    return worded(replay, f"<h2>{statement}</h2><p>{text}</p>")
 
 
 def rest(replay: Replay) -> str:

@@ -73,7 +73,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
     h, phi = summary["dimension"], summary["packing_fraction"]
     each = worded(state.replay, "contacts per disk")
-    found = (
+    values = (
         ""
         if volume is None
         else with_error(volume["log_volume"].item(), volume["log_volume_error"].item())
@@ -85,7 +85,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
             "h", "h", "free dimensions", exact=f"{h} = {unknowns} − {unknowns - h}",
             note="forces minus independent equations",
         ),
-        Quantity("volume", "ln V", "volume of S", exact=found),
+        Quantity("volume", "ln V", "volume of S", exact=values),
     ]  # fmt: skip
 
 
@@ -132,12 +132,12 @@ def sampler(selection: Selection) -> str:
 def _networks(replay: Replay) -> str:
     """The number of networks, and of the attempts they took."""
     summary = replay.summary
-    states, kept = summary["states"], summary["kept"]
+    states, stored = summary["states"], summary["kept"]
     words = f"{states} networks"
     if "accepted" in summary and not summary.get("skipped"):
         tried = sum(int(summary[name]) for name in ("accepted", "rejected", "unconverged"))
         words = f"{int(summary['accepted'])} of {tried} attempts accepted"
-    return f"{words}, {kept} kept" if kept < states else words
+    return f"{words}, {stored} kept" if stored < states else words
 
 
 def _doubts(r_hat: float, size: float, least: float) -> Iterator[str]:

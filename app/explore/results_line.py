@@ -47,9 +47,9 @@ class Results(Scripted):
         if state.replay is not None and state.cell is not None:
             self._work.looking.start(compute.known_volume(state.library, state.cell), self._take)
 
-    def _take(self, found: tuple[Cell, xr.Dataset | None]) -> None:
-        if found[0] == self._state.cell:
-            self._volume = found[1]
+    def _take(self, result: tuple[Cell, xr.Dataset | None]) -> None:
+        if result[0] == self._state.cell:
+            self._volume = result[1]
             self._tell()
 
     def _tell(self, *events: Any) -> None:
@@ -69,10 +69,10 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
-    seen = f"seen in {state.replay.summary['states']} networks"
+    heading = f"seen in {state.replay.summary['states']} networks"
     if sampling and sampling.verdict:
-        seen += f", {term('r_hat', sampling.verdict)}"
-    rows = [[seen, *_values(measures, "seen")]]
+        heading += f", {term('r_hat', sampling.verdict)}"
+    rows = [[heading, *_values(measures, "seen")]]
     if any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)

@@ -49,8 +49,8 @@ class StatusLine(Scripted):
 
             self._looking.start(read, self._take)
 
-    def _take(self, found: tuple[Cell, bool]) -> None:
-        self._rest = found
+    def _take(self, result: tuple[Cell, bool]) -> None:
+        self._rest = result
         self._tell()
 
     def _tell(self, *events: Any) -> None:
@@ -91,9 +91,9 @@ def bounds(state: AppState) -> str:
     if exact is None:
         return "exact bounds: not computed"
     gap = exact["interval_gap"].values
-    count, wanted = int(np.isfinite(gap).sum()), gap.size
+    count, total = int(np.isfinite(gap).sum()), gap.size
     most = float(exact["max_gap"]) / state.replay.force_scale
-    of = "" if count == wanted else f" of {wanted}"
+    of = "" if count == total else f" of {total}"
     return f"{count}{of} bounds certified, gap ≤ {power(most)} ⟨fₙ⟩"
 
 

@@ -70,17 +70,17 @@ class Lesson(Scripted):
             case "curve":
                 self._send("curve", "", lesson_data.curve)
 
-    def _send(self, what: str, name: str, made: Callable[[], Any], pool: Any = reading) -> None:
+    def _send(self, what: str, name: str, compute: Callable[[], Any], pool: Any = reading) -> None:
         """Compute the data off the event loop and send them, or the reason for a failure."""
         task = self._tasks.get(what + name)
         if task is None:
             task = self._tasks[what + name] = self._task(pool)
             task.param.watch(partial(self._failed, what, name), "message")
         if not task.running:
-            task.start(lambda job: made(), lambda found: self._tell(what, name, found))
+            task.start(lambda job: compute(), lambda found: self._tell(what, name, found))
 
-    def _tell(self, what: str, name: str, found: dict[str, Any]) -> None:
-        self.tell({"what": what, "name": name, "given": found})
+    def _tell(self, what: str, name: str, data: dict[str, Any]) -> None:
+        self.tell({"what": what, "name": name, "given": data})
 
     def _failed(self, what: str, name: str, event: Any) -> None:
         if event.new:

@@ -77,7 +77,7 @@ export class Buttons {
     this.root = made("div", { className: "stage", innerHTML: BUTTONS })
     this.bar = new PlayerBar(actions, (words) => this.say(words))
     this.keyboard = new Keyboard(this.root, actions)
-    this.asked = scene.root.appendChild(made("div", { className: "asked" }))
+    this.requested = scene.root.appendChild(made("div", { className: "requested" }))
     this.scenes = this.part("scenes")
     this.scenes.prepend(scene.root)
     this.scenes.after(this.bar.root)
@@ -134,8 +134,8 @@ export class Buttons {
   say(words) { this.part("said").textContent = words }
 
   /** A message over the old picture about a request in progress; empty: no message. */
-  tellAsked(words) {
-    this.asked.textContent = words
+  showRequested(words) {
+    this.requested.textContent = words
     this.root.classList.toggle("pale", Boolean(words))
   }
 

@@ -116,7 +116,7 @@ class Player {
     this.select()
     this.tellTrack()
     this.buttons.say("")
-    this.tellAsked()
+    this.showRequested()
     scene.show(this.replay.walk)
     if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
     this.split.show()
@@ -167,13 +167,13 @@ class Player {
   /** Whether more states are expected. */
   get grows() { return this.replay?.walk.room > 0 }
 
-  tellAsked() {
+  showRequested() {
     const { model, live } = this, { style } = document.documentElement
     this.buttons.root.classList.toggle("moving", live.moves)
-    this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
+    this.buttons.showRequested(live.moves || this.grows ? "" : model.requested)
     // Neighbouring plots are dimmed by these: a style set from Python would make Bokeh lay out the
     // whole page again.
-    const pale = { "--still": model.asked, "--growing": model.asked && !this.grows }
+    const pale = { "--still": model.requested, "--growing": model.requested && !this.grows }
     for (const [name, old] of Object.entries(pale)) {
       style.setProperty(name, old ? OLD : 1)
       style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
@@ -339,7 +339,7 @@ class Player {
       tab: loaded(() => { if (this.pushes && this.playing && this.playback.resting === null) this.toggle() }),
       legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
-      asked: () => this.tellAsked(),
+      requested: () => this.showRequested(),
       opened: () => buttons.tellOpen(model.opened),
       paused: loaded(() => { if (model.paused === this.playing && this.playback.resting === null) this.play(!model.paused && !STILL.matches) }),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
@@ -352,7 +352,7 @@ class Player {
       plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
       measured: loaded(() => { this.look.measure(); this.again() }),
-      gone: loaded(() => { this.look.measure(); this.again() }),
+      reduction: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
@@ -400,6 +400,6 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["opened", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  for (const name of ["opened", "legend", "source", "busy", "requested", "plane", "twin", "walk", "displacement"]) changes[name]()
   return player.buttons.root
 }

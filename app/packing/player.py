@@ -10,12 +10,12 @@ from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.replays import Replay
-from ..state.view_settings import Seen
+from ..state.view_settings import Appearance
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
-class Player(Scripted, Seen):
+class Player(Scripted, Appearance):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
     Its script has parts: what is replayed and how (replay/), where and how it is drawn (drawing/),
@@ -29,7 +29,7 @@ class Player(Scripted, Seen):
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
-    gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
+    reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
     measured = param.Dict(default={}, doc="of a frame, see packing.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
@@ -40,7 +40,7 @@ class Player(Scripted, Seen):
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
     scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
-    asked = param.String(doc="the requested selection if it is not on screen, in words")
+    requested = param.String(doc="the requested selection if it is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
     keepable = param.Boolean(doc="whether more networks of the walk could be stored")
     source = param.String(doc="where the states come from, in words")

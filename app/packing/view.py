@@ -13,14 +13,14 @@ from ..results.planes import Plane
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.known import Knowledge
-from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
+from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Looks, Appearance
 from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
 from .player import Player, frames
 
 # In both directions.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
 SHARED += ("stretch", "paused", "opened")
-SEEN = sorted(set(Seen.param) - {"name"})
+APPEARANCE = sorted(set(Appearance.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty if unknown
 
@@ -67,7 +67,7 @@ class PackingView:
             sizing_mode="stretch_width",
             palettes=palettes(looks.dark),
             zoom=None if looks.zoom is None else list(looks.zoom),
-            **{name: getattr(looks, name) for name in SEEN},
+            **{name: getattr(looks, name) for name in APPEARANCE},
             source=state.source,
             busy=state.work.busy,
         )
@@ -77,16 +77,16 @@ class PackingView:
         for name in ("between", "zoom"):
             self.player.param.watch(self._go, name)
         self.player.param.watch(self._explain, "pulled")
-        looks.param.watch(self._follow, SEEN)
+        looks.param.watch(self._follow, APPEARANCE)
         state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
-        state.param.watch(self._show, ["seen", "exact", "measured"])
+        state.param.watch(self._show, ["shown", "exact", "measured"])
         state.knowledge.param.watch(self._show, "narrowed")
         looks.param.watch(self._show, ["between", "full"])
         state.param.watch(self._pin, "replay")
         state.knowledge.param.watch(self._pin, ["known", "ranked"])
         state.param.watch(self._displace, "displacement")
-        state.besides.param.watch(self._accompany, "twin")
+        state.comparison.param.watch(self._accompany, "twin")
         dress = self.player.param.update
         state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
@@ -94,7 +94,7 @@ class PackingView:
             self._explain,
             ["colour", "thickness", "full", "stretch", "dark", "tab", "reference"],
         )
-        state.param.watch(self._explain, ["seen", "exact", "loads", "measured"])
+        state.param.watch(self._explain, ["shown", "exact", "loads", "measured"])
         state.knowledge.param.watch(self._explain, ["known", "narrowed"])
         state.hand.param.watch(self._explain, "pulls")
         state.work.param.watch(self._explain, "moving")
@@ -115,13 +115,13 @@ class PackingView:
 
     def _show(self, *events: Any) -> None:
         """Send related changes in one message."""
-        state, looks, replay = self.state, self.looks, self.state.seen
+        state, looks, replay = self.state, self.looks, self.state.shown
         if replay is None:
             return
         exact = exact_intervals(state.possible, replay)
         changes = {
             "exact": exact,
-            "gone": gone(state.knowledge, replay),
+            "reduction": reduction(state.knowledge, replay),
             "measured": measured(state, replay),
             "most": full_extent(replay, exact, looks.full),
             "between": None if looks.between is None else list(looks.between),
@@ -135,7 +135,7 @@ class PackingView:
 
     def _accompany(self, *events: Any) -> None:
         """Show another packing next to the one on screen."""
-        twin = self.state.besides.twin
+        twin = self.state.comparison.twin
         if twin is None:
             self.player.twin = {}
         else:
@@ -150,9 +150,9 @@ class PackingView:
             work = compute.thrust(state.library, state.cell)
             self.thrust.start(work, lambda found: self._show_thrust(found, replay))
 
-    def _show_thrust(self, found: dict[str, Any], replay: Replay) -> None:
+    def _show_thrust(self, bands: dict[str, Any], replay: Replay) -> None:
         if replay is self.state.replay:
-            self.player.thrust = found
+            self.player.thrust = bands
             self._explain()
 
     def _pin(self, *events: Any) -> None:
@@ -201,20 +201,27 @@ def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
     }
 
 
-def gone(knowledge: Knowledge, replay: Replay) -> Any:
+def reduction(knowledge: Knowledge, replay: Replay) -> Any:
     """Reduction of ΔF_n (N_c,) by known forces, in ⟨f_n⟩; None without known forces."""
     narrowed = knowledge.narrowed
-    if narrowed is None or len(narrowed.gone) != len(replay.backbone):
+    if narrowed is None or len(narrowed.reduction) != len(replay.backbone):
         return None
-    return narrowed.gone.astype(np.float32)
+    return narrowed.reduction.astype(np.float32)
 
 
 def measured(state: AppState, replay: Replay) -> dict[str, Any]:
     """Measured f_n in ⟨f_n⟩ of an opened frame, and its deviation in σ; otherwise {}."""
-    found = state.measured
-    if found is None or state.selection is None or state.selection.packing != found.packing:
+    measurement = state.measured
+    if (
+        measurement is None
+        or state.selection is None
+        or state.selection.packing != measurement.packing
+    ):
         return {}
-    normal, off = found.force[replay.backbone] / replay.force_scale, found.off[replay.backbone]
+    normal, off = (
+        measurement.force[replay.backbone] / replay.force_scale,
+        measurement.off[replay.backbone],
+    )
     return {"normal": normal.astype(np.float32), "off": off.astype(np.float32)}
 
 
@@ -241,7 +248,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     change = f"≤ −{full:.3g}", diverging, f"≥ +{full:.3g} ⟨fₙ⟩"
     if pulled:
         return change
-    most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
+    most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
         "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
@@ -272,7 +279,7 @@ def _largest(loads: Floats | None, full: float | None) -> str:
 
 def legend(state: AppState, pulled: bool = False) -> str:
     """The present meaning of width and colour, as HTML."""
-    looks, replay = state.looks, state.seen
+    looks, replay = state.looks, state.shown
     if replay is None:
         return ""
     low, stops, high = colour_bar(state, pulled)
@@ -308,18 +315,20 @@ def legend(state: AppState, pulled: bool = False) -> str:
 def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:
     """The quantities for colour or width: pinned state and known forces only if present."""
     pinned = state.looks.reference
-    there = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
-    there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
+    conditions = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
+    conditions |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
     chosen = getattr(state.looks, name)
-    return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
+    return {
+        key: words for key, words in labels.items() if conditions.get(key, True) or key == chosen
+    }
 
 
 def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     """A list of the quantities that lines can show, as HTML; the player handles the choice."""
-    value, there = getattr(state.looks, name), meaningful(state, labels, name)
+    value, available = getattr(state.looks, name), meaningful(state, labels, name)
     options = "".join(
         f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
-        for key, words in there.items()
+        for key, words in available.items()
     )
     title = {"colour": "Colour", "thickness": "Width"}[name]
     return f'<select name="{name}" aria-label="{title}">{options}</select>'

@@ -26,20 +26,20 @@ from .selection import Selection
 PACKING_SHARE, NEARLY = 0.5, 0.95
 
 
-def found_or_made(
+def load_or_compute(
     library: Library, job: Job, stage: str, kind: Kind, params: Parameters, **options: Any
 ) -> xr.Dataset:
     """The dataset of a kind and parameters from a store, or computed in this stage.
 
     options: for the kind's compute.
     """
-    found = library.stored(kind, params)
-    if found is None:
+    result = library.stored(kind, params)
+    if result is None:
         with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
             job.begin(stage)
-            found, _ = study.get(library.own, kind, params, **{"progress": job.tell} | options)
-    return found
+            result, _ = study.get(library.cache, kind, params, **{"progress": job.tell} | options)
+    return result
 
 
 def states(library: Library, selection: Selection) -> Work:
@@ -55,7 +55,7 @@ def states(library: Library, selection: Selection) -> Work:
                 job.begin("finding the contacts that carry force")
                 with _naming_friction(selection):
                     dataset, _ = study.get(
-                        library.own,
+                        library.cache,
                         kind,
                         params,
                         progress=lambda done, total: _counted(job, done, total),
@@ -86,7 +86,7 @@ def all_states(library: Library, cell: Cell) -> Work:
 def computed_anew(library: Library, cell: Cell, params: Parameters, job: Job) -> xr.Dataset:
     """Compute the states of a cell again and store more of them, as given by these parameters."""
     count = partial(_counted, job, begin=0.0)
-    return found_or_made(
+    return load_or_compute(
         library, job, "reading the packing", SOURCES[cell.kind], params, progress=count
     )
 
@@ -97,12 +97,12 @@ def _naming_friction(selection: Selection) -> Iterator[None]:
     try:
         yield
     except NotJammedError as error:
-        own = selection.packing["mu"]
-        if selection.mu >= own:
+        packing_mu = selection.packing["mu"]
+        if selection.mu >= packing_mu:
             raise
         raise InputError(
-            f"no forces hold this packing at μ = {selection.mu:g}: it was made at μ = {own:g}, "
-            "and needs some of that friction; try a larger μ"
+            f"no forces hold this packing at μ = {selection.mu:g}: it was made at μ = "
+            f"{packing_mu:g}, and needs some of that friction; try a larger μ"
         ) from error
 
 
@@ -116,9 +116,9 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
         job.begin("finding the first state")
         walking.restart(first_replay(S, params["states"]))
 
-    def add(found: Any) -> None:
+    def add(state: Any) -> None:
         job.keeps = True
-        walking.add(found)
+        walking.add(state)
 
     return {"begun": begun, "watch": add, "enough": job.enough}
 
@@ -131,16 +131,16 @@ def exact(library: Library, shown: Shown) -> Work:
         replay = shown.replay
         bounding = progress_feed.shared(progress_feed.Bounding, params)
         try:
-            dataset = found_or_made(
+            dataset = load_or_compute(
                 library, job, "exact intervals, widest first", kinds.INTERVALS, params,
                 begun=bounding.restart, watch=bounding.add,
                 widths=replay.high[:, 0] - replay.low[:, 0],
             )  # fmt: skip
         finally:
             bounding.forget()
-        found = Shown(shown.cell, shown.replay, dataset)
-        library.keep_in_memory(found)
-        return found
+        result = Shown(shown.cell, shown.replay, dataset)
+        library.keep_in_memory(result)
+        return result
 
     return Work(work, wants=((kinds.INTERVALS.name, params),))
 
@@ -164,7 +164,7 @@ def volume(library: Library, cell: Cell) -> Work:
     params = _volume_parameters(cell)
 
     def work(job: Job) -> tuple[Cell, xr.Dataset]:
-        return cell, found_or_made(library, job, "volume of S", kinds.VOLUME, params)
+        return cell, load_or_compute(library, job, "volume of S", kinds.VOLUME, params)
 
     return Work(work, wants=((kinds.VOLUME.name, params),))
 
@@ -186,7 +186,7 @@ def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
         return
     with in_turn(job, "packing", packing):
         if "scene" in packing:
-            study.get(library.own, kinds.PACKING, packing)
+            study.get(library.cache, kinds.PACKING, packing)
         else:
             _compact(job, library, packing)
 
@@ -199,14 +199,14 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
     job.begin("compressing")
-    seen = progress_feed.shared(progress_feed.Compaction, packing)
-    seen.restart()
+    feed = progress_feed.shared(progress_feed.Compaction, packing)
+    feed.restart()
 
     def look(glimpse: Any) -> None:
         job.stage = f"compressing, step {glimpse.step}"  # other numbers are next to the picture
-        seen.add(glimpse)
+        feed.add(glimpse)
 
-    study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)
+    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=look)
 
 
 def _counted(job: Job, done: float, total: float | None, begin: float = PACKING_SHARE) -> None:

@@ -35,9 +35,9 @@ def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
 
 def _kin(selection: Selection) -> tuple[Any, ...]:
     """Properties that all cells of one statistic share."""
-    made = selection.packing
-    packing = {name: made.get(name) for name in ("imported", "scene", "n")}
-    packing |= {} if selection.imported else unusual(made)
+    settings = selection.packing
+    packing = {name: settings.get(name) for name in ("imported", "scene", "n")}
+    packing |= {} if selection.imported else unusual(settings)
     own_mu = None if selection.same_mu else selection.packing["mu"]
     relax = selection.relax if selection.kind == "walk" else ""
     return packing, own_mu, selection.kind, relax, selection.states
@@ -50,14 +50,14 @@ def rows(cells: Iterable[Cell]) -> list[Row]:
 
 def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
     """The same from exact intervals, for packings whose intervals are in a store."""
-    found = []
+    rows = []
     for cell in cells:
         for store in library.stores:
             name = entry_name(store, kinds.INTERVALS, cell.selection.intervals)
             if name in store:
-                found.append(_row(store, name, cell.selection))
+                rows.append(_row(store, name, cell.selection))
                 break
-    return found
+    return rows
 
 
 def _row(store: Store, name: str, selection: Selection) -> Row:
@@ -79,13 +79,13 @@ def _row(store: Store, name: str, selection: Selection) -> Row:
     return row
 
 
-def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
+def groups(rows: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
     """{μ: extents of its packings} for this μ and some others, spread over all available ones.
 
     Packings with determined forces are left out.
     """
     by_mu: dict[float, list[Floats]] = {}
-    for row in found:
+    for row in rows:
         if row["extent"].max(initial=0) > UNDETERMINED:
             by_mu.setdefault(row["mu"], []).append(row["extent"])
     others = sorted(value for value in by_mu if value != mu)

@@ -19,9 +19,9 @@ _lock = threading.Lock()
 def names(store: Store) -> dict[str, str]:
     """All names; empty if the file is missing or damaged."""
     with suppress(OSError, ValueError):
-        found = json.loads((store.path / NAMES).read_text())
-        if isinstance(found, dict):
-            return {str(key): str(value) for key, value in found.items()}
+        labels = json.loads((store.path / NAMES).read_text())
+        if isinstance(labels, dict):
+            return {str(key): str(value) for key, value in labels.items()}
     return {}
 
 

@@ -34,7 +34,7 @@ SHIPPED = Path(__file__).resolve().parents[2] / "data" / "start.zarr"
 SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
 
 OPENING_MU = 0.1  # where forces are least determined, and most interesting to see
-SHOWN_KEPT = 16  # cells in memory, for all visitors
+CELLS_IN_MEMORY = 16  # cells in memory, for all visitors
 STEPS_GROW = 0.3  # steps of a compaction ~ n to this power: 325 at 400 disks, 475 at 1600
 
 
@@ -53,7 +53,7 @@ class Cell(NamedTuple):
         return self.selection.mu
 
     @property
-    def kept(self) -> int:
+    def stored(self) -> int:
         """Number of its stored states."""
         return int(self.params.get("keep") or self.selection.states)
 
@@ -81,7 +81,7 @@ class Library:
         self,
         shipped: str | Path | None = None,
         cache: str | Path | None = None,
-        kept: int = SHOWN_KEPT,
+        cells_in_memory: int = CELLS_IN_MEMORY,
     ) -> None:
         """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache.
 
@@ -95,7 +95,7 @@ class Library:
         self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
         self._damaged: set[tuple[Path, str]] = set()  # entries that could not be read
         self._shown: OrderedDict[str, Shown] = OrderedDict()
-        self._kept, self._lock = kept, threading.Lock()
+        self._cells_in_memory, self._lock = cells_in_memory, threading.Lock()
 
     def _open(self, path: str | Path | None, readonly: bool) -> Store | None:
         try:
@@ -110,7 +110,7 @@ class Library:
         return [store for store in (self.shipped, self.cache) if store is not None]
 
     @property
-    def own(self) -> Store:
+    def cache(self) -> Store:
         """The cache, where computed results are stored; InputError without one."""
         if self.cache is None:
             raise InputError("no cache folder can be written, so nothing can be computed")
@@ -121,7 +121,7 @@ class Library:
 
         If a store has the same states twice, the entry with most stored states.
         """
-        found: dict[tuple[str, ...], Cell] = {}
+        cells: dict[tuple[str, ...], Cell] = {}
         for store in self.stores:
             for name in store:
                 key = store.path, name
@@ -131,9 +131,9 @@ class Library:
                 if cell is None or key in self._damaged:
                     continue
                 same = cell.series, repr(cell.selection)
-                if same not in found or found[same].kept < cell.kept:
-                    found[same] = cell
-        self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
+                if same not in cells or cells[same].stored < cell.stored:
+                    cells[same] = cell
+        self.catalogue = sorted(cells.values(), key=lambda cell: (cell.series, cell.mu))
         return self.catalogue
 
     def find(self, kind: str, params: Parameters) -> Cell | None:
@@ -164,21 +164,21 @@ class Library:
 
     def dataset(self, cell: Cell) -> xr.Dataset:
         """The dataset of one cell; if it is damaged, InputError, and it is no longer listed."""
-        found = study.load(cell.store, SOURCES[cell.kind], cell.params)
-        if found is None:
+        dataset = study.load(cell.store, SOURCES[cell.kind], cell.params)
+        if dataset is None:
             self._damaged.add((cell.store.path, cell.name))
             raise _damage(cell.store, cell.name)
-        return found
+        return dataset
 
     def shown(self, cell: Cell) -> Shown:
         """Shown of one cell; the last few are cached. InputError if its packing is in no store."""
-        found = self.shown_in_memory(cell)
-        if found is None:
+        shown = self.shown_in_memory(cell)
+        if shown is None:
             packing = self.packing(cell.params["packing"])
             replay = make_replay(packing, self.dataset(cell), cell.mu)
-            found = Shown(cell, replay, self.exact(cell.selection))
-            self.keep_in_memory(found)
-        return found
+            shown = Shown(cell, replay, self.exact(cell.selection))
+            self.keep_in_memory(shown)
+        return shown
 
     def shown_in_memory(self, cell: Cell) -> Shown | None:
         """Shown of one cell if it is cached, otherwise None; returns at once."""
@@ -191,14 +191,14 @@ class Library:
         """Make this the newest in the cache."""
         with self._lock:
             self._shown[shown.cell.name] = shown
-            while len(self._shown) > self._kept:
+            while len(self._shown) > self._cells_in_memory:
                 self._shown.popitem(last=False)
 
     def packing(self, params: Parameters) -> Packing:
         """The packing of these parameters from the first store that has it. InputError if none."""
-        found = self.stored(kinds.PACKING, params)
-        if found is not None:
-            return dataset_packing(found)
+        dataset = self.stored(kinds.PACKING, params)
+        if dataset is not None:
+            return dataset_packing(dataset)
         raise InputError("the packing of these states is not in any open store")
 
     def exact(self, selection: Selection) -> xr.Dataset | None:
@@ -208,18 +208,18 @@ class Library:
     def stored(self, kind: study.Kind, params: Parameters) -> xr.Dataset | None:
         """The dataset of this kind and parameters from the first store that has it, or None."""
         for store in self.stores:
-            found = study.load(store, kind, params)
-            if found is not None:
-                return found
+            dataset = study.load(store, kind, params)
+            if dataset is not None:
+                return dataset
         return None
 
     def lend_packing(self, params: Parameters) -> None:
         """Copy a packing from the shipped store to the cache, so that it is not made again."""
-        own = self.own
+        cache = self.cache
         if self.shipped is not None:
-            found = study.load(self.shipped, kinds.PACKING, params)
-            if found is not None:
-                kinds.keep_packing(own, params, dataset_packing(found))
+            dataset = study.load(self.shipped, kinds.PACKING, params)
+            if dataset is not None:
+                kinds.keep_packing(cache, params, dataset_packing(dataset))
 
     def expected_steps(self, n: int, mu: float) -> float | None:
         """Compaction steps of n grains, from the stored packing nearest in n, then μ; or None."""
@@ -260,25 +260,27 @@ def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
     return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
 
 
-def cell_of(cells: Sequence[Cell], wanted: Selection | None) -> Cell | None:
+def cell_of(cells: Sequence[Cell], selection: Selection | None) -> Cell | None:
     """The cell of the wanted Selection, or None."""
-    return next((c for c in cells if wanted is not None and c.selection.names(wanted)), None)
+    return next((c for c in cells if selection is not None and c.selection.names(selection)), None)
 
 
-def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
+def best_cell(cells: Sequence[Cell], selection: Selection | None = None) -> Cell | None:
     """The cell of the wanted Selection, or the best one to open; None without cells."""
-    found = cell_of(cells, wanted)
-    if found is not None or not cells:
-        return found
+    best = cell_of(cells, selection)
+    if best is not None or not cells:
+        return best
     names = [cell.series for cell in cells]
     fullest = max(dict.fromkeys(names), key=names.count)
     return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)
 
 
-def with_states(cells: Sequence[Cell], wanted: Selection) -> Selection:
-    """The wanted Selection with the largest number of states in a cell, or unchanged."""
-    found = [c.selection for c in cells if c.selection._replace(states=wanted.states).names(wanted)]
-    return max(found, key=lambda selection: selection.states, default=wanted)
+def with_states(cells: Sequence[Cell], requested: Selection) -> Selection:
+    """The requested Selection with the largest number of states in a cell, or unchanged."""
+    candidates = [
+        c.selection for c in cells if c.selection._replace(states=requested.states).names(requested)
+    ]
+    return max(candidates, key=lambda selection: selection.states, default=requested)
 
 
 LEAST_PLACE = -3.5  # represents μ = 0

@@ -12,21 +12,22 @@ from .library import SOURCES, Library
 
 def rows(library: Library) -> list[dict[str, Any]]:
     """A dict per computation in the cache, newest first: entry, name, kind, time, MB."""
-    store = library.own
+    store = library.cache
     known, entries = names(store), store.entries()
     cells = [cell for cell in library.cells() if cell.store is store]
-    made = {entry.name: entry for entry in entries}
+    packings = {entry.name: entry for entry in entries}
     return sorted(
         (
             {
                 "entry": cell.name,
                 "name": known.get(cell.name, ""),
                 "what": f"μ = {cell.mu:g}, {cell.series}",
-                "when": made[cell.name].created,
-                "megabytes": sum(e.bytes for e in entries if _belongs(e, made[cell.name])) / 1e6,
+                "when": packings[cell.name].created,
+                "megabytes": sum(e.bytes for e in entries if _belongs(e, packings[cell.name]))
+                / 1e6,
             }
             for cell in cells
-            if cell.name in made
+            if cell.name in packings
         ),
         key=lambda row: row["when"],
         reverse=True,
@@ -35,7 +36,7 @@ def rows(library: Library) -> list[dict[str, Any]]:
 
 def delete(library: Library, name: str) -> None:
     """Delete a computation from the cache, and its packing with all results on it alone."""
-    store = library.own
+    store = library.cache
     entry = store.entry(name)
     if entry is None or entry.kind not in SOURCES:
         raise InputError("that computation is no longer in the cache")

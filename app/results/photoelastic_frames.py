@@ -47,7 +47,7 @@ class Frame(NamedTuple):
     certain: np.ndarray  # unmeasured contacts that certainly carry force, strongest first
     at_wall: np.ndarray  # (N,) bool, grains at walls
     left_open: np.ndarray  # (N,) bool, other grains with open balance
-    found: np.ndarray  # (k, 2) places of repairs
+    repaired: np.ndarray  # (k, 2) places of repairs
     region: np.ndarray  # (N_c,) number of the contact's region, see `regions`
     stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
     stress_error: np.ndarray  # (9, 3)
@@ -86,11 +86,11 @@ def infer(
         job.begin("finding balanced forces close to the measured ones")
         roles = uploads.FAMILIES[uploads.family(files)][1]
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
-        found = read_pegs(
+        photo = read_pegs(
             frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
         )
         job.begin("simulating repeated measurements, for error bars")
-        dataset = series.infer_frame(found, states=DRAWS)
+        dataset = series.infer_frame(photo, states=DRAWS)
         names = " and ".join(name for name, _ in files.values())
         return frame_of(dataset, names, tuple(map(plain, frames.frames.tolist())))
 
@@ -135,7 +135,7 @@ def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame
         certain=order[certain[order]],
         at_wall=at_wall[:count] & ~left_open[:count],
         left_open=left_open[:count],
-        found=places[np.isfinite(places).all(axis=1)],
+        repaired=places[np.isfinite(places).all(axis=1)],
         region=regions(begin + of["arm_i"][:, None] * of["normal"], of["x"][:count])[0],
         stress=of["regional_stress"] / pressure,
         stress_error=of["regional_stress_error"] / pressure,

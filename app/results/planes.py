@@ -19,7 +19,7 @@ from granforce.study.keys import Parameters
 from granforce.types import Floats
 
 from ..background.jobs import Job
-from .compute import found_or_made
+from .compute import load_or_compute
 from .library import Cell, Library
 from .replays import Replay
 from .selection import Selection
@@ -154,8 +154,12 @@ def _spelled(components: Components) -> str:
 
 def renumbered(name: str, number: Callable[[int], int]) -> str:
     """The name of a plane with each contact renumbered."""
-    found = read(name)
-    return _spelled(tuple((number(contact), part) for contact, part in found)) if found else name
+    positions = read(name)
+    return (
+        _spelled(tuple((number(contact), part) for contact, part in positions))
+        if positions
+        else name
+    )
 
 
 def read(text: str) -> Components:
@@ -174,22 +178,22 @@ def named(library: Library, cell: Cell, replay: Replay, text: str) -> Plane:
     if text == "s":
         return stress(library, cell.selection, replay)
     plane = principal(replay)
-    kept = library.stored(kinds.OUTLINE, _parameters(cell, replay, plane))
-    return plane if kept is None else _as_kept(replay, plane, kept)
+    stored = library.stored(kinds.OUTLINE, _parameters(cell, replay, plane))
+    return plane if stored is None else _from_stored(replay, plane, stored)
 
 
-def beside(cells: Sequence[Cell], cell: Cell) -> Cell | None:
+def other_states(cells: Sequence[Cell], cell: Cell) -> Cell | None:
     """The cell of the other kind of states with the same packing and μ and most states, or None.
 
     Uniform states for a walk, and a walk for uniform states.
     """
-    own = cell.selection
+    selection = cell.selection
     others = [
         other
         for other in cells
         if other.kind != cell.kind
         and other.mu == cell.mu
-        and other.selection.packing == own.packing
+        and other.selection.packing == selection.packing
     ]
     return max(others, key=lambda other: other.selection.states, default=None)
 
@@ -236,8 +240,8 @@ def outline(
             return _stresses(library, job, cell, plane)
         params = _parameters(cell, replay, plane)
         axes = None if plane.components else plane.axes
-        found = found_or_made(library, job, "outline of S", kinds.OUTLINE, params, axes=axes)
-        return _outlined(replay, plane, found)
+        dataset = load_or_compute(library, job, "outline of S", kinds.OUTLINE, params, axes=axes)
+        return _outlined(replay, plane, dataset)
 
     return work
 
@@ -245,11 +249,11 @@ def outline(
 def _stresses(library: Library, job: Job, cell: Cell, plane: Plane) -> Outlined:
     """The Outlined of all stresses."""
     params = kinds.STRESS.parameters(cell.selection.packing, mu=cell.mu)
-    found = found_or_made(library, job, "outline of all stresses", kinds.STRESS, params)
-    inner, outer = found["stress_inner"].values, found["stress_outer"].values
-    gap = found["friction_bound"].item() - found["friction"].item()
-    programs = json.loads(found.attrs["counts"])["programs"]
-    return Outlined(plane, inner, outer, gap, programs, found["seconds"].item())
+    dataset = load_or_compute(library, job, "outline of all stresses", kinds.STRESS, params)
+    inner, outer = dataset["stress_inner"].values, dataset["stress_outer"].values
+    gap = dataset["friction_bound"].item() - dataset["friction"].item()
+    programs = json.loads(dataset.attrs["counts"])["programs"]
+    return Outlined(plane, inner, outer, gap, programs, dataset["seconds"].item())
 
 
 def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
@@ -264,23 +268,23 @@ def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
     )
 
 
-def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
+def _from_stored(replay: Replay, plane: Plane, dataset: xr.Dataset) -> Plane:
     """The Plane on the axes with which its outline was computed."""
-    axes = found["axes"].values
+    axes = dataset["axes"].values
     if np.array_equal(axes, plane.axes):
         return plane
     centre = measures.mean_network(_frames(replay)[1:])
     return _plane(replay, plane.components, axes, centre, plane.share)
 
 
-def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
+def _outlined(replay: Replay, plane: Plane, dataset: xr.Dataset) -> Outlined:
     """The stored outline, on the axes of its computation, to which the path is converted."""
-    plane = _as_kept(replay, plane, found)
+    plane = _from_stored(replay, plane, dataset)
     return Outlined(
         plane,
-        inner=found["inner"].values - plane.origin,
-        outer=found["outer"].values - plane.origin,
-        gap=found["outline_gap"].item(),
-        programs=found["programs"].item(),
-        seconds=found["seconds"].item(),
+        inner=dataset["inner"].values - plane.origin,
+        outer=dataset["outer"].values - plane.origin,
+        gap=dataset["outline_gap"].item(),
+        programs=dataset["programs"].item(),
+        seconds=dataset["seconds"].item(),
     )

@@ -41,10 +41,10 @@ def shared(kind: type[Kind], params: Parameters) -> Kind:
     """The shared Compaction, Walking or Bounding of these parameters."""
     with _lock:
         key = kind.__name__, repr(params)
-        found = _shared.get(key)
-        if found is None:
-            found = _shared[key] = kind()
-        return found
+        feed = _shared.get(key)
+        if feed is None:
+            feed = _shared[key] = kind()
+        return feed
 
 
 class Compaction:
@@ -59,7 +59,7 @@ class Compaction:
         """Start again: an earlier run was cancelled."""
         with self._lock:
             self.run += 1
-            self._kept: deque[Message] = deque()
+            self._pictures: deque[Message] = deque()
             self.total = 0  # number of recorded pictures, including dropped ones
             self._side, self._at = np.inf, -np.inf
 
@@ -72,10 +72,10 @@ class Compaction:
         picture = _picture(glimpse)
         size = sum(value.nbytes for value in picture.values() if isinstance(value, np.ndarray))
         with self._lock:
-            self._kept.append(picture)
+            self._pictures.append(picture)
             self.total += 1
-            while len(self._kept) * size > PICTURE_BYTES and len(self._kept) > 1:
-                self._kept.popleft()
+            while len(self._pictures) * size > PICTURE_BYTES and len(self._pictures) > 1:
+                self._pictures.popleft()
 
     def after(self, run: int, place: int) -> tuple[int, int, Message | None]:
         """(run, place, picture or None): the next picture for a page that has seen `place`."""
@@ -85,8 +85,8 @@ class Compaction:
             left = self.total - place
             if left <= 0:
                 return run, place, None
-            place = max(place + (left - 1) // BEHIND, self.total - len(self._kept))
-            return run, place + 1, self._kept[place - self.total]
+            place = max(place + (left - 1) // BEHIND, self.total - len(self._pictures))
+            return run, place + 1, self._pictures[place - self.total]
 
 
 def _picture(glimpse: Any) -> Message:
@@ -125,15 +125,15 @@ class Walking:
         self.replay = replay
         self.run += 1
 
-    def add(self, found: Any) -> None:
+    def add(self, accepted: Any) -> None:
         """Record a WalkState, or only some if not all can be sent."""
         assert self.replay is not None  # set by `restart`
-        state = found.forces / self.replay.force_scale
+        state = accepted.forces / self.replay.force_scale
         grown = self._growth.add(state)
         self._found += 1
         if (self._found - 1) % self._every:
             return
-        numbers = self._found, found.residual, *grown
+        numbers = self._found, accepted.residual, *grown
         self.parts.append((state.astype(np.float32), numbers))
 
 

@@ -64,12 +64,12 @@ def make_replay(
     summary: dict[str, Any] = {
         str(name): array.item() for name, array in dataset.items() if array.ndim == 0
     }
-    kept = dataset.sizes["state"]
-    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
-    pick = evenly(kept, len(backbone), most_bytes)
+    stored = dataset.sizes["state"]
+    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else stored
+    pick = evenly(stored, len(backbone), most_bytes)
     frames: Any = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
     frames = (frames / scale).astype(np.float32)
-    number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
+    number = np.linspace(0, walked - 1, stored).astype(int)[pick] + 1
     summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
     summary |= {"kept": len(pick), "states": walked}
 

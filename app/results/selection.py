@@ -69,19 +69,19 @@ class Selection(NamedTuple):
         mu = friction(mu)
         if self.imported or not self.same_mu:
             return self._replace(mu=mu)
-        made = kinds.PACKING.parameters(
+        packing = kinds.PACKING.parameters(
             self.packing["n"], mu, self.packing["seed"], **unusual(self.packing)
         )
-        return self._replace(mu=mu, packing=made)
+        return self._replace(mu=mu, packing=packing)
 
     @property
-    def kept(self) -> int:
+    def stored(self) -> int:
         """Number of states to store."""
         return min(self.states, int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400))))
 
     def parameters(self) -> Parameters:
         """Parameters of the walk or sample, for its kind."""
-        common = {"mu": self.mu, "keep": None if self.states == self.kept else self.kept}
+        common = {"mu": self.mu, "keep": None if self.states == self.stored else self.stored}
         if self.kind == "uniform":
             return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
         return kinds.WALK.parameters(
@@ -113,26 +113,32 @@ class Selection(NamedTuple):
         return _plain(self) == _plain(other)
 
 
-def differing(wanted: Selection, shown: Selection | None) -> str:
+def differing(requested: Selection, shown: Selection | None) -> str:
     """The differences of a Selection from another one (None: everything), in words."""
-    if shown is None or wanted.imported or shown.imported:
-        return f"the packing at μ = {wanted.mu:g}" if wanted.imported else f"μ = {wanted.mu:g}"
+    if shown is None or requested.imported or shown.imported:
+        return (
+            f"the packing at μ = {requested.mu:g}"
+            if requested.imported
+            else f"μ = {requested.mu:g}"
+        )
     words, other = [], shown.packing
-    if wanted.mu != shown.mu:
-        words.append(f"μ = {wanted.mu:g}")
-    if wanted.packing["n"] != other["n"]:
-        words.append(f"N = {wanted.packing['n']}")
-    if wanted.packing["seed"] != other["seed"]:
-        words.append(f"seed {wanted.packing['seed']}")
-    if not wanted.same_mu and wanted.packing["mu"] != other["mu"]:
-        words.append(f"packed at μ = {wanted.packing['mu']:g}")
-    if wanted.kind != shown.kind:
-        words.append(f"states {KINDS[wanted.kind]}" if wanted.kind == "uniform" else KINDS["walk"])
-    if wanted.states != shown.states:
-        words.append(f"{wanted.states} states")
-    if wanted.kind == shown.kind == "walk" and wanted.relax != shown.relax:
-        words.append(SOLVERS[wanted.relax])
-    return ", ".join(words) or f"μ = {wanted.mu:g}"
+    if requested.mu != shown.mu:
+        words.append(f"μ = {requested.mu:g}")
+    if requested.packing["n"] != other["n"]:
+        words.append(f"N = {requested.packing['n']}")
+    if requested.packing["seed"] != other["seed"]:
+        words.append(f"seed {requested.packing['seed']}")
+    if not requested.same_mu and requested.packing["mu"] != other["mu"]:
+        words.append(f"packed at μ = {requested.packing['mu']:g}")
+    if requested.kind != shown.kind:
+        words.append(
+            f"states {KINDS[requested.kind]}" if requested.kind == "uniform" else KINDS["walk"]
+        )
+    if requested.states != shown.states:
+        words.append(f"{requested.states} states")
+    if requested.kind == shown.kind == "walk" and requested.relax != shown.relax:
+        words.append(SOLVERS[requested.relax])
+    return ", ".join(words) or f"μ = {requested.mu:g}"
 
 
 def _plain(selection: Selection) -> Selection:
@@ -282,7 +288,7 @@ def _read_selection(given: dict[str, str]) -> Selection:
     if "scene" in given:
         scene = choice(given.pop("scene"), BLOCKS, "scene")
         return Selection({"scene": scene, "mu": packed}, mu, kind, relax, **rest)
-    made = select(
+    selection = select(
         _whole(given, "n", 400),
         mu,
         _whole(given, "seed", 1),
@@ -301,7 +307,7 @@ def _read_selection(given: dict[str, str]) -> Selection:
         options["radii"] = given.pop("radii")
         if ":" not in options["radii"]:
             raise InputError("radii in a link must be a named distribution")
-    return made._replace(packing=made.packing | options)
+    return selection._replace(packing=selection.packing | options)
 
 
 def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:

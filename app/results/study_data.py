@@ -57,10 +57,10 @@ def claims(about: str) -> list[dict[str, Any]]:
     path = DATA / "claims.json"
     if not path.exists():
         return []
-    found = json.loads(path.read_text())["claims"]
+    claims_read = json.loads(path.read_text())["claims"]
     return [
         {name: math.nan if value is None else value for name, value in claim.items()}
-        for claim in found
+        for claim in claims_read
         if claim["statement"].startswith(ABOUT[about])
     ]
 

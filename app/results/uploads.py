@@ -126,9 +126,9 @@ def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMIT
     for a file that is none of WORDS, or if all together are too large.
     """
     for name, content in new:
-        found = role(name, content)
-        files = {k: v for k, v in files.items() if family([k]) == family([found])}
-        files[found] = (name, content)
+        part = role(name, content)
+        files = {k: v for k, v in files.items() if family([k]) == family([part])}
+        files[part] = (name, content)
     size = sum(len(content) for _, content in files.values())
     if size > limits.upload * 1e6:
         raise InputError(f"the files have {size / 1e6:.1f} MB; at most {limits.upload} MB are read")

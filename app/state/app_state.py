@@ -18,7 +18,7 @@ from ..results.progress_feed import Arriving, Following, numbers
 from ..results.replays import Replay
 from ..results.selection import Selection, brief, command, link, read_link
 from . import known, perturbations
-from .comparison import Beside
+from .comparison import Comparison
 from .known import Knowledge
 from .links import OF_A_REPLAY, VIEW, Numbered, Numbers, View, fitting, read_view, spelled
 from .page_tasks import Work
@@ -36,7 +36,7 @@ class AppState(param.Parameterized):
     """The states selected, and the catalogue to select from.
 
     `looks` is how they are shown, `work` what is being computed; these do not depend on it.
-    `knowledge` holds known forces, `hand` what was pulled, and `besides` the comparison.
+    `knowledge` holds known forces, `hand` what was pulled, and `comparison` the comparison.
     """
 
     catalogue = param.List(doc="all cells, by series and μ")
@@ -44,7 +44,7 @@ class AppState(param.Parameterized):
     missing = param.Boolean(doc="whether the selection is in no store and has to be computed")
     cell = param.Parameter(doc="the Cell on screen, or None")
     replay = param.Parameter(doc="the Replay of the cell on screen, or None")
-    seen = param.Parameter(doc="the same, or meanwhile that of the walk under way")
+    shown = param.Parameter(doc="the same, or meanwhile that of the walk under way")
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
@@ -69,7 +69,7 @@ class AppState(param.Parameterized):
         # A refusal is shown until the next action; watched before the parts that may refuse.
         chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
         self.looks.param.watch(self._forget, chosen)
-        self.knowledge, self.besides = Knowledge(self), Beside(self)
+        self.knowledge, self.comparison = Knowledge(self), Comparison(self)
         self.hand = Hand(self)  # uses what is known
         self.parts = self.looks, self.knowledge, self.hand  # which a link names
         self._viewed: dict[str, Any] = {
@@ -92,15 +92,15 @@ class AppState(param.Parameterized):
     def open(self, query: str = "") -> None:
         """Show the selection of a link, computing it if necessary, or a good one to begin with."""
         try:
-            wanted, texts = read_link(query)
+            selection, texts = read_link(query)
             self.work.message = ""
         except InputError as error:
-            wanted, texts = None, {}
+            selection, texts = None, {}
             self.work.message = str(error)
         view = read_view(texts, self._viewed)
         self.looks.dark = view.get("dark", self.looks.dark)  # before anything is visible
         self._look_up(
-            wanted, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
+            selection, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
         )
 
     def _as_new(self) -> View:
@@ -125,7 +125,7 @@ class AppState(param.Parameterized):
     @property
     def growing(self) -> bool:
         """Whether the Replay on screen is that of a walk in progress."""
-        return self.seen is not self.replay
+        return self.shown is not self.replay
 
     @property
     def possible(self) -> Any:
@@ -143,14 +143,14 @@ class AppState(param.Parameterized):
 
     def ask(self, selection: Selection, at_once: bool = False) -> None:
         """Select states: shown if a store has them, otherwise `missing`, or computed at_once."""
-        self.besides.keep(selection)
+        self.comparison.keep(selection)
         self._ask(selection, at_once)
 
     def _ask(self, selection: Selection, at_once: bool) -> None:
         self.work.message = ""
-        found = cell_of(self.catalogue, selection)
-        if found is not None:
-            self.show(found)
+        cell = cell_of(self.catalogue, selection)
+        if cell is not None:
+            self.show(cell)
             return
         try:
             selection.check(LIMITS)
@@ -169,13 +169,13 @@ class AppState(param.Parameterized):
         If it has no states there, they are requested and can be computed.
         """
         if mu is not None:
-            found = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
+            matching = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
         else:
             cells = [cell for cell in self.catalogue if cell.series == series]
-            found = cells and [nearest_cell(cells, self.cell.mu)]
-        if found:
-            self.besides.keep(found[0].selection)
-            self.show(found[0])
+            matching = cells and [nearest_cell(cells, self.cell.mu)]
+        if matching:
+            self.comparison.keep(matching[0].selection)
+            self.show(matching[0])
         elif mu is not None and self.cell is not None:
             self.ask(self.cell.selection.at(mu))
 
@@ -203,12 +203,12 @@ class AppState(param.Parameterized):
                 if self.library.shown_in_memory(near) is None
             )
 
-    def _look_up(self, wanted: Selection | None, view: View, counted: bool) -> None:
+    def _look_up(self, requested: Selection | None, view: View, counted: bool) -> None:
         """counted: whether exactly this many states are required, not any stored number."""
         library = self.library
 
         def meant(cells: list[Cell]) -> Selection | None:
-            return wanted if wanted is None or counted else with_states(cells, wanted)
+            return requested if requested is None or counted else with_states(cells, requested)
 
         def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
             damage = ""
@@ -222,18 +222,18 @@ class AppState(param.Parameterized):
                         raise
                     damage = str(error)  # use the next best
 
-        def done(found: tuple[list[Cell], Shown | None, str]) -> None:
-            cells, shown, damage = found
+        def done(result: tuple[list[Cell], Shown | None, str]) -> None:
+            cells, shown, damage = result
             message, selection = damage or self.work.message, meant(cells)
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
-            there = shown is not None and (
+            available = shown is not None and (
                 selection is None or shown.cell.selection.names(selection)
             )
             # The old view stays until the requested states exist; Cancel returns to it.
-            if shown is not None and (there or self.cell is None):
+            if shown is not None and (available or self.cell is None):
                 self._show(shown, view)
-            if selection is not None and not there:
+            if selection is not None and not available:
                 dear = LIMITS.shared and selection.dear
                 self._ask(selection, at_once=not dear)
                 if dear and self.missing:
@@ -263,7 +263,7 @@ class AppState(param.Parameterized):
         cell, replay, exact = shown
         fresh = self._unseen
         # A walk that was replaced may have reached numbers that the replay does not have.
-        if (self.seen is replay and view is None) or self._is_grown(replay):
+        if (self.shown is replay and view is None) or self._is_grown(replay):
             fresh = {}
         with as_one(*self.parts, self.work, self):
             self.work.shown(cell.selection)
@@ -272,7 +272,7 @@ class AppState(param.Parameterized):
                 missing=False,
                 cell=cell,
                 replay=replay,
-                seen=replay,
+                shown=replay,
                 exact=exact,
                 source=self._source(cell),
                 displacement=None,
@@ -292,7 +292,7 @@ class AppState(param.Parameterized):
 
     def _is_grown(self, replay: Replay) -> bool:
         """Whether a Replay is the final version of the growing walk on screen."""
-        return self.growing and np.array_equal(self.seen.normal[0], replay.normal[0])
+        return self.growing and np.array_equal(self.shown.normal[0], replay.normal[0])
 
     # Computations
 
@@ -308,7 +308,7 @@ class AppState(param.Parameterized):
             self.work.message = str(error)
             return
         with as_one(self.work, self):
-            self.seen = self.replay
+            self.shown = self.replay
             self.work.compute(self.library, selection, self._computed)
 
     def _computed(self, shown: Shown) -> None:
@@ -320,7 +320,7 @@ class AppState(param.Parameterized):
     @property
     def keepable(self) -> bool:
         """Whether more networks of the walk on screen could be stored."""
-        return self.cell is not None and self.cell.kept < self.cell.selection.kept
+        return self.cell is not None and self.cell.stored < self.cell.selection.stored
 
     def keep_all(self) -> None:
         """Compute the networks of the walk on screen that were not stored, keeping the view."""
@@ -355,7 +355,7 @@ class AppState(param.Parameterized):
         source = f"μ = {selection.mu:g}, {label} (as they are sampled)"
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
-            self.param.update(seen=replay, plane=None, source=source, displacement=None)
+            self.param.update(shown=replay, plane=None, source=source, displacement=None)
             self._look(self._unseen)
 
     def follow(self) -> Following | Arriving | None:
@@ -363,12 +363,12 @@ class AppState(param.Parameterized):
         with as_one(*self.parts, self.work, self):
             if self.work.live is not None and not self.work.computation.running:
                 plane = None if self.growing else self.plane
-                self.param.update(seen=self.replay, plane=plane, source=self._source())
+                self.param.update(shown=self.replay, plane=plane, source=self._source())
                 self._look(self._unseen)
             return self.work.follow()
 
     @property
-    def asked(self) -> str:
+    def requested(self) -> str:
         """The requested states that are not on screen yet, in words, or an empty string."""
         if not self.missing or self.cell is None:
             return ""
@@ -382,14 +382,14 @@ class AppState(param.Parameterized):
         if self.work.computation.running or self.cell is None or self.exact is not None:
             return
 
-        def done(found: Shown) -> None:
-            if found.cell == self.cell:
-                self._show(found)
+        def done(result: Shown) -> None:
+            if result.cell == self.cell:
+                self._show(result)
 
         self.work.compute_exact(self.library, self.library.shown(self.cell), done)
 
     @property
-    def exact_wanted(self) -> bool:
+    def exact_requested(self) -> bool:
         """Whether exact intervals are neither there nor in progress, and nothing precedes them."""
         under_way = self.work.computation.running or self.knowledge.task.running
         return self.exact is None and not self.growing and not under_way
@@ -433,7 +433,7 @@ class AppState(param.Parameterized):
     @property
     def numbers(self) -> Numbers | None:
         """Numbers of the contacts and networks on screen, if they belong to the selection."""
-        seen = self.seen
-        if seen is None or (self.missing and not self.growing):
+        replay = self.shown
+        if replay is None or (self.missing and not self.growing):
             return None
-        return Numbers(seen.backbone, numbers(seen.summary) if self.growing else seen.number)
+        return Numbers(replay.backbone, numbers(replay.summary) if self.growing else replay.number)

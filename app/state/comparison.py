@@ -12,7 +12,7 @@ from ..results.library import Shown, cell_of
 from ..results.selection import Selection
 
 
-class Beside(param.Parameterized):
+class Comparison(param.Parameterized):
     """The packing next to the states on screen if `looks.beside` names another μ.
 
     It is the same selection at that μ, with its own packing: `twin`. While the view is split,
@@ -28,13 +28,13 @@ class Beside(param.Parameterized):
         state.param.watch(self._follow, ["cell", "missing"])
         self.looks.param.watch(self._follow, ["split", "beside"])
 
-    def keep(self, wanted: Selection) -> None:
+    def keep(self, selection: Selection) -> None:
         """React to a new Selection: if only μ differs, the present states become the comparison."""
         state, looks = self.state, self.looks
         if not looks.split or looks.beside is not None or state.cell is None:
             return
         shown = state.cell.selection
-        if shown.mu != wanted.mu and shown.at(wanted.mu).names(wanted):
+        if shown.mu != selection.mu and shown.at(selection.mu).names(selection):
             looks.beside = shown.mu
 
     def _follow(self, *events: Any) -> None:
@@ -48,24 +48,25 @@ class Beside(param.Parameterized):
             self.twin = None
             return
         try:
-            wanted = state.cell.selection.at(looks.beside)
-            wanted.check(LIMITS)
+            selection = state.cell.selection.at(looks.beside)
+            selection.check(LIMITS)
         except InputError as error:
             looks.beside, state.work.message = None, str(error)
             return
-        if self.twin is None or not self.twin.cell.selection.names(wanted):
-            self._find(wanted)
+        if self.twin is None or not self.twin.cell.selection.names(selection):
+            self._find(selection)
 
-    def _find(self, wanted: Selection) -> None:
+    def _find(self, selection: Selection) -> None:
         state, library = self.state, self.state.library
-        cell = cell_of(state.catalogue, wanted)
-        if cell is None and LIMITS.shared and wanted.dear:
+        cell = cell_of(state.catalogue, selection)
+        if cell is None and LIMITS.shared and selection.dear:
             state.looks.beside = None
             state.work.message = (
-                f"the packing at μ = {wanted.mu:g} takes long to compute: open it by itself first"
+                f"the packing at μ = {selection.mu:g} takes long to compute: open it by itself "
+                "first"
             )
         elif cell is None:
-            self.task.start(compute.states(library, wanted), self._found)
+            self.task.start(compute.states(library, selection), self._found)
         elif (shown := library.shown_in_memory(cell)) is None:
             self.task.start(lambda job: library.shown(cell), self._found)
         else:

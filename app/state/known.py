@@ -72,7 +72,7 @@ class Narrowed(NamedTuple):
         return _extent(self.before), _extent(self.after)
 
     @property
-    def gone(self) -> Floats:
+    def reduction(self) -> Floats:
         """(N_c,) reduction of the intervals of f_n, in ⟨f_n⟩."""
         before, after = self.extents
         return np.maximum(before - after, 0.0)
@@ -80,7 +80,7 @@ class Narrowed(NamedTuple):
     @property
     def shortened(self) -> Floats:
         """The same for contacts that are not known themselves; 0 for known ones."""
-        change = self.gone
+        change = self.reduction
         change[[one.contact for one in self.known]] = 0.0
         return change
 
@@ -201,9 +201,9 @@ class Knowledge(param.Parameterized):
         self.work.message = ""
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
-    def _rank(self, found: Ranked | None) -> None:
-        if found is not None and found.replay is self.state.replay:
-            self.ranked = found if found.known == tuple(self.known) else None
+    def _rank(self, ranked: Ranked | None) -> None:
+        if ranked is not None and ranked.replay is self.state.replay:
+            self.ranked = ranked if ranked.known == tuple(self.known) else None
 
     def _stated(self, contact: int, value: float, error: float) -> Statement:
         """The Statement of a force, refused if the known forces exclude it."""
@@ -233,8 +233,10 @@ class Knowledge(param.Parameterized):
     @property
     def whole(self) -> Narrowed | None:
         """The Narrowed of all known forces, once all its bounds exist; otherwise None."""
-        found: Narrowed | None = self.narrowed
-        return found if self._settled and found and found.known == tuple(self.known) else None
+        narrowed: Narrowed | None = self.narrowed
+        return (
+            narrowed if self._settled and narrowed and narrowed.known == tuple(self.known) else None
+        )
 
     @property
     def _settled(self) -> bool:
@@ -328,8 +330,8 @@ def narrowing(
         params = kinds.INTERVALS.parameters(selection.packing, **given)
         stage = "exact intervals given the known forces"
         options: dict[str, Any] = {"widths": affected(shown.replay, known), "watch": bounds.add}
-        found = compute.found_or_made(library, job, stage, kinds.INTERVALS, params, **options)
-        return Narrowed(known, whole, found)
+        dataset = compute.load_or_compute(library, job, stage, kinds.INTERVALS, params, **options)
+        return Narrowed(known, whole, dataset)
 
     return work
 
@@ -368,7 +370,7 @@ def ranking(
         def watch(found: Any) -> None:
             job.so_far = ranked(*found[:4])
 
-        found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
+        found = compute.load_or_compute(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
         names = "backbone", "part_expected", "mean_before", "mean_after"
         return ranked(*(found[name].values for name in names))
 

@@ -174,12 +174,12 @@ def fitting(view: View, replay: Replay) -> View:
     """The rows and contacts that exist in a Replay, as positions."""
     numbers = Numbers(replay.backbone, replay.number)
     places = [range(len(of)).index for of in numbers]  # ValueError for others
-    found = {}
+    values = {}
     for name in OF_A_REPLAY:
         with suppress(KeyError, ValueError):
             value = view[name]
             if isinstance(value, Numbered):
-                found[name] = numbers.positions(name, value.value)
+                values[name] = numbers.positions(name, value.value)
             else:
-                found[name] = _translated(name, value, *places)
-    return found
+                values[name] = _translated(name, value, *places)
+    return values

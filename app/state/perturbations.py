@@ -15,7 +15,7 @@ from granforce.study.responses import moved_grains
 from granforce.types import Floats
 
 from ..background.jobs import Job
-from ..results.compute import found_or_made
+from ..results.compute import load_or_compute
 from ..results.distributions import Row, alike, rows
 from ..results.library import Cell, Library, readable
 from ..results.replays import Replay, flat
@@ -61,12 +61,12 @@ def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
     def work(job: Job) -> Loads:
         params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
         stage = "failure load of every contact"
-        found = found_or_made(library, job, stage, kinds.LIMIT_LOADS, params)
-        scale = found["force_scale"].item()
+        dataset = load_or_compute(library, job, stage, kinds.LIMIT_LOADS, params)
+        scale = dataset["force_scale"].item()
         return Loads(
-            load=found["limit_load"].values / scale,
-            gap=found["max_gap"].item(),
-            seconds=found["seconds"].item(),
+            load=dataset["limit_load"].values / scale,
+            gap=dataset["max_gap"].item(),
+            seconds=dataset["seconds"].item(),
         )
 
     return work
@@ -82,12 +82,12 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
             contacts=[int(replay.backbone[contact])],
         )
         stage = "contact dynamics under a growing load"
-        found = found_or_made(library, job, stage, kinds.PERTURBATION, params)
-        low = found["critical_low"].values[0].item()
+        dataset = load_or_compute(library, job, stage, kinds.PERTURBATION, params)
+        low = dataset["critical_low"].values[0].item()
         job.begin("networks under smaller loads")
         under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)
         packing = library.packing(cell.selection.packing)
-        return _pushed(found, packing, under)
+        return _pushed(dataset, packing, under)
 
     return work
 
@@ -98,17 +98,17 @@ def path(under: Any, scale: float) -> dict[str, Any]:
     return {"values": under.loads / scale, **networks, "residual": under.residual}
 
 
-def _pushed(found: xr.Dataset, packing: Packing, under: Any) -> Pushed:
-    scale = found["force_scale"].item()
+def _pushed(dataset: xr.Dataset, packing: Packing, under: Any) -> Pushed:
+    scale = dataset["force_scale"].item()
 
     def force(name: str) -> float:
-        return found[name].values[0].item() / scale
+        return dataset[name].values[0].item() / scale
 
     def count(name: str) -> int:
-        return int(found[name].values[0])
+        return int(dataset[name].values[0])
 
-    u = found["displacement"].values[0]
-    distance, size = moved_grains(packing, found)
+    u = dataset["displacement"].values[0]
+    distance, size = moved_grains(packing, dataset)
     return Pushed(
         limit=force("limit_load"),
         low=force("critical_low"),
@@ -120,11 +120,11 @@ def _pushed(found: xr.Dataset, packing: Packing, under: Any) -> Pushed:
         displacement=np.nan_to_num(u),
         distance=distance,
         size=size,
-        radius=found["shell_radius"].values,
-        profile=found["profile"].values[0],
-        exponent=found["decay_exponent"].item(),
-        fit=tuple(json.loads(found.attrs["fit_range"])),
-        spread=_range(found["fit_exponent"].values),
+        radius=dataset["shell_radius"].values,
+        profile=dataset["profile"].values[0],
+        exponent=dataset["decay_exponent"].item(),
+        fit=tuple(json.loads(dataset.attrs["fit_range"])),
+        spread=_range(dataset["fit_exponent"].values),
     )
 
 
@@ -141,7 +141,7 @@ def over_store(library: Library, cells: Iterable[Cell], cell: Cell) -> list[Row]
     measured = {}
     for other in [*cells, *alike(cells, cell)]:
         measured[_key(other.selection.packing, other.selection.mu)] = other
-    found = []
+    collected = []
     for store in library.stores:
         for entry in entries(store, kinds.PERTURBATION):
             states = measured.get(_key(entry.params["packing"], entry.params["mu"]))
@@ -153,8 +153,8 @@ def over_store(library: Library, cells: Iterable[Cell], cell: Cell) -> list[Row]
                 load = dataset["limit_load"].values.mean() / dataset["force_scale"].item()
                 values = {k: dataset[k].item() for k in ("critical_force", "decay_exponent")}
             measure = {k: rows([states])[0][k] for k in ("mu", "eta2")}
-            found.append(measure | values | {"limit_load": load, "entry": entry.name})
-    return list({row["entry"]: row for row in found}.values())
+            collected.append(measure | values | {"limit_load": load, "entry": entry.name})
+    return list({row["entry"]: row for row in collected}.values())
 
 
 def _key(packing: Parameters, mu: float) -> tuple[Any, ...]:

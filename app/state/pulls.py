@@ -44,14 +44,14 @@ def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
     """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
     key = cell.name, str(given)
     with _lock:
-        found = _pullers.pop(key, None)
-    if found is None:
-        found = Puller(library.packing(cell.params["packing"]), cell.mu, given or None)
+        puller = _pullers.pop(key, None)
+    if puller is None:
+        puller = Puller(library.packing(cell.params["packing"]), cell.mu, given or None)
     with _lock:
-        _pullers[key] = found
+        _pullers[key] = puller
         while len(_pullers) > PULLERS_KEPT:
             _pullers.popitem(last=False)
-    return found
+    return puller
 
 
 class Hand(param.Parameterized):
@@ -153,18 +153,18 @@ class Hand(param.Parameterized):
             return
         statements = tuple(state.knowledge.known)
         base = cell.name, frame, statements
-        made = self._made if self._base == base else []
+        networks = self._made if self._base == base else []
         first = Held(_forces(replay, frame), float(replay.residual[frame]))
         library = state.library
 
         def work(job: Job) -> tuple[Any, ...]:
-            ours = puller_of(library, cell, known.rows(replay, statements))
-            pulled = partial(_pulled, library, cell, replay, ours)
-            held, refusal = _networks(pulled, _held(statements), made, pulls, first)
+            puller = puller_of(library, cell, known.rows(replay, statements))
+            pulled = partial(_pulled, library, cell, replay, puller)
+            held, refusal = _networks(pulled, _held(statements), networks, pulls, first)
             ready: Iterator[Message] = iter(())
             if grabbed is not None and not refusal:
                 last = held[-1][1] if held else first
-                ready = _to_pull(ours, replay, last, grabbed)
+                ready = _to_pull(puller, replay, last, grabbed)
             return base, held, next(ready, None), ready, refusal
 
         if pulls or grabbed is not None:
@@ -174,23 +174,23 @@ class Hand(param.Parameterized):
             self._made, self._base, self.held = [], base, None
             self.tell({"held": None})
 
-    def _done(self, found: tuple[Any, ...]) -> None:
-        base, made, ready, more, refusal = found
-        self._made, self._base = made, base
-        self.held = made[-1][1] if made else None
+    def _done(self, result: tuple[Any, ...]) -> None:
+        base, networks, ready, more, refusal = result
+        self._made, self._base = networks, base
+        self.held = networks[-1][1] if networks else None
         if refusal:
-            self.pulls = [pull for pull, _ in made]
+            self.pulls = [pull for pull, _ in networks]
             self.work.message = refusal  # set last, because observers of the pulls would clear it
             return
         if ready is not None:
             self.tell(ready)
             if "rail" in ready and not ready["rail"]["whole"]:
                 self._task.start(lambda job: next(more), self.tell)
-        elif made:
-            self._show(made)
+        elif networks:
+            self._show(networks)
 
-    def _show(self, made: list[tuple[Pull, Held]]) -> None:
-        pull, held = made[-1]
+    def _show(self, networks: list[tuple[Pull, Held]]) -> None:
+        pull, held = networks[-1]
         network = flat(held.forces) | {"residual": held.residual}
         self.tell({"held": network | {"pull": list(pull)}})
 
@@ -212,7 +212,7 @@ def _held(statements: Iterable[known.Statement]) -> dict[int, float]:
 def _networks(
     pulled: Callable[[Held, Pull], Held],
     held: Mapping[int, float],
-    made: Sequence[tuple[Pull, Held]],
+    networks: Sequence[tuple[Pull, Held]],
     pulls: Sequence[Pull],
     first: Held,
 ) -> tuple[list[tuple[Pull, Held]], str]:
@@ -220,19 +220,19 @@ def _networks(
 
     pulled(network, pull): the network after a pull; held: {contact: f_n} fixed in all of them.
     """
-    kept = 0
-    while kept < min(len(made), len(pulls)) and made[kept][0] == pulls[kept]:
-        kept += 1
-    made = list(made[:kept])
-    for pull in pulls[kept:]:
-        last = made[-1][1] if made else first
+    reused = 0
+    while reused < min(len(networks), len(pulls)) and networks[reused][0] == pulls[reused]:
+        reused += 1
+    networks = list(networks[:reused])
+    for pull in pulls[reused:]:
+        last = networks[-1][1] if networks else first
         try:
             # A pull on a contact that was held later.
             to = (pull[0], held[pull[0]]) if pull[0] in held else pull
-            made.append((pull, pulled(last, to)))
+            networks.append((pull, pulled(last, to)))
         except InputError as error:
-            return made, str(error)
-    return made, ""
+            return networks, str(error)
+    return networks, ""
 
 
 def _pulled(
@@ -243,10 +243,10 @@ def _pulled(
     if isinstance(pull[0], str):
         plane = planes.named(library, cell, replay, pull[0])
         point = np.array(pull[1:]) + plane.origin
-        found = puller.mixed(puller.fan(plane.axes), plane.axes, point, last.forces * scale)
+        pulled = puller.mixed(puller.fan(plane.axes), plane.axes, point, last.forces * scale)
     else:
-        found = puller.at(int(replay.backbone[pull[0]]), pull[1] * scale, last.forces * scale)
-    return Held(found[0] / scale, found[1])
+        pulled = puller.at(int(replay.backbone[pull[0]]), pull[1] * scale, last.forces * scale)
+    return Held(pulled[0] / scale, pulled[1])
 
 
 def _to_pull(

@@ -46,5 +46,5 @@ def request_of(query: str) -> Request:
 
 def titles() -> list[list[str]]:
     """[name, title] of every scene, for the list on the page."""
-    found = [[name, scenes.EVERY[name].title] for name in (*SMALL, *LARGE)]
-    return [*found, [OWN, "Build your own"]]
+    names_and_titles = [[name, scenes.EVERY[name].title] for name in (*SMALL, *LARGE)]
+    return [*names_and_titles, [OWN, "Build your own"]]

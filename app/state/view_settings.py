@@ -58,7 +58,7 @@ PLANES = {
 SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
 
 
-class Seen(param.Parameterized):
+class Appearance(param.Parameterized):
     """The part of a page's view that its player also knows; see Looks."""
 
     tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
@@ -84,7 +84,7 @@ class Seen(param.Parameterized):
     scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
 
 
-class Looks(Seen):
+class Looks(Appearance):
     """The view of a page; rows and contacts are those of its Replay."""
 
     pair = param.Tuple(
@@ -112,8 +112,8 @@ class Looks(Seen):
         parameter = "active" if "active" in panel.param else "open"
 
         def wanted() -> list[int] | bool:
-            there = [k for k, name in enumerate(names) if name in self.opened]
-            return there if parameter == "active" else bool(there)
+            active = [k for k, name in enumerate(names) if name in self.opened]
+            return active if parameter == "active" else bool(active)
 
         def follow(*events: Any) -> None:
             if getattr(panel, parameter) != wanted():
@@ -122,8 +122,8 @@ class Looks(Seen):
         def tell(event: Any) -> None:
             if event.new != wanted():
                 others = [other for other in self.opened if other not in names]
-                there = [0] * event.new if isinstance(event.new, bool) else event.new
-                self.opened = [*others, *(names[k] for k in there)]
+                active = [0] * event.new if isinstance(event.new, bool) else event.new
+                self.opened = [*others, *(names[k] for k in active)]
 
         self.param.watch(follow, "opened")
         panel.param.watch(tell, parameter)

@@ -16,7 +16,7 @@ from .page_tasks import Work
 
 POLL_MS = 200  # interval at which the page polls running work
 # Time without a browser after which a page's work is ended; the page itself stays longer.
-GONE_MS = 3000
+DISCONNECTED_MS = 3000
 
 
 def library() -> Library:
@@ -71,7 +71,7 @@ def poll_while_running(work: Work, document: Document) -> None:
     loaded: list[bool] = []
 
     def poll() -> None:
-        if loaded and unseen_ms(document.session_context) > GONE_MS:
+        if loaded and unseen_ms(document.session_context) > DISCONNECTED_MS:
             work.cancel()
         if not in_transit(document):
             work.poll()

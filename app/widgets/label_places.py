@@ -28,7 +28,7 @@ def labels(
     room = 0.05 * np.array(SMALLEST)  # by which the axes extend beyond the data
     low, high = places.min(axis=0) - room, places.max(axis=0) + room
     taken = [(place - POINT, place + POINT) for place in places]
-    found: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     for k, place in enumerate(places):
         size = LETTER[0] * len(words[k]), LETTER[1]
         for right, up in product((1, -1), repeat=2):
@@ -40,7 +40,7 @@ def labels(
             taken.append((begin, end))
             row = x[k], y[k], words[k], right * AWAY[0], -up * AWAY[1]
             side = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
-            for column, value in zip(found.values(), (*row, *side), strict=True):
+            for column, value in zip(columns.values(), (*row, *side), strict=True):
                 column.append(value)
             break
-    return found
+    return columns

@@ -159,8 +159,8 @@ def by_words(labels: dict[str, str]) -> dict[str, str]:
 def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
     """A labelled list of the values {value: words} of the parameter with this name."""
     look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
-    made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
-    return linked(made, looks, name)
+    select = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
+    return linked(select, looks, name)
 
 
 def linked(widget: Any, looks: Looks, name: str) -> Any:

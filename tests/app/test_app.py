@@ -213,7 +213,7 @@ def test_frames_beyond_the_budget_are_left_out_and_counted(library):
 
 
 def test_the_last_cells_are_kept_in_memory_and_no_more(shipped, tmp_path):
-    library = Library(shipped, tmp_path / "cache.zarr", kept=2)
+    library = Library(shipped, tmp_path / "cache.zarr", cells_in_memory=2)
     cells = library.cells()
     for cell in cells:
         library.shown(cell)
@@ -573,7 +573,7 @@ def test_cancel_goes_back_to_what_a_visitor_saw_before_a_link_to_other_states(st
     assert state.work.computation.running and state.missing and state.replay is shown
     state.work.computation.dismiss()
     wait_for(state)
-    assert not state.missing and state.seen is state.replay is shown
+    assert not state.missing and state.shown is state.replay is shown
     assert "mu=1&" in state.link() and state.source.startswith("μ = 1,")
 
 
@@ -590,7 +590,7 @@ def test_a_friction_stands_beside_another_one_only(state):
     assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
     state.choose(mu=first)  # as Back does
     wait_for(state)
-    assert state.looks.beside is None and state.besides.twin is None
+    assert state.looks.beside is None and state.comparison.twin is None
 
 
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state):
@@ -874,7 +874,7 @@ def test_a_link_starts_nothing_dear_beside_another(library, shared, visited):
     state.cell = state.cell._replace(selection=state.cell.selection._replace(states=19_999))
     state.looks.split = True
     state.looks.beside = 0.2
-    assert not state.besides.task.running and state.looks.beside is None
+    assert not state.comparison.task.running and state.looks.beside is None
     assert "takes long to compute" in state.work.message
 
 

@@ -120,10 +120,10 @@ class Tabs:
             if name in PLOTTED and not (name == "plane" and self.looks.wide):  # there once
                 pieces.append(figure.panel(self.state))
             # Choices first, then two at a time: Bokeh processes everything at each step.
-            there = []
+            queued = []
             for k in range(-1, len(pieces), 2):
-                there += pieces[max(k, 0) : k + 2]
-                self.pages[name][:] = there
+                queued += pieces[max(k, 0) : k + 2]
+                self.pages[name][:] = queued
                 yield
             self.looks.views += 1
 

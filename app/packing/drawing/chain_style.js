@@ -28,7 +28,7 @@ export class Look {
     this.mostLoad = Math.max(...(this.loads ?? [1]))
     const measured = plain(model.measured ?? {})
     this.measured = measured.normal?.length === walk.contacts ? measured : null
-    this.gone = model.gone?.length === walk.contacts ? model.gone : null // reduction of ΔFₙ by known forces
+    this.reduction = model.reduction?.length === walk.contacts ? model.reduction : null // reduction of ΔFₙ by known forces
   }
 
   /** The style of these forces, for the scene. */
@@ -36,47 +36,47 @@ export class Look {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
     // Reading the model is slow.
-    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
-    this.asked.load = full ?? this.mostLoad
+    this.settings = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
+    this.settings.load = full ?? this.mostLoad
     const unit = this.walk.unit * this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
     for (let c = 0; c < style.lean?.length; c++) style.lean[c] = mixed.normal[c] > CARRYING ? mixed.tangential[c] / mixed.normal[c] : 0
-    const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+    const coloured = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.reduction) &&
       (colour !== "deviation" || this.measured)
-    style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
+    style.colours = coloured ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
-      style.bin[c] = told ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
+      style.bin[c] = coloured ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
     }
     return style
   }
 
   /** fₙ of the pinned state. */
-  pinned(c) { return this.walk.normal[this.asked.pinned + c] }
+  pinned(c) { return this.walk.normal[this.settings.pinned + c] }
 
   /** The quantity shown by the width, in ⟨fₙ⟩. */
   thickness(c, { normal }) {
-    const { thickness } = this.asked
+    const { thickness } = this.settings
     if (thickness === "extent") return this.extent[c]
     if (thickness === "load" && this.loads) return this.loads[c]
-    if (thickness === "known" && this.gone) return this.gone[c]
+    if (thickness === "known" && this.reduction) return this.reduction[c]
     if (thickness === "measured" && this.measured) return this.measured.normal[c] || 0
     return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
   }
 
   /** Position on the colour scale, 0 … 1. */
   shade(c, { normal, tangential }) {
-    const { colour, most } = this.asked
+    const { colour, most } = this.settings
     if (colour === "mobilised") return 0.5 + (this.mobilised(c, normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
-    if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
-    if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
-    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)
-    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.asked.full)
+    if (colour === "known") return this.reduction[c] / Math.max(this.reduction[c] + this.extent[c], CARRYING)
+    if (colour === "load") return this.loads ? this.loads[c] / this.settings.load : 0.5
+    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.settings.full)
+    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.settings.full)
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
   }
 
@@ -91,7 +91,7 @@ export class Look {
   contact(k, { mixed, seen, low, high }) {
     const { walk, exact } = this, c = walk.contact[k]
     const n = mixed.normal[c], t = mixed.tangential[c]
-    const told = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
+    const coloured = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
       ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
@@ -99,8 +99,8 @@ export class Look {
       ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
-    if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
-    if (exact) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
+    if (seen) rows.push(["fₙ seen", interval(low[c], high[c])])
+    if (exact) rows.push(["fₙ possible", interval(exact.low[c], exact.high[c])])
     return rows
   }
 

@@ -88,9 +88,9 @@ export class Scene {
   /** After pan, zoom, resize or a change of theme: redraw everything, once per painted frame. */
   changed() {
     this.stale = true
-    if (this.asked) return
-    this.asked = requestAnimationFrame(() => {
-      this.asked = 0
+    if (this.pendingFrame) return
+    this.pendingFrame = requestAnimationFrame(() => {
+      this.pendingFrame = 0
       if (this.geometry && this.size) this.repaint()
     })
   }

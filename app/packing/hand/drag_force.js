@@ -215,9 +215,9 @@ export class Grab {
     const { replay, player } = this
     replay.held = held
     player.tellHeld(true)
-    if (this.asked) return
-    this.asked = requestAnimationFrame(() => {
-      this.asked = 0
+    if (this.pendingFrame) return
+    this.pendingFrame = requestAnimationFrame(() => {
+      this.pendingFrame = 0
       this.frames++
       if (this.replay === replay && replay.held) player.repaintHeld()
     })

@@ -39,7 +39,7 @@ class Stream:
         self._awake = message.get("seen", self._awake)
 
     def _show(self, *events: Any) -> None:
-        self.player.asked = self.state.asked
+        self.player.requested = self.state.requested
 
     def _follow(self, *events: Any) -> None:
         self._show()

@@ -34,24 +34,24 @@ def test_computations_are_listed_named_opened_and_deleted(computed):
     wait_for(state)
     assert state.selection.states == 3
     for row in (older, newest):
-        assert state.library.own.find("packing", n=DISKS, seed=2)  # as long as states need it
+        assert state.library.cache.find("packing", n=DISKS, seed=2)  # as long as states need it
         view.hear({"delete": row["entry"]})
         wait_for(state)
-    assert not view.rows and not list(state.library.own)  # nothing of it is left
-    assert entry_labels.names(state.library.own) == {}
+    assert not view.rows and not list(state.library.cache)  # nothing of it is left
+    assert entry_labels.names(state.library.cache) == {}
     assert state.replay is not None and state.work.message == ""  # what is on screen stays there
 
 
 def test_what_is_not_in_the_list_is_left_alone(computed):
     state, view = computed, Mine(computed)
     wait_for(state)
-    before = sorted(state.library.own)
+    before = sorted(state.library.cache)
     packing = next(name for name in before if name.startswith("packing"))
     for entry in (packing, "../elsewhere", state.library.shipped.name("walk", {}, version=1)):
         view.hear({"delete": entry})
         view.hear({"call": [entry, "mine"]})
         wait_for(state)
-    assert sorted(state.library.own) == before and entry_labels.names(state.library.own) == {}
+    assert sorted(state.library.cache) == before and entry_labels.names(state.library.cache) == {}
     with pytest.raises(InputError, match="no longer"):
         my_results.delete(state.library, packing)
 
@@ -64,6 +64,6 @@ def test_an_upload_is_called_by_its_files(state):
     task.start(brought, found.append)
     wait_for(state)
     state.ask(select(DISKS, 1, 1, states=3)._replace(packing=found[0].params, mu=1.0), at_once=True)
-    assert "heap.npz" in state.asked
+    assert "heap.npz" in state.requested
     wait_for(state)
     assert state.cell.series.startswith("heap.npz ") and "heap.npz" in state.source

@@ -324,7 +324,7 @@ def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):
     found, _ = read_link("?scene=arch")
     assert found.mu == 0.6 and read_link(link(found, {}))[0] == found
     assert request_of("?scene=arch&mu=0.5").query == "?scene=arch&mu=0.5"
-    made, _ = kinds.get_packing(Library(tmp_path, tmp_path / "cache").own, found.packing)
+    made, _ = kinds.get_packing(Library(tmp_path, tmp_path / "cache").cache, found.packing)
     assert np.array_equal(made.x, scene("arch").x)
 
 
@@ -846,7 +846,7 @@ def test_walk_and_uniform_states_are_shown_together(state):
     view.planes.value = "contact"
     wait_for(state)
     assert len(view.drawing.beside.data["x"]) == count
-    other = planes.beside(state.catalogue, state.cell)
+    other = planes.other_states(state.catalogue, state.cell)
     state.show(other)
     wait_for(state)
     assert state.cell.kind == "uniform" and view.others.kind == "walk"

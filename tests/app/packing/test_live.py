@@ -60,8 +60,11 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     browser, old = Browser(state), state.replay
     tab = View(state)
     state.ask(asked(0.23), at_once=True)
-    assert state.asked.startswith("requested: μ = 0.23") and browser.player.asked == state.asked
-    assert browser.player.live and state.seen is old
+    assert (
+        state.requested.startswith("requested: μ = 0.23")
+        and browser.player.requested == state.requested
+    )
+    assert browser.player.live and state.shown is old
     browser.run(lambda: state.growing)
     pictures = browser.parts("picture")
     fractions = [picture["fraction"] for picture in pictures]
@@ -76,7 +79,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     assert begun["room"] == 21 and len(begun["number"]) == 1 and begun["mu"] == 0.23
     assert len(tab.growth.growth.data["state"]) == 21
     browser.run()
-    assert not state.growing and state.work.live is None and not state.asked
+    assert not state.growing and state.work.live is None and not state.requested
     assert not browser.player.live and browser.player.walk["room"] == 0
     states = browser.parts("states")
     normal = np.concatenate([part["normal"] for part in states]).reshape(-1, begun["contacts"])
@@ -132,7 +135,7 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state):
     browser.run(lambda: state.growing)
     kept = state.plane
     assert kept.components and len(tab.drawing.path.data["x"]) == len(
-        progress_feed.numbers(state.seen.summary)
+        progress_feed.numbers(state.shown.summary)
     )
     browser.run(lambda: state.work.fourfold > 1)
     assert state.plane is kept
@@ -235,8 +238,8 @@ def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state):
     state.work.cancel()
     browser.run()
     browser.stream.tick()
-    assert state.seen is old and state.work.live is None and state.missing
-    assert state.asked.startswith("of μ = 0.1; not computed: μ = 0.27")
+    assert state.shown is old and state.work.live is None and state.missing
+    assert state.requested.startswith("of μ = 0.1; not computed: μ = 0.27")
     assert "precomputed" in state.source
     assert browser.player.walk["room"] == 0 and browser.player.walk["mu"] == 0.1
 

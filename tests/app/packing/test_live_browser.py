@@ -126,7 +126,7 @@ def test_computed_states_are_shown_to_the_last(visit):
         f"() => {MODEL}('growth').get_column('eta1').every((v, k) => !k || Number.isFinite(v))"
     )
     assert page.locator(".stage.pale").count() == 0
-    assert not page.locator(".asked").inner_text()
+    assert not page.locator(".requested").inner_text()
 
 
 def test_discarded_the_old_packing_is_back_with_its_friction(visit):

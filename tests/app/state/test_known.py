@@ -37,18 +37,18 @@ def test_a_held_force_narrows_the_others(state):
 
 def test_colour_and_width_show_what_measuring_took_away(state):
     player = PackingView(state).player
-    assert player.gone is None
+    assert player.reduction is None
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     state.knowledge.hold(9, float(state.replay.normal[0, 9]), 0.02)
     wait_for(state)
     before, after = state.knowledge.narrowed.extents
-    assert player.gone == pytest.approx(np.maximum(before - after, 0), abs=1e-5)
-    assert player.gone[4] == pytest.approx(before[4], abs=1e-4)  # held: all of it
-    assert player.gone[9] > before[9] - 0.04 - 1e-4  # at most the error bar is left
+    assert player.reduction == pytest.approx(np.maximum(before - after, 0), abs=1e-5)
+    assert player.reduction[4] == pytest.approx(before[4], abs=1e-4)  # held: all of it
+    assert player.reduction[9] > before[9] - 0.04 - 1e-4  # at most the error bar is left
     state.knowledge.release(4)
     state.knowledge.release(9)
     wait_for(state)
-    assert player.gone is None
+    assert player.reduction is None
 
 
 def test_what_carries_for_certain_is_counted_by_certified_bounds(state):

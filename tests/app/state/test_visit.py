@@ -6,7 +6,7 @@ import pytest
 from bokeh.document import Document
 
 from app.state.page_tasks import Work
-from app.state.visit import GONE_MS, poll_while_running
+from app.state.visit import DISCONNECTED_MS, poll_while_running
 
 PATIENCE = 60  # s, on a busy machine
 
@@ -31,12 +31,12 @@ def opened():
 
 def test_a_closed_page_computes_no_more(opened):
     session, poll, job = opened
-    session.connection_count, session.milliseconds_since_last_unsubscribe = 0, GONE_MS + 1.0
+    session.connection_count, session.milliseconds_since_last_unsubscribe = 0, DISCONNECTED_MS + 1.0
     poll()
     assert job.cancelled() and job.wait(PATIENCE)
 
 
-@pytest.mark.parametrize("connections, ms", [(1, 1e9), (0, GONE_MS - 1.0)])
+@pytest.mark.parametrize("connections, ms", [(1, 1e9), (0, DISCONNECTED_MS - 1.0)])
 def test_a_page_that_is_looked_at_or_reloaded_goes_on(opened, connections, ms):
     session, poll, job = opened
     session.connection_count, session.milliseconds_since_last_unsubscribe = connections, ms

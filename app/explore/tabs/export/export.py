@@ -11,7 +11,7 @@ import xarray as xr
 
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, origin, stem
-from ....packing.view import gone, measured, pins
+from ....packing.view import measured, pins
 from ....results import planes
 from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
@@ -43,7 +43,7 @@ class Snapshot:
         self._numbered = self.view if numbers is None else numbers.of(self.view)
         self._shown: dict[str, Any] = {
             "loads": state.loads,
-            "gone": gone(knowledge, self.replay),
+            "reduction": reduction(knowledge, self.replay),
             "measured": measured(state, self.replay),
             "pins": pins(knowledge),
         }
@@ -83,9 +83,9 @@ class Snapshot:
         """The view as a page that needs no server."""
         outlined, shown = None, self._shown
         if self.replay.summary["dimension"] > 0:
-            kept = standalone.thinned(self.replay)
-            principal = planes.principal(kept)
-            outlined = planes.outline(self.library, self.cell, kept, principal)(job)
+            thinned_replay = standalone.thinned(self.replay)
+            principal = planes.principal(thinned_replay)
+            outlined = planes.outline(self.library, self.cell, thinned_replay, principal)(job)
             if self.replay.outlines:
                 shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
         job.begin("making the page")

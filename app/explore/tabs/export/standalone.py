@@ -71,28 +71,28 @@ def html(
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: with known forces; shown: loads, gone, measured, pins and thrust, as for the player.
+    exact: with known forces; shown: loads, reduction, measured, pins and thrust, as for the player.
     """
     intervals = exact_intervals(exact, replay)
-    kept = thinned(replay)
-    plane = planes.principal(kept)
-    figures = still.figures(library, kept, exact, plane, outlined, view)
+    thinned_replay = thinned(replay)
+    plane = planes.principal(thinned_replay)
+    figures = still.figures(library, thinned_replay, exact, plane, outlined, view)
     # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
     bare = Document()
     for figure in figures:
         bare.add_root(figure)
     script, plots = components(figures)
-    frame = min(view["frame"], len(kept.normal) - 1)
+    frame = min(view["frame"], len(thinned_replay.normal) - 1)
     between = view["between"]
-    if len(kept.normal) < len(replay.normal):
+    if len(thinned_replay.normal) < len(replay.normal):
         frame, between = 0, None
     same = ("contact", "colour", "thickness", "full", "stretch", "scale", "paused")
-    own = set(Player.param) - set(Scripted.param)
-    given = {name: Player.param[name].default for name in own}
+    names = set(Player.param) - set(Scripted.param)
+    given = {name: Player.param[name].default for name in names}
     given |= {name: view[name] for name in same}
     given |= shown
     given |= {
-        "walk": frames(kept),
+        "walk": frames(thinned_replay),
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
@@ -104,7 +104,7 @@ def html(
         "tab": "intervals",
         "wide": True,  # force space is beside the intervals
     }
-    left = len(replay.normal) - len(kept.normal)
+    left = len(replay.normal) - len(thinned_replay.normal)
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),

@@ -30,7 +30,7 @@ def at_rest(
     here = view | {"dark": False, "between": None, "tab": tab}
     with discard_events(state):
         replay = replay._replace(inviting=-1)  # nothing can be dragged
-        state.param.update(replay=replay, seen=replay, exact=exact, loads=loads)
+        state.param.update(replay=replay, shown=replay, exact=exact, loads=loads)
     with discard_events(state.looks):
         state.looks.param.update({name: here[name] for name in Looks.param if name in here})
     return state

@@ -33,7 +33,7 @@ class View(TabView):
     name = "plane"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "seen", looks=["contact", "pair"], work=["fourfold"])
+        super().__init__(state, "shown", looks=["contact", "pair"], work=["fourfold"])
         self.drawing = SpaceFigure(self.name, self._choose)
         self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
         self.task, self.placing = state.work.task(), state.work.task(reading)
@@ -44,7 +44,7 @@ class View(TabView):
         self.looks.param.watch(self._title, "dark")
         self.looks.param.watch(self._fit, "wide")
         self.shown: tuple[Any, ...] | None = None
-        self.found: Outlined | None = None
+        self.outlined: Outlined | None = None
         self._fit()
         self.catch_up()
 
@@ -68,20 +68,20 @@ class View(TabView):
 
     def update(self) -> None:
         """Place the states on screen in the plane, and look up or compute the outline."""
-        state, replay = self.state, self.state.seen
+        state, replay = self.state, self.state.shown
         if replay is None:
             return
-        wanted = replay, self.kind, *self._depends()
-        same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
+        request = replay, self.kind, *self._depends()
+        same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == request[1:]
         if same and state.plane is not None:
             return
         if self.shown is None or self.shown[0] is not replay:
             self.others.look()
-        self.shown = wanted
+        self.shown = request
         self.task.cancel()
         self.placing.cancel()
-        if wanted[1] in WHOLE:
-            self._place(replay, wanted[1])
+        if request[1] in WHOLE:
+            self._place(replay, request[1])
             return
         try:
             self._placed(replay, self._components(replay))
@@ -124,13 +124,13 @@ class View(TabView):
 
     def _clear(self) -> None:
         """Remove everything that belongs to another plane."""
-        self.state.plane = self.found = None
+        self.state.plane = self.outlined = None
         self.finding.object = self.lead.object = ""
         self.drawing.clear()
 
     def _placed(self, replay: Replay, plane: Plane) -> None:
         state = self.state
-        if state.seen is not replay:
+        if state.shown is not replay:
             return
         self._show(replay, plane)
         if state.growing:
@@ -172,13 +172,13 @@ class View(TabView):
         self._title()
         self.drawing.draw_cone(plane, replay.summary["mu"], 1.05 * float(plane.path[:, 0].max()))
         self.details.object = self.finding.object = ""
-        self.found = None
+        self.outlined = None
         self._show_others()
         self.lead.object = sentences.lead(replay, plane, outlined=False)
 
     def _title(self, *events: Any) -> None:
-        if self.state.plane is not None and self.state.seen is not None:
-            self.drawing.title(self.state.seen, self.state.plane, self.looks.dark)
+        if self.state.plane is not None and self.state.shown is not None:
+            self.drawing.title(self.state.shown, self.state.plane, self.looks.dark)
 
     def _path(self, replay: Replay, plane: Plane) -> Columns:
         """Columns of the path; during a walk the player adds states as they arrive."""
@@ -189,16 +189,16 @@ class View(TabView):
             path[0] = plane.path[0]
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
-    def _outlined(self, replay: Replay, found: Outlined) -> None:
+    def _outlined(self, replay: Replay, outlined: Outlined) -> None:
         if self.shown is not None and self.shown[0] is not replay:  # another one arrived meanwhile
             return
-        self._show(replay, found.plane)
-        self.found = found
-        self.drawing.outline(found)
-        reach = 1.05 * float(found.outer[:, 0].max())
-        self.drawing.draw_cone(found.plane, replay.summary["mu"], reach)
-        self.lead.object = sentences.lead(replay, found.plane, outlined=True)
-        self._tell(found)
+        self._show(replay, outlined.plane)
+        self.outlined = outlined
+        self.drawing.outline(outlined)
+        reach = 1.05 * float(outlined.outer[:, 0].max())
+        self.drawing.draw_cone(outlined.plane, replay.summary["mu"], reach)
+        self.lead.object = sentences.lead(replay, outlined.plane, outlined=True)
+        self._tell(outlined)
 
     def _show_others(self) -> None:
         """Show the other states in the plane on screen."""
@@ -208,20 +208,20 @@ class View(TabView):
         else:
             x, y = planes.points(plane, replay, other).T
             self.drawing.beside.data = {"x": x.astype(np.float32), "y": y.astype(np.float32)}
-        if self.found is not None and self.found.plane is plane:
-            self._tell(self.found)
+        if self.outlined is not None and self.outlined.plane is plane:
+            self._tell(self.outlined)
 
-    def _tell(self, found: Outlined) -> None:
+    def _tell(self, outlined: Outlined) -> None:
         """Report how much of the outline the states reach."""
-        if found.plane.kind == planes.STRESS:
-            self.details.object = sentences.stresses(found)
+        if outlined.plane.kind == planes.STRESS:
+            self.details.object = sentences.stresses(outlined)
             return
         replay, others, called = self.state.replay, np.empty((0, 2)), ""
         if self.others.replay is not None:
             others = np.column_stack([self.drawing.beside.data[name] for name in "xy"])
             called = MARKED[self.others.kind]
-        self.finding.object = sentences.finding(found, replay, others, called)
-        self.details.object = folded(sentences.computed(found, replay))
+        self.finding.object = sentences.finding(outlined, replay, others, called)
+        self.details.object = folded(sentences.computed(outlined, replay))
 
 
 def _loosest(replay: Replay) -> int:

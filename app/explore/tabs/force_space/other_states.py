@@ -41,10 +41,10 @@ class OtherStates:
             return self.fetch()
         self.task.cancel()
         self.switch.label = ALSO[cell.kind]
-        found = planes.beside(self.state.catalogue, cell) is not None
-        if self.switch.value != found:
-            self.switch.value = found
-        elif found:
+        available = planes.other_states(self.state.catalogue, cell) is not None
+        if self.switch.value != available:
+            self.switch.value = available
+        elif available:
             self.fetch()
 
     def fetch(self, *events: Any) -> None:
@@ -55,20 +55,20 @@ class OtherStates:
         if not self.switch.value or cell is None or state.growing:
             self._changed()
             return
-        found = planes.beside(state.catalogue, cell)
-        own = cell.selection
-        wanted = own._replace(kind=self.kind, states=min(own.states, ENOUGH))
+        other = planes.other_states(state.catalogue, cell)
+        selection = cell.selection
+        requested = selection._replace(kind=self.kind, states=min(selection.states, ENOUGH))
         work = (
-            compute.states(state.library, wanted)
-            if found is None
-            else lambda job: state.library.shown(found)
+            compute.states(state.library, requested)
+            if other is None
+            else lambda job: state.library.shown(other)
         )
 
         def done(shown: Shown) -> None:
             if state.replay is replay:
                 self.replay = shown.replay
                 self._changed()
-                if found is None:
+                if other is None:
                     state.refresh()  # now it is listed
 
         self.task.start(work, done)

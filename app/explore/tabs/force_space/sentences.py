@@ -22,9 +22,9 @@ HELP = (
     f"all of S lies inside the shaded {term('outline')}."
 )
 COMPUTED = (
-    " The outline is exact to {found.gap:.1g} of the mean force ({found.programs} linear programs, "
-    "one for each direction, in {found.seconds:.1f} s). Halfway means the outline shrunk "
-    "to half its size about its centre."
+    " The outline is exact to {outlined.gap:.1g} of the mean force ({outlined.programs} linear "
+    "programs, one for each direction, in {outlined.seconds:.1f} s). Halfway means the outline "
+    "shrunk to half its size about its centre."
 )
 
 
@@ -43,44 +43,44 @@ def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
     return HEADING + ". ".join(marks) + "." + (shadow if h > 2 else "")
 
 
-def finding(found: Outlined, replay: Replay, others: Floats, called: str) -> str:
+def finding(outlined: Outlined, replay: Replay, others: Floats, called: str) -> str:
     """How many of the states, and of others (k, 2), are near the centre of S, as HTML."""
-    path = found.plane.path[1:]
-    inner = planes.inner_share(path, found.outer)
+    path = outlined.plane.path[1:]
+    inner = planes.inner_share(path, outlined.outer)
     many = "All" if inner == 1 else f"{min(inner, 0.99):.0%}"
     words = f"{_drawn(replay)} <b>{many} of them lie less than halfway from the middle of the "
     words += "blue shape to its edge</b> (dotted)"
     if len(others):
-        share = planes.inner_share(others, found.outer)
+        share = planes.inner_share(others, outlined.outer)
         words += f", and {share:.0%} of the {len(others)} {called}"
     crowded = replay.summary["dimension"] >= MANY and inner > MOSTLY
     return words + (CROWDED if crowded else "") + "."
 
 
-def computed(found: Outlined, replay: Replay) -> str:
+def computed(outlined: Outlined, replay: Replay) -> str:
     """What is drawn, how much of the outline the states reach, and how it was computed."""
-    path = found.plane.path[1:]
-    part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
-    area = planes.area(path) / planes.area(found.outer)
-    named = [replay.backbone[contact] for contact in found.plane.pair]
+    path = outlined.plane.path[1:]
+    part = np.ptp(path, axis=0) / np.ptp(outlined.outer, axis=0)
+    area = planes.area(path) / planes.area(outlined.outer)
+    named = [replay.backbone[contact] for contact in outlined.plane.pair]
     which = " Green: contact {}; violet: contact {}.".format(*named) if named else ""
     share = (
         f" The {len(path)} dots span {part[0]:.0%} of its width, "
         f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
-        f"{_variance(found.plane)}."
+        f"{_variance(outlined.plane)}."
     )
-    return HELP + which + share + COMPUTED.format(found=found)
+    return HELP + which + share + COMPUTED.format(outlined=outlined)
 
 
-def stresses(found: Outlined) -> str:
+def stresses(outlined: Outlined) -> str:
     """The meaning of the outline of all stresses, as HTML."""
-    reach = np.hypot(*found.inner.T).max(initial=0.0)
-    path = np.hypot(*found.plane.path.T)
+    reach = np.hypot(*outlined.inner.T).max(initial=0.0)
+    path = np.hypot(*outlined.plane.path.T)
     return (
         f"Shaded: every {term('stress', 'stress')} that these contacts can carry at this "
-        f"pressure, exactly ({found.programs} linear programs, {found.seconds:.1f} s). The "
+        f"pressure, exactly ({outlined.programs} linear programs, {outlined.seconds:.1f} s). The "
         f"farther from (0, 0), the larger the shear: at most <b>{reach:.3f}</b> of the pressure, "
-        f"certified not to exceed {reach + found.gap:.3f}; the network as packed carries "
+        f"certified not to exceed {reach + outlined.gap:.3f}; the network as packed carries "
         f"{path[0]:.3f}, the {len(path) - 1} networks shown up to {path[1:].max():.3f}. Only the "
         "pressure is prescribed."
     )
@@ -88,9 +88,9 @@ def stresses(found: Outlined) -> str:
 
 def _drawn(replay: Replay) -> str:
     """The number of networks drawn as dots, in a sentence."""
-    kept, states = replay.summary["kept"], replay.summary["states"]
-    some = f"{kept} of the {states} networks, about every {round(states / kept)}th"
-    return f"The dots are {some if kept < states else f'all {kept} networks'}."
+    stored, states = replay.summary["kept"], replay.summary["states"]
+    some = f"{stored} of the {states} networks, about every {round(states / stored)}th"
+    return f"The dots are {some if stored < states else f'all {stored} networks'}."
 
 
 def _variance(plane: Plane) -> str:

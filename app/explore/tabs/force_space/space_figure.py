@@ -96,11 +96,11 @@ class SpaceFigure:
         # Distances are meaningful in principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components
 
-    def outline(self, found: Outlined) -> None:
+    def outline(self, outlined: Outlined) -> None:
         """The outline, and the half-way line to its centroid, which is omitted for stresses."""
-        parts = [(self.inner, found.inner), (self.outer, found.outer)]
-        if found.plane.kind != planes.STRESS:
-            parts.append((self.half, planes.halfway(found.outer)))
+        parts = [(self.inner, outlined.inner), (self.outer, outlined.outer)]
+        if outlined.plane.kind != planes.STRESS:
+            parts.append((self.half, planes.halfway(outlined.outer)))
         for source, corners in parts:
             closed = np.concatenate([corners, corners[:1]])
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}

@@ -39,7 +39,7 @@ class AgainstFriction:
         fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
         self.figure = fig
         self.points: list[GlyphRenderer] = []
-        self.own: list[ColumnDataSource] = []
+        self.page_sources: list[ColumnDataSource] = []
         self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
         for k, line in enumerate(lines):
             self._draw(k, line)
@@ -51,10 +51,10 @@ class AgainstFriction:
     def _draw(self, k: int, line: Line) -> None:
         fig, colour, marker = self.figure, COLOURS[k], MARKERS[k % len(MARKERS)]
         x, y, error = shown(line.points)
-        own = ColumnDataSource({"x": [], "y": []})
-        self.own.append(own)
+        source = ColumnDataSource({"x": [], "y": []})
+        self.page_sources.append(source)
         rings = fig.scatter(
-            "x", "y", source=own, size=9, marker=marker, fill_alpha=0, line_color=colour,
+            "x", "y", source=source, size=9, marker=marker, fill_alpha=0, line_color=colour,
             line_alpha=0.7,
         )  # fmt: skip
         self.points.append(rings)
@@ -64,9 +64,9 @@ class AgainstFriction:
         rows = ("μ", "@x{0.[00000]}")
         self.points.append(draw_means(fig, line.label, columns, k, rows, line_dash=line.dash))
 
-    def mark(self, own: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
+    def mark(self, points_of_page: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
         """Open symbols at `own` points, of each line, and rings at `here`, (μ, value)."""
-        for source, points in zip(self.own, own, strict=True):
+        for source, points in zip(self.page_sources, points_of_page, strict=True):
             x, y, _ = shown(points)
             source.data = {"x": x, "y": y}
         x, y, _ = shown([(mu, value, 0.0) for mu, value in here])
@@ -96,5 +96,5 @@ def draw_means(
 
 def shown(points: Points) -> Floats:
     """Columns x, y, error of the points that a logarithmic axis of μ can show."""
-    kept = [p for p in points if p[0] > 0 and np.isfinite(p[1])]
-    return np.array(kept, dtype=float).reshape(-1, 3).T
+    finite = [p for p in points if p[0] > 0 and np.isfinite(p[1])]
+    return np.array(finite, dtype=float).reshape(-1, 3).T

@@ -32,11 +32,11 @@ TABLE = "<div style='overflow-x:auto'><table class='claims'>{}</table></div>"
 
 def claims(about: str, heading: str, opened: bool = False) -> str:
     """The paper's claims about one of `study_data.ABOUT`, a column per sampler, as HTML."""
-    found = study_data.claims(about)
-    if not found:
+    chosen = study_data.claims(about)
+    if not chosen:
         return ""
     by_statement: dict[str, dict[str, dict[str, Any]]] = {}
-    for claim in found:
+    for claim in chosen:
         by_statement.setdefault(claim["statement"], {})[claim["sampler"]] = claim
     used = [name for name in SAMPLERS if any(name in one for one in by_statement.values())]
     rows = [HEAD.format("".join(f"<th>{SAMPLERS[name]}</th>" for name in used))]
@@ -44,7 +44,7 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
         cells = "".join(f"<td>{_cell(one[name]) if name in one else ''}</td>" for name in used)
         rows.append(f"<tr><td>{typeset(statement)}</td>{cells}</tr>")
     return (
-        f"<details{' open' if opened else ''}><summary>{heading}: {_counted(found)}</summary>"
+        f"<details{' open' if opened else ''}><summary>{heading}: {_counted(chosen)}</summary>"
         f"{TABLE.format(''.join(rows))}</details>"
     )
 
@@ -58,8 +58,8 @@ def legend() -> str:
     )
 
 
-def _counted(found: list[dict[str, Any]]) -> str:
-    counts = Counter(claim["verdict"] for claim in found)
+def _counted(claims: list[dict[str, Any]]) -> str:
+    counts = Counter(claim["verdict"] for claim in claims)
     return ", ".join(f"{counts[word]} {word}" for word in VERDICTS if counts[word])
 
 

@@ -40,7 +40,7 @@ WIDE = {"sizing_mode": "stretch_width"}
 class Rows(NamedTuple):
     """Numbers of the page's packings made with the same options as the one on screen."""
 
-    own: list[Row]
+    page: list[Row]
     exact: list[Row]  # of those whose exact intervals are in a store
     here: Row  # that on screen
 
@@ -91,9 +91,9 @@ class View(TabView):
             self.indeterminacy = Indeterminacy()
             self._place(self.indeterminacy)
         self.first.object = self.indeterminacy.sentence()
-        self.indeterminacy.mark(rows.own, rows.here)
+        self.indeterminacy.mark(rows.page, rows.here)
         yield
-        fig, self.fourth.object = study_figures.extents(rows.own, rows.here["mu"])
+        fig, self.fourth.object = study_figures.extents(rows.page, rows.here["mu"])
         self.figures[1].objects = [plotted(fig)]
         yield
         if self.correlations is None:
@@ -102,7 +102,7 @@ class View(TabView):
             self.figures[2].objects = [plotted(self.correlations.drawn.figure)]
             self.sixth.object = self.correlations.sentence()
             self.details.object = _claims()
-        self.correlations.mark(rows.own, rows.exact, rows.here)
+        self.correlations.mark(rows.page, rows.exact, rows.here)
         yield
         self._show_packing(replay, rows)
 
@@ -121,7 +121,7 @@ class View(TabView):
         fig, sentence = forces(replay)
         self.folded[0].objects = [plotted(self.scatter.figure)]
         self.folded[1].objects = [note(sentence), plotted(fig)]
-        self.folded[2].objects = [plotted(study_figures.samplers(rows.own, rows.exact))]
+        self.folded[2].objects = [plotted(study_figures.samplers(rows.page, rows.exact))]
 
     def _mark(self, *events: Any) -> None:
         if self.scatter is not None and self.visible:

@@ -54,12 +54,14 @@ class Indeterminacy:
         legend_above(self.etas.figure, 3)
         _small(self.z.figure)
 
-    def mark(self, own: list[Row], here: Row) -> None:
+    def mark(self, page_rows: list[Row], here: Row) -> None:
         """Mark the page's packings, with `here` on screen."""
-        points = [statistics.means(own, name, factor=factor) for name, _, factor in MEASURES]
+        points = [statistics.means(page_rows, name, factor=factor) for name, _, factor in MEASURES]
         rings = [(here["mu"], factor * here[name]) for name, _, factor in MEASURES]
         self.etas.mark(points, rings)
-        self.z.mark([statistics.means(own, "coordination")], [(here["mu"], here["coordination"])])
+        self.z.mark(
+            [statistics.means(page_rows, "coordination")], [(here["mu"], here["coordination"])]
+        )
 
     def sentence(self) -> str:
         """The μ at which η is largest, and why it falls again, as HTML."""
@@ -79,7 +81,7 @@ class Indeterminacy:
         )
 
 
-def samplers(own: list[Row], exact: list[Row]) -> Figure:
+def samplers(page_rows: list[Row], exact: list[Row]) -> Figure:
     """0.15 η3 by every sampler and exact, and of the page's packings."""
     lines = [
         Line(
@@ -91,13 +93,13 @@ def samplers(own: list[Row], exact: list[Row]) -> Figure:
     ]
     drawn = AgainstFriction("samplers", "0.15 η₃", lines, height=280)
     none: Points = []
-    points = [statistics.means(rows, "eta3", factor=0.15) for rows in (own, exact)]
+    points = [statistics.means(rows, "eta3", factor=0.15) for rows in (page_rows, exact)]
     drawn.mark([points[0], none, none, points[1], none], [])
     legend_above(drawn.figure, 3)
     return drawn.figure
 
 
-def extents(own: list[Row], mu: float) -> tuple[Figure, str]:
+def extents(page_rows: list[Row], mu: float) -> tuple[Figure, str]:
     """Figure 4: P(ΔF_n) for some μ of the study, and of the page's packings at this μ."""
     fig = figure(
         "extents", None, "length ΔFₙ of a contact's interval, in mean forces", "P(ΔFₙ)",
@@ -106,7 +108,7 @@ def extents(own: list[Row], mu: float) -> tuple[Figure, str]:
     table = study_data.study()
     known = {} if table is None else table.extents("walk")
     curves = [(f"μ = {value:g}", known[value]) for value in SHOWN if value in known]
-    here = distributions.groups(own, mu).get(mu)
+    here = distributions.groups(page_rows, mu).get(mu)
     every = [group for _, group in curves] + ([here] if here else [])
     largest = max((np.quantile(np.concatenate(group), 0.999) for group in every), default=1.0)
     edges = np.linspace(0, largest, BINS + 1)
@@ -137,38 +139,38 @@ def _density(
     heights = np.array([statistics.density(values, edges) for values in group])
     mean = heights.mean(axis=0)
     error = heights.std(axis=0, ddof=1) / np.sqrt(len(group)) if len(group) > 1 else 0 * mean
-    x, seen = (edges[1:] + edges[:-1]) / 2, mean > 0
+    x, positive = (edges[1:] + edges[:-1]) / 2, mean > 0
     low = np.maximum(mean - error, 0.3 * mean)
     look = {"color": colour, "legend_label": label}
-    fig.line(x, np.where(seen, mean, np.nan), line_width=wide, **look)
-    fig.segment(x[seen], low[seen], x[seen], (mean + error)[seen], color=colour)
-    fig.scatter(x[seen], mean[seen], size=5, marker=marker, **look)
+    fig.line(x, np.where(positive, mean, np.nan), line_width=wide, **look)
+    fig.segment(x[positive], low[positive], x[positive], (mean + error)[positive], color=colour)
+    fig.scatter(x[positive], mean[positive], size=5, marker=marker, **look)
 
 
 class Correlations:
     """Figure 6: corr(f_n, ΔF_n) against μ."""
 
     def __init__(self) -> None:
-        self.found = {
+        self.points = {
             part: statistics.means(study_data.rows(part), "correlation") for part in CORRELATED
         }
         lines = [
             Line(SAMPLERS[part], points, "dashed" if part == "exact" else "solid")
-            for part, points in self.found.items()
+            for part, points in self.points.items()
         ]
         self.drawn = AgainstFriction("correlation", "corr(fₙ, ΔFₙ)", lines, height=280)
         legend_above(self.drawn.figure, 3)
 
-    def mark(self, own: list[Row], exact: list[Row], here: Row) -> None:
+    def mark(self, page_rows: list[Row], exact: list[Row], here: Row) -> None:
         """Mark the page's packings, with `here` on screen."""
-        known = [[row for row in rows if _has(row, "correlation")] for rows in (own, exact)]
+        known = [[row for row in rows if _has(row, "correlation")] for rows in (page_rows, exact)]
         points = [statistics.means(rows, "correlation") for rows in known]
         ring = [(here["mu"], here["correlation"])] if _has(here, "correlation") else []
         self.drawn.mark([points[0], [], points[1]], ring)
 
     def sentence(self) -> str:
         """The range of the walk's correlation, as HTML; empty without a study."""
-        points = self.found["walk"]
+        points = self.points["walk"]
         if not points:
             return ""
         values = [value for _, value, _ in points]

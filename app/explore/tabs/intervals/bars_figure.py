@@ -46,17 +46,17 @@ class BarsFigure:
                 ("whole_", PALE, 0.3), ("exact_", PALE, 1.0), ("", DARK, 1.0),
             )
         ]  # fmt: skip
-        _, exact, seen = self.layers
-        seen.name = "seen"  # see plot_layer.js
+        _, exact, sampled = self.layers
+        sampled.name = "seen"  # see plot_layer.js
         self.line = fig.line("rank", "original", source=self.bars, color=ORIGINAL, line_width=1.5)
         self.packed = fig.scatter("rank", "original", source=self.bars, size=2.5, color=ORIGINAL)
         self.dots = fig.scatter("rank", "now", source=self.bars, color=now(False), name="dots")
-        for moving in (seen, self.line, self.packed, self.dots):
+        for moving in (sampled, self.line, self.packed, self.dots):
             moving.tags = MOVES
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         fig.add_tools(
             hover(
-                [seen, exact],
+                [sampled, exact],
                 ("contact", "@contact"),
                 ("now", "@now{0.000}"),
                 ("as packed", "@original{0.000}"),
@@ -68,7 +68,7 @@ class BarsFigure:
         on_tap(fig, lambda row, data: choose(int(data["at"][row])), *marks)
 
     def show(
-        self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, own: bool
+        self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, relative: bool
     ) -> int:
         """Draw these contacts; return how many bars extend beyond the axis.
 
@@ -76,7 +76,7 @@ class BarsFigure:
         """
         self.contacts = contacts
         original = replay.normal[0, contacts]
-        unit = original if own else np.ones_like(original)
+        unit = original if relative else np.ones_like(original)
         ends = {
             **_ends("whole_", before, contacts),
             **_ends("exact_", exact, contacts),
@@ -98,7 +98,7 @@ class BarsFigure:
         self.dots.glyph.size = size
         set_range(self.figure.x_range, 0, len(contacts) + 1)
         highest = np.fmax.reduce([scaled[name] for name in ("whole_high", "exact_high", "high")])
-        counted = original >= CARRYING if own else np.ones(len(original), dtype=bool)
+        counted = original >= CARRYING if relative else np.ones(len(original), dtype=bool)
         top = 1.04 * float(np.nanmax(highest[counted], initial=1.0))
         set_range(self.figure.y_range, 0, top)
         return int(np.sum(highest > top))

@@ -40,7 +40,7 @@ class View(TabView):
 
     def __init__(self, state: AppState) -> None:
         super().__init__(
-            state, "seen", "exact", looks=["drawn", "sort", "scale", "contact", "dark"],
+            state, "shown", "exact", looks=["drawn", "sort", "scale", "contact", "dark"],
             work=["arriving"],
         )  # fmt: skip
         self.drawing = BarsFigure(self._choose)
@@ -56,7 +56,7 @@ class View(TabView):
         self.lead, self.details = note("Opening the packing …"), note()
         self.exact.on_click(lambda event: state.compute_exact())
         state.knowledge.param.watch(self.refresh, ["narrowed", "known"])
-        state.param.watch(self._offer, ["seen", "exact"])
+        state.param.watch(self._offer, ["shown", "exact"])
         for task in (state.work.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
         self._offer()
@@ -79,7 +79,7 @@ class View(TabView):
 
     def update(self) -> None:
         """Update contacts, exact intervals and the walk's length."""
-        state, looks, replay = self.state, self.looks, self.state.seen
+        state, looks, replay = self.state, self.looks, self.state.shown
         if replay is None:
             return
         narrowed, coming = state.knowledge.narrowed, state.work.arriving is not None
@@ -89,8 +89,8 @@ class View(TabView):
         named = [one.contact for one in state.knowledge.known]
         named += [] if looks.contact is None else [looks.contact]
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
-        own = looks.scale == "own"
-        beyond = self.drawing.show(replay, order.contacts[ranks], exact, before, own)
+        relative = looks.scale == "own"
+        beyond = self.drawing.show(replay, order.contacts[ranks], exact, before, relative)
         self.drawing.draw_packed(order.as_packed)
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
@@ -109,7 +109,7 @@ class View(TabView):
 
     def _offer(self, *events: Any) -> None:
         """Offer exact intervals only if there are none and none are being computed."""
-        self.exact.visible = self.state.replay is not None and self.state.exact_wanted
+        self.exact.visible = self.state.replay is not None and self.state.exact_requested
 
 
 def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: int = 0) -> str:

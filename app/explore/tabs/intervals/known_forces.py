@@ -31,7 +31,7 @@ class Known(Scripted):
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
-        state.param.watch(self._show, "seen")
+        state.param.watch(self._show, "shown")
         state.looks.param.watch(self._show, "contact")
         state.knowledge.param.watch(self._show, ["known", "narrowed", "ranked"])
         for task in (state.knowledge.task, state.knowledge.ranking):

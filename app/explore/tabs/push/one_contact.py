@@ -98,9 +98,9 @@ def decay(pushed: Pushed) -> Figure:
         "displacement", None, "distance from the pushed contact, in the packing's unit",
         "first motion |u| (rms = 1)", height=300, x_axis_type="log", y_axis_type="log",
     )  # fmt: skip
-    seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
+    visible = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
     fig.scatter(
-        pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
+        pushed.distance[visible], pushed.size[visible], size=4, color=DARK, alpha=0.5,
         legend_label="one dot, one grain",
     )  # fmt: skip
     known = np.isfinite(pushed.profile) & (pushed.profile > 0)

@@ -21,7 +21,7 @@ ACROSS = "how undetermined the forces are, η₂"
 LINES = {"critical_force": "critical force", "limit_load": "limit load"}
 
 
-def responses(own: list[Row]) -> tuple[list[Figure], str, str]:
+def responses(page_rows: list[Row]) -> tuple[list[Figure], str, str]:
     """⟨F_crit⟩, limit load and α against η2, joined in order of μ: figures, lead and caption.
 
     own: rows of the page's packings, drawn as open symbols.
@@ -32,8 +32,8 @@ def responses(own: list[Row]) -> tuple[list[Figure], str, str]:
     _against_eta2(force, study, LINES)
     alpha = figure("decay", None, ACROSS, "decay exponent α", height=280)
     _against_eta2(alpha, study, {"decay_exponent": "α of |u| ~ r⁻ᵅ"})
-    _own(force, own, list(LINES))
-    _own(alpha, own, ["decay_exponent"])
+    _own(force, page_rows, list(LINES))
+    _own(alpha, page_rows, ["decay_exponent"])
     for fig in (force, alpha):
         if fig.renderers:
             legend_above(fig)
@@ -42,7 +42,7 @@ def responses(own: list[Row]) -> tuple[list[Figure], str, str]:
         f"{term('limit_load', 'Limit load')}: the push beyond which no network balances. "
         f"{term('alpha', 'α')}: how fast the first motion decays with distance, |u| ~ r⁻ᵅ. Each "
         "point is the mean over the packings of one μ, which is written where there is room, "
-        f"with its standard error; open symbols: {len(own)} packings on this page."
+        f"with its standard error; open symbols: {len(page_rows)} packings on this page."
     )
     return [force, alpha], _lead(study), text
 
@@ -78,9 +78,9 @@ def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
     mu, points = drawn[0]
     every = np.concatenate([points for _, points in drawn])
     span = np.ptp(every[:, 0]), np.ptp([every[:, 1] - every[:, 2], every[:, 1] + every[:, 2]])
-    found = labels(points[:, 0], points[:, 1], [f"{m:g}" for m in mu], span)
+    places = labels(points[:, 0], points[:, 1], [f"{m:g}" for m in mu], span)
     fig.text(
-        "x", "y", "text", source=ColumnDataSource(found), x_offset="right", y_offset="down",
+        "x", "y", "text", source=ColumnDataSource(places), x_offset="right", y_offset="down",
         text_align="align", text_baseline="baseline", text_font_size="10px",
         text_color="#808080", name="frictions",
     )  # fmt: skip

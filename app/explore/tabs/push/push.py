@@ -131,9 +131,9 @@ class View(TabView):
         work = perturbations.push(state.library, state.cell, replay, contact)
         self.task.start(work, lambda found: self._found(found, contact, replay))
 
-    def _found(self, found: Pushed, contact: int, replay: Replay) -> None:
+    def _found(self, pushed: Pushed, contact: int, replay: Replay) -> None:
         if contact == self.contact and replay is self.state.replay:
-            self.pushed, self.gave = (found, contact, replay), False
+            self.pushed, self.gave = (pushed, contact, replay), False
             self.refresh()
 
     def _give_way(self) -> None:
@@ -145,13 +145,13 @@ class View(TabView):
         contact, held = self.contact, len(self.state.knowledge.known)
         if contact is None:
             return Shown("No contact carries a force.")
-        found = None if self.pushed is None else self.pushed[0]
-        lead = one_contact.sentence(replay, contact, found, held)
-        if found is None:
+        pushed = None if self.pushed is None else self.pushed[0]
+        lead = one_contact.sentence(replay, contact, pushed, held)
+        if pushed is None:
             return Shown(lead, details=folded(one_contact.COMPUTED))
-        text = one_contact.decay_sentence(found) + folded(one_contact.COMPUTED)
-        numbers = one_contact.table(replay, contact, found)
-        return Shown(lead, [one_contact.decay(found)], numbers, text)
+        text = one_contact.decay_sentence(pushed) + folded(one_contact.COMPUTED)
+        numbers = one_contact.table(replay, contact, pushed)
+        return Shown(lead, [one_contact.decay(pushed)], numbers, text)
 
     def _animate(self, *events: Any) -> None:
         """Animate the first motion to and fro on the packing while this tab is visible."""
@@ -167,9 +167,9 @@ class View(TabView):
         work = perturbations.limit_loads(self.state.library, self.state.cell)
         self.task.start(work, lambda found: self._loads_known(replay, found))
 
-    def _loads_known(self, replay: Replay, found: Loads) -> None:
+    def _loads_known(self, replay: Replay, loads: Loads) -> None:
         if replay is self.state.replay:
-            self.loads = found, all_contacts.drawn(replay, found, self._choose)
+            self.loads = loads, all_contacts.drawn(replay, loads, self._choose)
             self.refresh()
 
     def _all(self) -> Shown:
@@ -193,9 +193,9 @@ class View(TabView):
         work = over_store(state.library, list(state.catalogue), state.cell)
         self.task.start(work, self._show_store)
 
-    def _show_store(self, found: Shown) -> None:
+    def _show_store(self, shown: Shown) -> None:
         if self.what.value == "store":
-            self._show(found)
+            self._show(shown)
 
 
 def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job], Shown]:
@@ -203,9 +203,9 @@ def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job
 
     def work(job: Job) -> Shown:
         job.begin("reading the stores")
-        found = perturbations.over_store(library, cells, cell)
+        rows = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
-        drawn, lead, text = responses(found)
+        drawn, lead, text = responses(rows)
         table = claims.claims("store", "The paper's claims and the results", opened=True)
         return Shown(lead, drawn, details=text + table)
 

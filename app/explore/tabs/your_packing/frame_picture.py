@@ -105,8 +105,8 @@ def dress(fig: Figure, layers: Layers, shown: str, small: bool = False) -> None:
 
 def _along(frame: Frame, force: Any, width: Any, chosen: Any) -> dict[str, Any]:
     """Columns of the chosen contacts, as rectangles of these widths (N_c,)."""
-    seen = chosen & (width > FAINT * WIDEST * frame.r.mean())
-    here = np.flatnonzero(seen & np.isfinite(frame.lines).all(axis=(1, 2)))
+    visible = chosen & (width > FAINT * WIDEST * frame.r.mean())
+    here = np.flatnonzero(visible & np.isfinite(frame.lines).all(axis=(1, 2)))
     x, y = frame.lines[here].mean(axis=1).T
     away = frame.lines[here, 1] - frame.lines[here, 0]
     return {
@@ -137,7 +137,7 @@ def _mark(fig: Figure, frame: Frame) -> None:
     for label, places, marker, colour in (
         ("suspect", middle[frame.suspects], "triangle", AMBER),
         ("certain", middle[frame.certain], "circle", SERIES[2]),
-        ("mended", frame.found, "x", AMBER),
+        ("mended", frame.repaired, "x", AMBER),
     ):
         if len(places):
             fig.scatter(

@@ -64,7 +64,7 @@ class Frames:
             show_loop_controls=False, **WIDE,
         )  # fmt: skip
         self.player.param.watch(lambda event: self._turn(event.new), "value")
-        self.found, self.listed, self.stresses = note(), note(), note()
+        self.findings, self.listed, self.stresses = note(), note(), note()
         self.compared = pn.pane.Bokeh(**WIDE)
         self._fill(first)
 
@@ -72,7 +72,7 @@ class Frames:
         """All parts, from the top."""
         return [
             self.player,
-            self.found,
+            self.findings,
             self.choice,
             self.pictures,
             self.open,
@@ -113,7 +113,7 @@ class Frames:
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
         self.picture, self.layers = frame_picture.network(frame)
         self.pictures[:] = self._panes()
-        self.found.object = head + rows + found(frame.report)
+        self.findings.object = head + rows + findings(frame.report)
         self.listed.object = listed(frame)
         self.compared.object = compared(frame)
         self.stresses.object = stresses(frame)
@@ -145,7 +145,7 @@ forces held fixed. Intervals, pulls and outlines then show which other forces ba
 """
 
 
-def found(report: dict[str, Any]) -> str:
+def findings(report: dict[str, Any]) -> str:
     """The findings by kind and line, collapsed."""
     if not report["findings"]:
         return ""
@@ -156,15 +156,21 @@ def found(report: dict[str, Any]) -> str:
 def compared(frame: Frame) -> Figure:
     """Figure of inferred against measured forces, for measured contacts."""
     fig = figure("photoelastic_forces", None, "measured / ⟨mₙ⟩", "inferred / ⟨mₙ⟩", height=340)
-    seen = np.isfinite(frame.measured).all(axis=1)
+    measured = np.isfinite(frame.measured).all(axis=1)
     drawn, ends = [], [0.0]
     for part, (label, colour) in enumerate(COMPONENTS):
         x, y, error = (
-            values[seen, part] for values in (frame.measured, frame.inferred, frame.error)
+            values[measured, part] for values in (frame.measured, frame.inferred, frame.error)
         )
         ends += [x.min(initial=0), x.max(initial=0), y.min(initial=0), y.max(initial=0)]
         source = ColumnDataSource(
-            {"x": x, "y": y, "low": y - error, "high": y + error, "contact": np.flatnonzero(seen)},
+            {
+                "x": x,
+                "y": y,
+                "low": y - error,
+                "high": y + error,
+                "contact": np.flatnonzero(measured),
+            },
             name=f"photoelastic_{'nt'[part]}",
         )
         fig.segment("x", "low", "x", "high", source=source, color=colour, alpha=0.2)
