@@ -1,6 +1,6 @@
 // The clipboard, which browsers offer only to pages of this machine and of https.
 
-import { button, made } from "./dom.js"
+import { button, createElement } from "./dom.js"
 
 const COPIED_MS = 1500 // for which a copy is confirmed
 
@@ -15,7 +15,7 @@ export function copyButton(label, text, look) {
 
 async function copy(text) {
   if (navigator.clipboard) return navigator.clipboard.writeText(text)
-  const area = made("textarea", { value: text })
+  const area = createElement("textarea", { value: text })
   document.body.append(area)
   area.select()
   document.execCommand("copy")

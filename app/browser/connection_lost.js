@@ -1,13 +1,13 @@
 // Reports a lost connection; when the server is available again, the page reloads its address,
 // which holds the view.
 
-import { made } from "./dom.js"
+import { createElement } from "./dom.js"
 
 const RETRY_MS = 1000 // time between two requests to a missing server
 
 /** The banner that reports it; still: what continues to work meanwhile. */
 export function goneBanner(view, still) {
-  const banner = made("div", { className: "gone", role: "alert", hidden: true })
+  const banner = createElement("div", { className: "gone", role: "alert", hidden: true })
   let lost = false
 
   function gone() {

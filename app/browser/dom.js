@@ -1,11 +1,11 @@
 // Elements of the page, with their properties.
 
 /** An element of this tag with these properties. */
-export function made(tag, look) { return Object.assign(document.createElement(tag), look) }
+export function createElement(tag, look) { return Object.assign(document.createElement(tag), look) }
 
 /** A button with this text and action. */
 export function button(textContent, act, look = {}) {
-  const it = made("button", { type: "button", textContent, ...look })
+  const it = createElement("button", { type: "button", textContent, ...look })
   it.addEventListener("click", () => act(it))
   return it
 }

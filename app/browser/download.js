@@ -1,10 +1,10 @@
 // Hands results to the browser: saves a file, or prints a page.
 
-import { made } from "./dom.js"
+import { createElement } from "./dom.js"
 
 /** Save a blob as a file of this name. */
 export function save(blob, name) {
-  const link = made("a", { href: URL.createObjectURL(blob), download: name })
+  const link = createElement("a", { href: URL.createObjectURL(blob), download: name })
   link.click()
   setTimeout(() => URL.revokeObjectURL(link.href), 10000)
 }
@@ -16,7 +16,7 @@ export function saveBytes(text, name) {
 
 /** Print an HTML document alone; title: its title, for screen readers. */
 export function print(title, html) {
-  const sheet = made("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })
+  const sheet = createElement("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })
   sheet.addEventListener("load", () => {
     sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
     sheet.contentWindow.print()

@@ -1,7 +1,7 @@
 // The line at the bottom: a failure, or the progress of a computation, or the reliability of the
 // numbers on screen; and, until it is closed, where new visitors can begin.
 import { ask } from "../browser/send.js"
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 import { knows, remember } from "../browser/local_storage.js"
 import { plain } from "../browser/to_object.js"
 
@@ -9,8 +9,8 @@ const NEW = "learn" // name under which a browser remembers that the line for ne
 const LATE_MS = 200 // after which a computation is shown; shorter ones would flicker
 
 export function render({ model, view }) {
-  const root = made("div", { className: "line" }), facts = made("p", { className: "facts" })
-  const failed = made("p", { className: "failed", role: "alert" }), task = made("div", { className: "task", hidden: true })
+  const root = createElement("div", { className: "line" }), facts = createElement("p", { className: "facts" })
+  const failed = createElement("p", { className: "failed", role: "alert" }), task = createElement("div", { className: "task", hidden: true })
   task.innerHTML = `
     <div class="bar" role="progressbar" aria-label="progress" aria-valuemin="0" aria-valuemax="100"><div></div></div><span></span>`
   const [bar, words] = task.children
@@ -25,7 +25,7 @@ export function render({ model, view }) {
     late = 0
     failed.hidden = !model.failed
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
-    facts.replaceChildren(...model.facts.map((fact) => made("span", { innerHTML: fact })))
+    facts.replaceChildren(...model.facts.map((fact) => createElement("span", { innerHTML: fact })))
     task.hidden = !said
     facts.hidden = !task.hidden
     view.el.classList.toggle("urgent", !task.hidden || Boolean(model.failed)) // visible at any scroll position
@@ -50,8 +50,8 @@ export function render({ model, view }) {
 }
 
 function invitation() {
-  const told = made("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
-  const link = made("a", { href: `${location.pathname}?learn${dark ? "&dark=1" : ""}`, textContent: "Learn" })
+  const told = createElement("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
+  const link = createElement("a", { href: `${location.pathname}?learn${dark ? "&dark=1" : ""}`, textContent: "Learn" })
   const close = button("×", () => { remember(NEW); told.remove() }, { ariaLabel: "Close permanently" })
   told.append("New to this? ", link, " starts with one disk", close)
   return told

@@ -1,7 +1,7 @@
 // Learn: seven chapters, one on screen; the chapter and the reader's progress are in the address
 // and in the browser.
 
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 import { CHAPTERS } from "./chapters.js"
 import { PredictDoSee } from "./predict_do_see.js"
@@ -15,11 +15,11 @@ const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["
 class Lesson {
   constructor(model, view) {
     Object.assign(this, { model, source: new Source(model, view), progress: new Progress(), asked: 0 })
-    this.root = made("div", { className: model.alone ? "course alone" : "course" })
-    this.list = made("ol", {})
-    const nav = made("nav", { ariaLabel: "Chapters" })
-    nav.append(this.list, made("p", { innerHTML: `<a href="?scene=pyramid">More small scenes</a><a href="?scene=own">Build your own</a>` }))
-    this.main = made("article", {})
+    this.root = createElement("div", { className: model.alone ? "course alone" : "course" })
+    this.list = createElement("ol", {})
+    const nav = createElement("nav", { ariaLabel: "Chapters" })
+    nav.append(this.list, createElement("p", { innerHTML: `<a href="?scene=pyramid">More small scenes</a><a href="?scene=own">Build your own</a>` }))
+    this.main = createElement("article", {})
     this.root.append(nav, this.main)
     this.returned = () => this.open(this.named)
     window.addEventListener("popstate", this.returned)
@@ -83,7 +83,7 @@ class Lesson {
     const stops = [...model.frictions]
     const x = stops.length && chapter.x.log ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.textContent = chapter.text(experiment.facts)
-    parts.text.append(" ", made("strong", { textContent: chapter.ask }))
+    parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
     const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
     this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name).prediction, kept, () => this.paint())
     this.sized.observe(parts.picture)
@@ -97,17 +97,17 @@ class Lesson {
   /** The parts of a chapter's page. */
   lay(chapter) {
     const { number } = this, last = number === CHAPTERS.length - 1
-    const heading = made("h1", { textContent: chapter.heading, tabIndex: -1 }), text = made("p", { className: "text" })
-    const pictures = made("div", { className: "pictures waiting" }), voice = made("div", { className: "voice", ariaLive: "polite" })
+    const heading = createElement("h1", { textContent: chapter.heading, tabIndex: -1 }), text = createElement("p", { className: "text" })
+    const pictures = createElement("div", { className: "pictures waiting" }), voice = createElement("div", { className: "voice", ariaLive: "polite" })
     voice.textContent = "Loading … The first time on a server, this can take a minute."
-    const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(made("figure", { className })))
-    const row = made("div", { className: "row" }), turn = made("span", { className: "turn" })
+    const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(createElement("figure", { className })))
+    const row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
     const move = (words, by) => button(words, () => this.go(number + by), { disabled: !CHAPTERS[number + by] })
     turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with these disks</a>` : ""
-    const after = made("p", { className: "after", innerHTML: onwards })
+    const after = createElement("p", { className: "after", innerHTML: onwards })
     this.main.replaceChildren(heading, text, pictures, voice, row, after)
     return { text, pictures, picture, plot, voice, row }
   }
@@ -115,12 +115,12 @@ class Lesson {
   /** The list of chapters, with finished ones marked. */
   show() {
     this.list.replaceChildren(...CHAPTERS.map(({ name, title }, k) => {
-      const item = made("li", {}), link = item.appendChild(made("a", { textContent: title, href: this.address(name) }))
+      const item = createElement("li", {}), link = item.appendChild(createElement("a", { textContent: title, href: this.address(name) }))
       if (k === this.number) {
         link.ariaCurrent = "step"
         requestAnimationFrame(() => this.list.parentNode.scrollTo({ left: item.offsetLeft - 40 })) // if the list is horizontal
       }
-      if (this.progress.of(name).done) item.append(made("span", { className: "done", textContent: " ✓", title: "done" }))
+      if (this.progress.of(name).done) item.append(createElement("span", { className: "done", textContent: " ✓", title: "done" }))
       link.addEventListener("click", (event) => {
         if (event.metaKey || event.ctrlKey || event.shiftKey) return
         event.preventDefault()

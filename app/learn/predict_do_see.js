@@ -1,7 +1,7 @@
 // The common course of every chapter: predict with a marker, do by dragging, see the answer next to
 // the prediction.
 
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 import { QuantityPlot } from "./drawing/quantity_plot.js"
 
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
@@ -17,7 +17,7 @@ export class PredictDoSee {
     Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true })
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
-    this.stages = made("span", { className: "stages" })
+    this.stages = createElement("span", { className: "stages" })
     row.prepend(this.button, this.stages)
     this.sized = new ResizeObserver(() => this.plot.fit())
     this.sized.observe(plot)
@@ -66,7 +66,7 @@ export class PredictDoSee {
     this.plot.allow(stage ? (this.ready ? "dot" : null) : "marker")
     this.button.hidden = stage > 0
     this.button.disabled = prediction === null
-    this.stages.replaceChildren(...STAGES.map((name, k) => made("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
+    this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
   }
@@ -76,7 +76,7 @@ export class PredictDoSee {
     const { chapter, experiment, voice } = this
     if (stage < 2) {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing : WAIT
-      if (voice.dataset.said !== words) voice.replaceChildren(made("p", { textContent: words }))
+      if (voice.dataset.said !== words) voice.replaceChildren(createElement("p", { textContent: words }))
       voice.dataset.said = words
     } else if (voice.dataset.said !== `found ${experiment.finds}`) {
       voice.dataset.said = `found ${experiment.finds}`
@@ -87,10 +87,10 @@ export class PredictDoSee {
   /** The answer next to the prediction, with its reason, the surprise, and the count. */
   answer([reason, surprise], count) {
     const { experiment: { answer }, prediction } = this
-    const verdict = made("p", { className: "verdict" })
-    verdict.append(made("b", { textContent: `It is ${this.named(answer)}.` }), ` You predicted ${this.named(prediction)}.`)
-    const words = made("div", { className: "words" })
-    words.append(verdict, made("p", { textContent: reason }), made("p", { textContent: surprise }))
+    const verdict = createElement("p", { className: "verdict" })
+    verdict.append(createElement("b", { textContent: `It is ${this.named(answer)}.` }), ` You predicted ${this.named(prediction)}.`)
+    const words = createElement("div", { className: "words" })
+    words.append(verdict, createElement("p", { textContent: reason }), createElement("p", { textContent: surprise }))
     if (!count) return [words]
     return [words, tableOf(count)]
   }
@@ -98,10 +98,10 @@ export class PredictDoSee {
 
 /** A table, {head, rows}; without a head its last row is a sum. */
 function tableOf({ head, rows }) {
-  const table = made("table", { className: head ? "" : "sum" })
+  const table = createElement("table", { className: head ? "" : "sum" })
   const add = (section, cells, tag) => {
     const row = section.insertRow()
-    row.append(...cells.map((textContent) => made(tag, { textContent })))
+    row.append(...cells.map((textContent) => createElement(tag, { textContent })))
   }
   if (head) add(table.createTHead(), head, "th")
   const body = table.createTBody()

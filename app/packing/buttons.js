@@ -1,7 +1,7 @@
 // The controls around the scene: tools above it; below it the player's bar, the legend, and the
 // controls that compare and check networks.
 
-import { made } from "../browser/dom.js"
+import { createElement } from "../browser/dom.js"
 import { Keyboard } from "./keyboard.js"
 import { PlayerBar } from "./player_bar.js"
 import { LEAST } from "./drawing/chain_strokes.js"
@@ -38,14 +38,14 @@ const BUTTONS = `
     </div>
     <div class="bar tools">
       ${button("undo", "the last pull (Z); Esc releases all", "Undo")}
-      <span class="knowing">
+      <span class="hold-tools">
         ${button("hold", "hold the selected contact at its present force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
           <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
       </span>
     </div>
   </div>
-  <div class="read"><span class="said"></span></div>
+  <div class="read"><span class="message"></span></div>
   <div class="legend"></div>
   <details class="extras"><summary>Compare and check</summary>
   <div class="game">
@@ -74,10 +74,10 @@ export class Buttons {
    * lines are to show, or how, was chosen in the legend. open(name, whether): a panel was opened or closed.
    */
   constructor(scene, actions, { look, open }) {
-    this.root = made("div", { className: "stage", innerHTML: BUTTONS })
+    this.root = createElement("div", { className: "stage", innerHTML: BUTTONS })
     this.bar = new PlayerBar(actions, (words) => this.say(words))
     this.keyboard = new Keyboard(this.root, actions)
-    this.requested = scene.root.appendChild(made("div", { className: "requested" }))
+    this.requested = scene.root.appendChild(createElement("div", { className: "requested" }))
     this.scenes = this.part("scenes")
     this.scenes.prepend(scene.root)
     this.scenes.after(this.bar.root)
@@ -131,7 +131,7 @@ export class Buttons {
   tellOpen(names) { this.part("extras").open = names.includes("check") }
 
   /** One line below the player; empty: no line. */
-  say(words) { this.part("said").textContent = words }
+  say(words) { this.part("message").textContent = words }
 
   /** A message over the old picture about a request in progress; empty: no message. */
   showRequested(words) {

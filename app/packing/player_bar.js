@@ -1,6 +1,6 @@
 // The bar of the player: steps, play, the slider, the number of the network, and their total.
 
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
 const OUTSIDE = (last) => `Networks have the numbers 1 to ${last}; 0 is the network as packed.`
@@ -23,20 +23,20 @@ export class PlayerBar {
   constructor(actions, say) {
     this.actions = actions
     this.say = say
-    this.scrub = made("input", { className: "scrub", type: "range", min: 0, value: 0, step: 1, ariaLabel: "network" })
-    this.number = made("input", { className: "number", inputMode: "numeric", autocomplete: "off", ariaLabel: "number of the network" })
-    this.place = made("span", { className: "state" })
-    this.speedInput = made("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
-    this.rate = made("span", { className: "rate" })
-    this.stored = made("span", { className: "stored" })
+    this.scrub = createElement("input", { className: "scrub", type: "range", min: 0, value: 0, step: 1, ariaLabel: "network" })
+    this.number = createElement("input", { className: "number", inputMode: "numeric", autocomplete: "off", ariaLabel: "number of the network" })
+    this.place = createElement("span", { className: "state" })
+    this.speedInput = createElement("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
+    this.rate = createElement("span", { className: "rate" })
+    this.stored = createElement("span", { className: "stored" })
     this.keep = button("Keep all", () => actions.keep(), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
-    const along = made("label", { className: "at" }), speed = made("label", { title: "networks per second" })
-    const more = made("span", { className: "more" })
+    const along = createElement("label", { className: "at" }), speed = createElement("label", { title: "networks per second" })
+    const more = createElement("span", { className: "more" })
     along.append("network ", this.number)
     speed.append(this.speedInput, this.rate)
     more.append(speed, this.stored, this.keep)
-    this.root = made("div", { className: "bar" })
+    this.root = createElement("div", { className: "bar" })
     this.root.append(
       iconButton("back", "one network back (←)", () => actions.back()), this.playButton,
       iconButton("step", "one network on (→)", () => actions.step()), this.scrub, along, this.place, more,

@@ -2,7 +2,7 @@
 
 import { ask } from "../browser/send.js"
 import { composed, plotsSeen, printFigure } from "./composed_figure.js"
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 import { save } from "../browser/download.js"
 
@@ -23,7 +23,7 @@ export function render({ model, view }) {
     root.replaceChildren()
     for (const [heading, files] of Object.entries(plain(model.files))) {
       const group = document.createElement("section")
-      if (heading) group.append(made("h4", { textContent: heading }))
+      if (heading) group.append(createElement("h4", { textContent: heading }))
       for (const [key, words] of Object.entries(plain(files))) group.append(button(words, () => ask(model, view, { key }), { className: `soft ${key}` }))
       root.append(group)
     }
@@ -40,7 +40,7 @@ export function render({ model, view }) {
   async function recorded(caption, button) {
     const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
     const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
-    const canvas = made("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
+    const canvas = createElement("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
     const context = canvas.getContext("2d"), pieces = []
     const stream = canvas.captureStream(30)
     const recorder = new MediaRecorder(stream, { mimeType: "video/webm", videoBitsPerSecond: RATE })
@@ -91,7 +91,7 @@ export function render({ model, view }) {
 
   async function rendered(svg) {
     const image = await imageOf(svg)
-    const canvas = made("canvas", { width: SCALE * image.naturalWidth, height: SCALE * image.naturalHeight })
+    const canvas = createElement("canvas", { width: SCALE * image.naturalWidth, height: SCALE * image.naturalHeight })
     canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height)
     return new Promise((resolve) => canvas.toBlob(resolve, "image/png"))
   }

@@ -11,10 +11,10 @@ export function render({ model, view }) {
   root.tabIndex = 0
   root.innerHTML = `
     <svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 3l5 5h-3v6h-4V8H7zM4 17h16v4H4z"/></svg>
-    <span class="what"></span><small class="told" role="status"></small>
+    <span class="what"></span><small class="status" role="status"></small>
     <input type="file" multiple hidden>`
-  const input = root.querySelector("input"), told = root.querySelector(".told")
-  const tell = (text) => { told.textContent = text }
+  const input = root.querySelector("input"), statusLine = root.querySelector(".status")
+  const tell = (text) => { statusLine.textContent = text }
 
   async function send(files) {
     const chosen = [...files], size = chosen.reduce((sum, file) => sum + file.size, 0)

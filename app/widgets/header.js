@@ -1,6 +1,6 @@
 // The header of every page: links to both entry pages, and tools that need no server.
 
-import { button, made } from "../browser/dom.js"
+import { button, createElement } from "../browser/dom.js"
 import { copyButton } from "../browser/clipboard.js"
 
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
@@ -8,8 +8,8 @@ const DOORS = [["explore", "Explore", ""], ["learn", "Learn", "learn"]]
 
 export function render({ model }) {
   const root = document.createElement("div"), header = root.appendChild(document.createElement("header"))
-  const nav = made("nav", { ariaLabel: "granforce" }), tools = made("div", { className: "tools" })
-  header.append(made("b", { textContent: "granforce" }), nav, tools)
+  const nav = createElement("nav", { ariaLabel: "granforce" }), tools = createElement("div", { className: "tools" })
+  header.append(createElement("b", { textContent: "granforce" }), nav, tools)
 
   /** The address of an entry page, in the theme of this page. */
   const address = (query) => {
@@ -19,7 +19,7 @@ export function render({ model }) {
 
   function show() {
     nav.replaceChildren(...DOORS.map(([door, textContent, query]) => {
-      const link = made("a", { textContent, href: address(query) })
+      const link = createElement("a", { textContent, href: address(query) })
       if (door === model.door) link.ariaCurrent = "page"
       return link
     }))
@@ -50,13 +50,13 @@ export function render({ model }) {
 function helpOf(model, root) {
   const dialog = root.appendChild(document.createElement("dialog"))
   const keys = document.createElement("dl"), words = document.createElement("div")
-  dialog.append(made("h2", { textContent: "Keys" }), keys, words, button("Close", () => dialog.close(), { className: "soft" }))
+  dialog.append(createElement("h2", { textContent: "Keys" }), keys, words, button("Close", () => dialog.close(), { className: "soft" }))
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close() })
   dialog.addEventListener("keydown", (event) => event.stopPropagation()) // keys have no other effect meanwhile
   const show = () => {
     words.innerHTML = model.help
     dialog.firstChild.hidden = !model.keys.length
-    keys.replaceChildren(...model.keys.flatMap(([key, does]) => [made("dt", { textContent: key }), made("dd", { textContent: does })]))
+    keys.replaceChildren(...model.keys.flatMap(([key, does]) => [createElement("dt", { textContent: key }), createElement("dd", { textContent: does })]))
   }
   model.on(["help", "keys"], show)
   show()

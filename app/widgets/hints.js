@@ -1,7 +1,7 @@
 // The glossary at the words on the page: elements with data-term, and the words in the label and
 // the chosen option of widgets.
 
-import { made } from "../browser/dom.js"
+import { createElement } from "../browser/dom.js"
 import { plain } from "../browser/to_object.js"
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
@@ -11,7 +11,7 @@ const DEEP = 14 // levels above the pointer to search for the word
 
 export function render({ model }) {
   const terms = plain(model.terms), labels = plain(model.labels)
-  const tip = made("div", { className: "hint", role: "tooltip", hidden: true })
+  const tip = createElement("div", { className: "hint", role: "tooltip", hidden: true })
   let waiting = 0, at = null
 
   const words = (node, part) => node?.querySelector(part)?.textContent.trim()
@@ -56,7 +56,7 @@ export function render({ model }) {
     at = node
     tip.replaceChildren(...keys.filter((key) => terms[key]).map((key) => {
       const [title, sentence] = plain(terms[key]), row = document.createElement("p")
-      row.append(made("b", { textContent: title }), ` ${sentence}`)
+      row.append(createElement("b", { textContent: title }), ` ${sentence}`)
       return row
     }))
     if (!node.ariaDescription) node.setAttribute("aria-description", tip.textContent)

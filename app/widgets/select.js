@@ -1,10 +1,10 @@
 // A choice from the browser's own list, which every keyboard and screen reader supports.
 
-import { made } from "../browser/dom.js"
+import { createElement } from "../browser/dom.js"
 
 export function render({ model }) {
-  const root = made("fieldset", { className: "choice", role: "presentation" })
-  const legend = made("legend", { className: "name", ariaHidden: "true" }), list = document.createElement("select")
+  const root = createElement("fieldset", { className: "choice", role: "presentation" })
+  const legend = createElement("legend", { className: "name", ariaHidden: "true" }), list = document.createElement("select")
   root.append(legend, list)
 
   function show() {

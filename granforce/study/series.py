@@ -32,7 +32,7 @@ from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
 from granforce.study.store import Store, is_store, open_store
-from granforce.system.files import beside, expanded
+from granforce.system.files import expanded, sibling
 from granforce.types import Floats, Integers, Progress
 
 # Draws for the error bars of a frame, and the assumed error of unmeasured forces, ⟨f_n⟩.
@@ -325,7 +325,7 @@ def check_folder(path: str | Path) -> Path:
 def save_series(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a dataset as a Zarr folder, completely or not at all, replacing an existing one."""
     path = check_folder(path)
-    aside = beside(path)
+    aside = sibling(path)
     try:
         entries.move(entries.encoded(dataset), aside)
         if path.exists():

@@ -149,7 +149,7 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     page.keyboard.press("n")
     page.locator("input.error").fill("-1")
     page.locator("button.hold").click()
-    page.locator(".said").get_by_text("Enter an error bar of 0 or more").wait_for()
+    page.locator(".message").get_by_text("Enter an error bar of 0 or more").wait_for()
     assert "hold=" not in page.url
     page.locator("input.error").fill("0.1")
     page.locator("button.hold").click()

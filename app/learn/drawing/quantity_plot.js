@@ -7,9 +7,9 @@ const GRAB = 26 // px from the dot within which dragging does not move it
 const STEPS = 60 // keyboard steps along an axis
 
 function element(parent, tag, attributes = {}) {
-  const made = parent.appendChild(document.createElementNS(NS, tag))
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value)
-  return made
+  const child = parent.appendChild(document.createElementNS(NS, tag))
+  for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value)
+  return child
 }
 
 /** One axis: {low, high, label, log, ticks, stops}, and its position in pixels. */
@@ -52,7 +52,7 @@ export class QuantityPlot {
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
     this.frame = element(svg, "g")
     this.exact = element(svg, "path", { class: "exact" })
-    this.seen = element(svg, "path", { class: "seen" })
+    this.seen = element(svg, "path", { class: "visited" })
     this.dots = element(svg, "path", { class: "dots" })
     this.answer = this.flag("answer")
     this.marker = this.flag("marker")

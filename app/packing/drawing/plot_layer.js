@@ -1,7 +1,7 @@
 // Moving parts of the plots next to the packing, on separate canvases above the static parts: while
 // the player plays or a force is dragged, Bokeh draws nothing. At rest Bokeh draws the same parts.
 
-import { made } from "../../browser/dom.js"
+import { createElement } from "../../browser/dom.js"
 import { circle, line } from "../../browser/canvas_paths.js"
 
 const TRAIL = 4 // states in the trail in force space
@@ -15,7 +15,7 @@ export class Layer {
     this.fig = fig
     this.draw = draw
     this.on = false
-    this.canvas = made("canvas", { className: "layer", style: "position: absolute; inset: 0; pointer-events: none" })
+    this.canvas = createElement("canvas", { className: "layer", style: "position: absolute; inset: 0; pointer-events: none" })
   }
 
   get view() {

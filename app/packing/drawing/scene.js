@@ -2,7 +2,7 @@
 // only chains. One unit of length is the same number of pixels in x and y.
 
 import { addPolygon, inside, polygon, unflat } from "../../browser/canvas_paths.js"
-import { made } from "../../browser/dom.js"
+import { createElement } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
 import { highlight, markForces, markSelected } from "./marks.js"
 import { listen } from "../hand/pointing.js"
@@ -15,12 +15,12 @@ const ZOOM_HINT = "Ctrl + wheel zooms; after a click here the wheel alone does."
 
 export class Scene {
   constructor(onSelect) {
-    this.root = made("div", { className: "scene", tabIndex: 0, role: "img", ariaLabel: "packing with its force chains" })
+    this.root = createElement("div", { className: "scene", tabIndex: 0, role: "img", ariaLabel: "packing with its force chains" })
     const layer = () => this.root.appendChild(document.createElement("canvas")).getContext("2d")
     this.disks = layer()
     this.chains = layer()
     this.marks = layer()
-    this.tip = this.root.appendChild(made("div", { className: "tip" }))
+    this.tip = this.root.appendChild(createElement("div", { className: "tip" }))
     this.root.scene = this
     this.onSelect = onSelect
     this.size = 0
@@ -247,7 +247,7 @@ export class Scene {
 
   /** Explain briefly how the wheel zooms. */
   hintAtZoom() {
-    const hint = this.root.appendChild(made("div", { className: "hint", textContent: ZOOM_HINT, role: "status" }))
+    const hint = this.root.appendChild(createElement("div", { className: "hint", textContent: ZOOM_HINT, role: "status" }))
     hint.addEventListener("animationend", () => hint.remove())
   }
 

@@ -3,7 +3,7 @@
 // look or the pinned state changes.
 
 import { Look } from "./chain_style.js"
-import { made } from "../../browser/dom.js"
+import { createElement } from "../../browser/dom.js"
 import { plain } from "../../browser/to_object.js"
 import { Replay } from "../replay/replay.js"
 import { Scene } from "./scene.js"
@@ -24,7 +24,7 @@ export class Split {
     twin.changed = () => scene.changed()
     twin.reset = (paint = true) => { if (paint) scene.reset() }
     twin.onRepaint = () => {}
-    this.captions = [twin, scene].map(({ root }) => root.appendChild(made("div", { className: "caption" })))
+    this.captions = [twin, scene].map(({ root }) => root.appendChild(createElement("div", { className: "caption" })))
     player.buttons.scenes.prepend(twin.root)
   }
 

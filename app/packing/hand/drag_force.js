@@ -61,9 +61,9 @@ export class Grab {
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()
     player.plots.move(true)
-    const told = player.buttons.part("said")
-    if (told.textContent !== FINDING) this.said = told.textContent
-    told.textContent = FINDING
+    const messageLine = player.buttons.part("message")
+    if (messageLine.textContent !== FINDING) this.messageBefore = messageLine.textContent
+    messageLine.textContent = FINDING
     return true
   }
 
@@ -105,8 +105,8 @@ export class Grab {
 
   /** If nothing was pulled, restore the previous message. */
   unsay() {
-    const told = this.player.buttons.part("said")
-    if (told.textContent === FINDING) told.textContent = this.said
+    const messageLine = this.player.buttons.part("message")
+    if (messageLine.textContent === FINDING) messageLine.textContent = this.messageBefore
   }
 
   /** A key moves the force of the selected contact. */

@@ -8,12 +8,12 @@ const STRIP = 1 // width of the strip around the box in which images are drawn, 
 export const CATCH_UP = 0.6 // s by which the player stays behind the newest state
 const WIDEST = 0.7 // widest chain in a moving packing, in largest radii: collisions carry most of the force
 export const FORCES = ["normal", "tangential"]
-const TOLD = ["residual", "eta1", "eta2", "eta3"]
+const MEASURES = ["residual", "eta1", "eta2", "eta3"]
 
 /** A moving packing for the scene, including its periodic images. */
 function moving({ box, tilt, x, radius, i, j, reach }) {
-  const made = { box, tilt, radius, touching: [], i: [], j: [], contact: [] }
-  for (const name of ["x", "y", "r", "grain", "kind", "x0", "y0", "x1", "y1"]) made[name] = []
+  const drawn = { box, tilt, radius, touching: [], i: [], j: [], contact: [] }
+  for (const name of ["x", "y", "r", "grain", "kind", "x0", "y0", "x1", "y1"]) drawn[name] = []
   const margin = STRIP * radius.reduce((most, r) => Math.max(most, r), 0)
   const [wide, high] = box
   // In a tilted cell: distances from its sides b and a; x and y in a straight one.
@@ -26,8 +26,8 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
     for (let g = 0; g < radius.length; g++) {
       const px = x[2 * g] + a, py = x[2 * g + 1] + b, r = radius[g], at = across(px, py)
       if (!seen(at - r, at + r, wide * narrow) || !seen(py - r, py + r, high)) continue
-      made.x.push(px); made.y.push(py); made.r.push(r); made.grain.push(g)
-      made.touching.push(touching[g]); made.kind.push(image + (touching[g] ? 0 : 1))
+      drawn.x.push(px); drawn.y.push(py); drawn.r.push(r); drawn.grain.push(g)
+      drawn.touching.push(touching[g]); drawn.kind.push(image + (touching[g] ? 0 : 1))
     }
     for (let c = 0; c < i.length; c++) {
       const x0 = x[2 * i[c]] + a, y0 = x[2 * i[c] + 1] + b
@@ -35,13 +35,13 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
       const at = across(x0, y0), to = across(x1, y1)
       if (!seen(Math.min(at, to), Math.max(at, to), wide * narrow)) continue
       if (!seen(Math.min(y0, y1), Math.max(y0, y1), high)) continue
-      made.x0.push(x0); made.y0.push(y0); made.x1.push(x1); made.y1.push(y1)
-      made.contact.push(c); made.i.push(i[c]); made.j.push(j[c])
+      drawn.x0.push(x0); drawn.y0.push(y0); drawn.x1.push(x1); drawn.y1.push(y1)
+      drawn.contact.push(c); drawn.i.push(i[c]); drawn.j.push(j[c])
     }
   }
   const half = Math.max(wide + Math.abs(tilt), high) / 2 + margin
-  made.window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
-  return made
+  drawn.window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
+  return drawn
 }
 
 /** Chains of a moving packing: width fₙ, colour mobilisation. */
@@ -60,12 +60,12 @@ function flickering({ normal, tangential, radius, mu }, palettes, scales) {
 export function roomy(walk) {
   const { room } = walk, whole = { ...walk, low: walk.low.slice(), high: walk.high.slice() }
   const wide = (values, count) => {
-    const made = new Float32Array(count).fill(NaN)
-    made.set(values)
-    return made
+    const padded = new Float32Array(count).fill(NaN)
+    padded.set(values)
+    return padded
   }
   for (const name of FORCES) whole[name] = wide(walk[name], room * walk.contacts)
-  for (const name of TOLD) whole[name] = wide(walk[name], room)
+  for (const name of MEASURES) whole[name] = wide(walk[name], room)
   whole.numbers = wide(walk.number, room)
   whole.number = whole.numbers.subarray(0, walk.number.length)
   return whole
@@ -76,7 +76,7 @@ export function extend(walk, states) {
   const { contacts } = walk, from = walk.number.length, count = states.number.length
   if (from + count > walk.numbers.length) return
   for (const name of FORCES) walk[name].set(states[name], from * contacts)
-  for (const name of TOLD) walk[name].set(states[name], from)
+  for (const name of MEASURES) walk[name].set(states[name], from)
   walk.numbers.set(states.number, from)
   walk.number = walk.numbers.subarray(0, from + count)
   for (let k = 0; k < states.normal.length; k++) {

@@ -66,7 +66,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     )
     during = normal(page)
     assert np.abs(during - before).max() > 1e-3 and during.min() > -1e-6
-    assert "point in force space pulled" in page.locator(".said").inner_text()
+    assert "point in force space pulled" in page.locator(".message").inner_text()
     # beyond the outline it stays on it
     page.mouse.move(u + 5000, v)
     until(page, "scene.hand.spot.at[0] < 1e3")

@@ -83,7 +83,7 @@ def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_d
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 30, y, steps=4)
-    assert page.locator("path.seen").get_attribute("d") != ""
+    assert page.locator("path.visited").get_attribute("d") != ""
     assert page.locator("path.exact").get_attribute("d") == ""
     page.mouse.move(x + 300, y, steps=4)
     page.mouse.up()

@@ -210,7 +210,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(page):
     during = normal(page)
     assert before[contact] < during[contact] <= rail["upper"] + 1e-6
     assert np.abs(during - before).max() > 0 and np.all(during > -1e-6)
-    assert "pulled to" in page.locator(".said").inner_text()
+    assert "pulled to" in page.locator(".message").inner_text()
     picture(page, "live/dragging")
     page.mouse.up()
     searched(page, "pull=")
@@ -337,10 +337,10 @@ def test_a_finger_pulls_the_selected_contact(visit):
 
 def test_a_grip_without_a_pull_leaves_what_is_told(page):
     """Let go before its rail is there, a contact is only selected."""
-    before, (contact, *_) = page.locator(".said").inner_text(), chain(page)
+    before, (contact, *_) = page.locator(".message").inner_text(), chain(page)
     told = page.locator(".scene").evaluate(
         """(e, contact) => {
-            const {hand} = e.scene, source = hand.player.buttons.part("said")
+            const {hand} = e.scene, source = hand.player.buttons.part("message")
             hand.take(contact, () => 0)
             const told = source.textContent
             hand.leave()
@@ -349,7 +349,7 @@ def test_a_grip_without_a_pull_leaves_what_is_told(page):
         contact,
     )
     until(page, f"scene.selected === {contact}")
-    assert "Finding" in told and page.locator(".said").inner_text() == before
+    assert "Finding" in told and page.locator(".message").inner_text() == before
 
 
 def test_playing_on_lets_go(page):

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, origin, stem
-from ....packing.view import measured, pins
+from ....packing.view import measured, pins, reduction
 from ....results import planes
 from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library

@@ -24,7 +24,7 @@ export function render({ model, view }) {
       <label>number of contact or grain <input class="find" inputmode="numeric"></label>
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
     </div>
-    <p class="told" role="status"></p>
+    <p class="status" role="status"></p>
     <div class="frame"><table><thead><tr></tr></thead><tbody></tbody></table></div>`
   const part = (name) => root.querySelector(name), body = part("tbody")
   const sorted = { by: FORCE, down: true }
@@ -49,25 +49,25 @@ export function render({ model, view }) {
   function fill() {
     if (!root.open || !player()?.replay) return
     const on = now(), value = COLUMNS[sorted.by][1], sign = sorted.down ? -1 : 1
-    const all = Array.from(on.mixed.normal.keys()), found = all.filter((c) => fits(on, c))
-    found.sort((a, b) => sign * (value(on, a) - value(on, b)) || a - b)
-    from = Math.min(from, Math.max(0, found.length - 1))
-    shown = found.slice(from, from + ROWS)
-    part(".told").textContent = `${found.length} of ${all.length} contacts` +
-      (found.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
+    const all = Array.from(on.mixed.normal.keys()), matching = all.filter((c) => fits(on, c))
+    matching.sort((a, b) => sign * (value(on, a) - value(on, b)) || a - b)
+    from = Math.min(from, Math.max(0, matching.length - 1))
+    shown = matching.slice(from, from + ROWS)
+    part(".status").textContent = `${matching.length} of ${all.length} contacts` +
+      (matching.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
       `; forces in mean forces; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}; ` +
       "a heading sorts the table, “Sort bars” the bars above"
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
       COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")
-    dim(found.length < all.length ? found : null, all.length)
+    dim(matching.length < all.length ? matching : null, all.length)
   }
 
   /** Dim the contacts hidden by a filter. */
-  function dim(found, count) {
+  function dim(matching, count) {
     const { look } = player(), was = look.only
-    look.only = found && new Uint8Array(count)
-    for (const c of found ?? []) look.only[c] = 1
+    look.only = matching && new Uint8Array(count)
+    for (const c of matching ?? []) look.only[c] = 1
     if (was || look.only) player().repaint()
   }
 

@@ -1,7 +1,7 @@
 // Known forces as chips, their effect in words, and the contact most worth measuring.
 
 import { ask } from "../../../browser/send.js"
-import { button, made } from "../../../browser/dom.js"
+import { button, createElement } from "../../../browser/dom.js"
 
 export function render({ model, view }) {
   const root = document.createElement("div")
@@ -13,7 +13,7 @@ export function render({ model, view }) {
   const tell = (message) => ask(model, view, message)
 
   function chip([contact, text]) {
-    const it = made("span", { className: "chip" })
+    const it = createElement("span", { className: "chip" })
     const look = { className: "release", title: "release it", ariaLabel: `release: ${text}` }
     it.append(
       button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),

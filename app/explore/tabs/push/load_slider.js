@@ -14,7 +14,7 @@ export function render({ model, view }) {
   root.className = "load"
   root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
       <span class="scale"></span></span></label>
-    <span class="told"><output></output> × mean force<b></b></span>
+    <span class="status"><output></output> × mean force<b></b></span>
     <button type="button" class="soft">Find F<sub>crit</sub>: increase the push</button>`
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player

@@ -1,13 +1,13 @@
 // Stored computations: name, kind, time, size; to open or delete.
 
 import { ask } from "../../../browser/send.js"
-import { button, made } from "../../../browser/dom.js"
+import { button, createElement } from "../../../browser/dom.js"
 import { plain } from "../../../browser/to_object.js"
 
 export function render({ model, view }) {
   const root = document.createElement("details")
-  root.innerHTML = `<summary>My computations</summary><p class="told"></p><table><tbody></tbody></table>`
-  const told = root.querySelector(".told"), body = root.querySelector("tbody")
+  root.innerHTML = `<summary>My computations</summary><p class="status"></p><table><tbody></tbody></table>`
+  const statusLine = root.querySelector(".status"), body = root.querySelector("tbody")
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
   /** Delete only at a second click. */
@@ -19,9 +19,9 @@ export function render({ model, view }) {
 
   function line({ entry, name, what, when, megabytes, here }) {
     const row = document.createElement("tr"), look = { className: "soft" }
-    const field = made("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
+    const field = createElement("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
     field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
-    const words = made("span", { textContent: what })
+    const words = createElement("span", { textContent: what })
     const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
     last.push(" ", button("Delete", (it) => remove(entry, it), look))
     const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
@@ -32,7 +32,7 @@ export function render({ model, view }) {
 
   function show() {
     const rows = model.rows.map(plain), all = rows.reduce((sum, { megabytes }) => sum + megabytes, 0)
-    told.textContent = rows.length
+    statusLine.textContent = rows.length
       ? `${rows.length} computed here, ${size(all)} with their packings. They stay until you delete them.`
       : "Nothing yet. Results for another friction, number of disks or seed are computed and kept here."
     body.replaceChildren(...rows.map(line))
