@@ -139,8 +139,13 @@ def others(table: StudyTable) -> str:
         ("α", answers, "decay_exponent", None),
         ("width of S, ⟨f_n⟩", table.part("volume"), "extent", None),
         ("ln V per grain", table.part("volume"), "log_volume_per_grain", None),
-        ("undetermined in frozen surroundings", table.part("frozen"), "undetermined_part", None),
-        ("largest shear over pressure", table.part("stress"), "friction", None),
+        (
+            "undetermined fraction, frozen surroundings",
+            table.part("frozen"),
+            "undetermined_part",
+            None,
+        ),
+        ("largest shear stress/pressure", table.part("stress"), "friction", None),
     )
     frictions = sorted({row["mu"] for _, rows, *_ in columns for row in rows if row["mu"] > 0})
     lines = []
@@ -193,8 +198,8 @@ def sweeps(table: StudyTable) -> str:
                 ]
             )
             lines.append([*cells, *eta])
-    heads = ("end at", "μ", "packings", "states reached", "sweeps per state", "excess")
-    return markdown_table([*heads, "η2", "over nearest η2"], lines)
+    heads = ("residual", "μ", "packings", "fraction reached", "sweeps per state", "excess")
+    return markdown_table([*heads, "η2", "relative to nearest η2"], lines)
 
 
 def _excess(excess: float, length: float) -> str:
@@ -366,7 +371,7 @@ def claim_table(claims: Rows) -> str:
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in _HEADS]
         rows.append([statement, source, criterion, *cells])
-    return markdown_table(["claim", "from", "criterion", *_HEADS.values()], rows)
+    return markdown_table(["claim", "source", "criterion", *_HEADS.values()], rows)
 
 
 def _verdict(claim: dict[str, Any]) -> str:

@@ -27,6 +27,7 @@ from granforce.paper.tables import StudyTable
 from granforce.types import Floats, Rows
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
+WORDS = {part: part.replace("gauss_seidel", "paper's sweeps") for part in SAMPLERS}
 
 
 def measured(table: StudyTable) -> list[Claim]:
@@ -78,7 +79,7 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
             chosen = [[v for _, v in g] for g in within(groups, span).values()]
             if chosen:
                 yield _finding(
-                    f"width of P(ΔF_n), ⟨f_n⟩, {sampler}, {word} μ",
+                    f"width of P(ΔF_n) in ⟨f_n⟩, {WORDS[sampler]}, {word} μ",
                     lambda *g: np.mean([np.concatenate(values).std() for values in g]),
                     chosen,
                     resamples=99,
