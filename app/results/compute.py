@@ -38,7 +38,9 @@ def load_or_compute(
         with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
             job.begin(stage)
-            result, _ = study.get(library.cache, kind, params, **{"progress": job.tell} | options)
+            result, _ = study.get(
+                library.writable_cache, kind, params, **{"progress": job.tell} | options
+            )
     return result
 
 
@@ -55,7 +57,7 @@ def states(library: Library, selection: Selection) -> Work:
                 job.begin("finding the contacts that carry force")
                 with _naming_friction(selection):
                     dataset, _ = study.get(
-                        library.cache,
+                        library.writable_cache,
                         kind,
                         params,
                         progress=lambda done, total: _counted(job, done, total),
@@ -186,7 +188,7 @@ def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
         return
     with in_turn(job, "packing", packing):
         if "scene" in packing:
-            study.get(library.cache, kinds.PACKING, packing)
+            study.get(library.writable_cache, kinds.PACKING, packing)
         else:
             _compact(job, library, packing)
 
@@ -206,7 +208,7 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
         job.stage = f"compressing, step {glimpse.step}"  # other numbers are next to the picture
         feed.add(glimpse)
 
-    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=look)
+    study.get(library.writable_cache, kinds.PACKING, packing, progress=tell, watch=look)
 
 
 def _counted(job: Job, done: float, total: float | None, begin: float = PACKING_SHARE) -> None:

@@ -85,7 +85,7 @@ class Library:
     ) -> None:
         """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache.
 
-        kept: cells in memory.
+        cells_in_memory: the number of cells kept in memory.
         """
         self.notes: list[str] = []  # one line for each store that cannot be used
         shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
@@ -110,7 +110,7 @@ class Library:
         return [store for store in (self.shipped, self.cache) if store is not None]
 
     @property
-    def cache(self) -> Store:
+    def writable_cache(self) -> Store:
         """The cache, where computed results are stored; InputError without one."""
         if self.cache is None:
             raise InputError("no cache folder can be written, so nothing can be computed")
@@ -215,7 +215,7 @@ class Library:
 
     def lend_packing(self, params: Parameters) -> None:
         """Copy a packing from the shipped store to the cache, so that it is not made again."""
-        cache = self.cache
+        cache = self.writable_cache
         if self.shipped is not None:
             dataset = study.load(self.shipped, kinds.PACKING, params)
             if dataset is not None:

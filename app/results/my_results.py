@@ -12,7 +12,7 @@ from .library import SOURCES, Library
 
 def rows(library: Library) -> list[dict[str, Any]]:
     """A dict per computation in the cache, newest first: entry, name, kind, time, MB."""
-    store = library.cache
+    store = library.writable_cache
     known, entries = names(store), store.entries()
     cells = [cell for cell in library.cells() if cell.store is store]
     packings = {entry.name: entry for entry in entries}
@@ -36,7 +36,7 @@ def rows(library: Library) -> list[dict[str, Any]]:
 
 def delete(library: Library, name: str) -> None:
     """Delete a computation from the cache, and its packing with all results on it alone."""
-    store = library.cache
+    store = library.writable_cache
     entry = store.entry(name)
     if entry is None or entry.kind not in SOURCES:
         raise InputError("that computation is no longer in the cache")

@@ -42,7 +42,7 @@ class Mine(Scripted):
                         state.show(cell)
             case {"call": [str(entry), str(name)]} if entry in known:
                 try:
-                    entry_labels.call(state.library.cache, entry, name)
+                    entry_labels.call(state.library.writable_cache, entry, name)
                 except InputError as error:
                     state.work.message = str(error)
                 self._list()
