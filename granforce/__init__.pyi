@@ -37,8 +37,8 @@ from granforce.explore.pull import Pull as Pull
 from granforce.explore.pull import Reach as Reach
 from granforce.explore.pull import pull as pull
 from granforce.explore.pull import reach as reach
-from granforce.explore.random_walk import Found as Found
 from granforce.explore.random_walk import Walk as Walk
+from granforce.explore.random_walk import WalkState as WalkState
 from granforce.explore.random_walk import walk as walk
 from granforce.explore.stress_outline import StressOutline as StressOutline
 from granforce.explore.stress_outline import admissible_stress as admissible_stress
