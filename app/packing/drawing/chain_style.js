@@ -91,7 +91,7 @@ export class Look {
   contact(k, { mixed, seen, low, high }) {
     const { walk, exact } = this, c = walk.contact[k]
     const n = mixed.normal[c], t = mixed.tangential[c]
-    const coloured = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
+    const interval = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
       ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
