@@ -145,6 +145,6 @@ def test_a_contact_given_twice_is_refused():
         packing.r,
     )
     forces = np.vstack([packing.forces, packing.forces[3]])
-    with pytest.raises(InputError, match=r"contacts 3 and .* are one"):
+    with pytest.raises(InputError, match=r"contacts 3 and .* are the same"):
         make_packing(packing.x, packing.r, packing.box, turned, forces, packing.mu, 1.0)
     assert len(two_disks().contacts.i) == 2  # two images of one disk are two contacts

@@ -180,7 +180,7 @@ def test_frames_of_contacts_that_nothing_tells_apart_are_refused(made, rng):
     with pytest.raises(InputError, match=r"ids restart 2 times.*add a column for the frame"):
         read(columns(grains + grains, 1, 2, 3, 4, 5), columns(mixed + mixed, 1, 2, 3, 4))
     three = [[k, *row[1:]] for k in (1, 2, 3) for row in rows]
-    with pytest.raises(InputError, match=r"restart 2 times, and adjacency.txt has 3 frames"):
+    with pytest.raises(InputError, match=r"restart 2 times, but adjacency.txt has 3 frames"):
         read(columns(grains + grains, 1, 2, 3, 4, 5), three)
 
 

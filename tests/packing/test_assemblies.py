@@ -93,7 +93,7 @@ def test_a_contact_given_twice_is_refused_unless_its_places_differ():
         return gf.make_packing(x, r, [np.inf, np.inf], contacts, forces, 0.5)
 
     assert len(made([-1.0, 1.0]).contacts.i) == 2
-    with pytest.raises(gf.InputError, match="contacts 0 and 2 are one"):
+    with pytest.raises(gf.InputError, match="contacts 0 and 2 are the same"):
         made([-1.0, 1.0, -1.0])
 
 

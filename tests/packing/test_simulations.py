@@ -133,7 +133,7 @@ def snapshots_of(name, files, options):
 
 def test_a_single_frame_that_is_cut_off_is_refused():
     text = particles(100)
-    with pytest.raises(InputError, match="8 rows where 9 are announced; is the file cut off"):
+    with pytest.raises(InputError, match="8 rows, but 9 are announced; is the file cut off"):
         read_lammps(*given(text[: text.rindex("\n9 1")], contacts(100, 1.0)), MU)
 
 
