@@ -60,7 +60,7 @@ def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     page.get_by_role("button", name="Cancel").filter(visible=True).first.wait_for()
     assert findings(page) == []
     page.get_by_role("button", name="Cancel").filter(visible=True).first.click()
-    until(page, "!scene.hand.player.model.asked")
+    until(page, "!scene.hand.player.model.requested")
     assert page.get_by_label("Disks N").first.input_value() == "30"
 
 
