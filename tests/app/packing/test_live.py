@@ -154,7 +154,7 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(visited):
     second.ask(asked(0.24, 400), at_once=True)
     assert second.work.live is not first.work.live
     two.run(lambda: second.growing)
-    assert second.seen is first.seen  # not computed anew
+    assert second.shown is first.shown  # not computed anew
     two.run(
         lambda: "already under way" in second.work.progress.get("words", "") or not second.work.busy
     )
