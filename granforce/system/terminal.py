@@ -76,12 +76,12 @@ class Bar:
     """A tqdm bar on stderr that a progress(done, total) callable drives; invisible until used."""
 
     _drawn: ClassVar[set[int]] = set()  # those whose line has not ended
-    _restarts: ClassVar[int] = 0
+    restarts: ClassVar[int] = 0
 
     @classmethod
     def restart(cls) -> None:
         """Let the clocks of all bars begin at their next call: rates exclude the time until now."""
-        cls._restarts += 1
+        cls.restarts += 1
 
     @classmethod
     def line_end(cls) -> str:
@@ -91,7 +91,7 @@ class Bar:
     def __init__(self, label: str, unit: str) -> None:
         # Created now, so that its rate counts from the beginning, and shown at the first call.
         self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, delay=math.inf)
-        self._restarted = Bar._restarts
+        self._restarted = Bar.restarts
 
     def __enter__(self) -> Self:
         return self
@@ -106,8 +106,8 @@ class Bar:
         self.bar.delay, self.bar.total = 0, total
         # Set, not added: quarters of cells would turn integers into 2.0.
         self.bar.n = int(done) if done == int(done) else done
-        if self._restarted != Bar._restarts:
-            self._restarted = Bar._restarts
+        if self._restarted != Bar.restarts:
+            self._restarted = Bar.restarts
             self.bar.unpause()
             self.bar.start_t, self.bar.initial = self.bar.last_print_t, self.bar.n
             self.bar.last_print_n = self.bar.n

@@ -300,7 +300,7 @@ def test_cache_commands(run):
     assert len(json.loads(run("cache", "list", "--json")[1])) == 1
     for kind in ("wlk", "", "*"):
         code, out, err = run("cache", "verify", "--kind", kind)
-        assert (code, out, err.count("\n")) == (2, "", 1) and "there are packing, walk" in err
+        assert (code, out, err.count("\n")) == (2, "", 1) and "choose one of packing, walk" in err
 
 
 @pytest.mark.parametrize("action", ["list", "size", "verify", "clear"])

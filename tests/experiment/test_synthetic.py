@@ -50,7 +50,7 @@ def test_a_frame_in_files_is_the_same(tmp_path):
     two = read_pegs(frame, mu=0.3, reach=0.1, repair=0.5)
     assert one.report["frame"] == two.report["frame"] == 4
     assert one.report["contacts_listed"] == two.report["contacts_listed"]
-    with pytest.raises(InputError, match="is 4"):
+    with pytest.raises(InputError, match="is frame 4"):
         read_pegs(frame, mu=0.3, frame=5)
 
 

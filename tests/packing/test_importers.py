@@ -516,7 +516,7 @@ def other_force(rows):
         (lambda: contact_text("\n110 400 1.49", "\n110 400 1.45"), "line 10: centre distance 1.45"),
         (lambda: contact_text("\n110 400 1.49", "\n110 110 1.49"), "line 10: .* at the same point"),
         (lambda: contact_text("0.000310905322829523", "1e999"), "line 10: fy is '1e999'"),
-        (lambda: rewritten(contacts=swapped_columns), "normal force does not point .* columns="),
+        (lambda: rewritten(contacts=swapped_columns), "normal force does not point .* columns"),
         (lambda: rewritten(contacts=other_force), "given before .* with another force"),
     ],
 )  # fmt: skip

@@ -58,8 +58,8 @@ def whole(packing):
     """What is taken must be a packing throughout."""
     c, r = packing.contacts, packing.r
     assert c.levers is None  # of disks
-    arrays = (packing.x, r, packing.forces, packing.load, *c[:-1])
-    assert all(np.all(np.isfinite(array)) for array in arrays)
+    arrays = (packing.x, r, packing.forces, packing.load, *c)
+    assert all(np.all(np.isfinite(array)) for array in arrays if array is not None)
     assert np.all(r > 0) and np.all(packing.box > 2 * r.max()) and packing.mu >= 0
     assert np.all((c.i != c.j) & (np.minimum(c.i, c.j) >= 0) & (np.maximum(c.i, c.j) < len(r)))
     assert np.all(np.abs(np.hypot(*c.normal.T) - 1) < 1e-6)

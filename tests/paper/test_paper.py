@@ -384,7 +384,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     documents.renew([path], table, told, found)
     assert page.read_text() == text
     page.write_text(blocks.format("everything"))
-    with pytest.raises(InputError, match="no table 'everything'"):
+    with pytest.raises(InputError, match="unknown table 'everything'"):
         documents.renew([path], table, told, found)
 
 

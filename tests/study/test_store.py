@@ -665,7 +665,7 @@ def test_what_is_not_a_store_is_refused(tmp_path):
     for readonly in (False, True):
         with pytest.raises(InputError, match="is a file, not a store"):
             open_store(tmp_path / "file", readonly=readonly)
-        with pytest.raises(InputError, match=r"holds 'thesis\.tex'"):
+        with pytest.raises(InputError, match=r"contains 'thesis\.tex'"):
             open_store(tmp_path / "home", readonly=readonly)
         with pytest.raises(InputError, match=r"holds 'zarr\.json'"):
             open_store(tmp_path / "foreign", readonly=readonly)

@@ -67,7 +67,7 @@ def test_contacts_worth_measuring_are_numbered(visit):
 
 def test_a_contradiction_in_a_link_is_one_line(visit):
     page = visit("?known=4:0.5~9:80")
-    page.get_by_role("alert").filter(has_text="agrees with").wait_for()
+    page.get_by_role("alert").filter(has_text="satisfies all known forces").wait_for()
     assert page.locator(".chip").count() == 0
 
 

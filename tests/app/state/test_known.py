@@ -128,10 +128,10 @@ def test_contradictions_are_one_clear_line_and_taken_back(state, visited):
     before = state.knowledge.known
     state.knowledge.known = [*before, Statement(9, 30.0)]
     wait_for(state)
-    assert "agrees with" in state.work.message and "\n" not in state.work.message
+    assert "satisfies all known forces" in state.work.message and "\n" not in state.work.message
     assert state.knowledge.known == before and state.knowledge.narrowed.known == tuple(before)
     other = visited(state.link().split("&hold")[0] + "&hold=9:30")
-    assert "agrees with" in other.work.message and not other.knowledge.known
+    assert "satisfies all known forces" in other.work.message and not other.knowledge.known
 
 
 def test_what_is_left_no_room_for_is_refused_at_once(state):
