@@ -191,13 +191,14 @@ export class QuantityPlot {
   }
 
   move(px, py) {
+    if (!this.x) return // not laid out yet
     if (this.movable === "marker") this.hears.marker(this.x.value(px))
     if (this.movable === "dot") this.hears.dot(this.x.value(px), this.y ? this.y.value(py) : 0)
   }
 
   key(event) {
     const [right, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? []
-    if (right === undefined || !this.movable) return
+    if (right === undefined || !this.movable || !this.x) return // or not laid out yet
     event.preventDefault()
     event.stopPropagation()
     if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up))
