@@ -69,8 +69,8 @@ def whole(packing):
 def whole_frame(found):
     """The same of a packing and its measured forces."""
     packing, c = found.packing, found.packing.contacts
-    arrays = (packing.x, packing.r, packing.forces, *c[:-1])
-    assert all(np.all(np.isfinite(array)) for array in arrays)
+    arrays = (packing.x, packing.r, packing.forces, *c)
+    assert all(np.all(np.isfinite(array)) for array in arrays if array is not None)
     assert np.all(packing.r > 0) and len(found.ids) == len(packing.r)
     assert np.all((c.i != c.j) & (np.minimum(c.i, c.j) >= 0))
     assert np.all(np.maximum(c.i, c.j) < len(packing.r))

@@ -667,7 +667,7 @@ def test_what_is_not_a_store_is_refused(tmp_path):
             open_store(tmp_path / "file", readonly=readonly)
         with pytest.raises(InputError, match=r"contains 'thesis\.tex'"):
             open_store(tmp_path / "home", readonly=readonly)
-        with pytest.raises(InputError, match=r"holds 'zarr\.json'"):
+        with pytest.raises(InputError, match=r"contains 'zarr\.json'"):
             open_store(tmp_path / "foreign", readonly=readonly)
     with pytest.raises(InputError, match="empty, not a store"):
         open_store(tmp_path / "empty", readonly=True)
