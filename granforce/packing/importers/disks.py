@@ -81,7 +81,7 @@ def enclosed(
 ) -> Packing:
     """A packing without forces, with walls and gravity as in `from_disks`.
 
-    Raises InputError in a periodic box, or if no disk touches a wall.
+    Raises InputError in a periodic box, without gravity and loads, or if no disk touches a wall.
     """
     gravity = positive(gravity, "gravity", or_zero=True, most=LARGEST_UNIT)
     if walls is None and not gravity:
@@ -96,6 +96,8 @@ def enclosed(
     behind = places_behind(packing.x, packing.r, segments, largest_gap(tolerance))
     if not len(behind.disk):
         raise InputError("no disk touches a wall; correct the walls, or raise the tolerance")
+    if not load.any():  # NaN counts: an open balance may press
+        raise InputError("nothing presses on the walls: add --gravity 1 (gravity=1), or loads")
     r = np.concatenate([packing.r, behind.r])
     outer = make_contacts(
         behind.disk,
