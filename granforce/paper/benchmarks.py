@@ -1,25 +1,16 @@
 """The benchmark's tables in documents, between <!-- bench: PART --> and <!-- end -->."""
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from granforce.paper import filled
 from granforce.paper.formatting import markdown_table
 from granforce.records import InputError, brief
-from granforce.system.files import content_of, written
+from granforce.system.files import content_of
 
-MARK = re.compile(r"(<!-- bench: (\w+) -->\n).*?(<!-- end -->)", re.S)
-
-
-def named(files: str | None) -> list[Path]:
-    """The paths of files separated by commas, or none; InputError for files without a mark."""
-    paths = [Path(name) for name in (files or "").split(",") if name]
-    for path in paths:
-        if not path.is_file() or not MARK.search(path.read_text()):
-            raise InputError(f"--documents: {path} is no file with <!-- bench: … --> in it")
-    return paths
+KIND = "bench"
 
 
 def load(path: str) -> dict[str, Any]:
@@ -35,10 +26,7 @@ def load(path: str) -> dict[str, Any]:
 
 def renew(paths: Sequence[Path], results: Mapping[str, Any]) -> None:
     """Write the tables into files with marks."""
-    for path in paths:
-        renewed = MARK.sub(lambda m: m[1] + _table(results.get(m[2])) + m[3], path.read_text())
-        with written(path) as file:
-            file.write(renewed.encode())
+    filled.renew(paths, KIND, lambda path, part: _table(results.get(part)))
 
 
 def _table(rows: Any) -> str:

@@ -7,7 +7,6 @@ against μ), "others" (other measures at each μ), "highlights" (ten findings, o
 depend on the packing), "counts" (number of packings in each part).
 """
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from scipy import stats
 
 from granforce.measures import statistics
+from granforce.paper import filled
 from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
@@ -23,10 +23,9 @@ from granforce.paper.formatting import NOTHING, RAISED, markdown_table, with_err
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
-from granforce.system.files import written
 from granforce.types import Rows
 
-MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
+KIND = "study"
 
 _SWEPT_EXTENT = "sweeps 0.15 η3"
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
@@ -45,15 +44,6 @@ _HEADS = {
 }
 
 
-def named(files: str | None) -> list[Path]:
-    """The paths of files separated by commas, or none; InputError for files without a mark."""
-    paths = [Path(name) for name in (files or "").split(",") if name]
-    for path in paths:
-        if not path.is_file() or not MARK.search(path.read_text()):
-            raise InputError(f"--documents: {path} is not a file that contains <!-- study: … -->")
-    return paths
-
-
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
     """Write the study's tables, judged claims and findings into files with marks.
 
@@ -70,13 +60,13 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "findings": lambda: finding_table(findings),
         "counts": lambda: counts(table),
     }
-    for path in paths:
-        text = path.read_text()
-        for name in {name for _, name, _ in MARK.findall(text)} - set(known):
+
+    def text_of(path: Path, name: str) -> str:
+        if name not in known:
             raise InputError(f"{path}: unknown table {name!r}; choose one of {', '.join(known)}")
-        renewed = MARK.sub(lambda m: m[1] + known[m[2]]() + m[3], text)
-        with written(path) as file:
-            file.write(renewed.encode())
+        return known[name]()
+
+    filled.renew(paths, KIND, text_of)
 
 
 def measures(table: StudyTable) -> str:
@@ -350,7 +340,7 @@ def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
 
 
 def _cell(rows: Rows, name: str, factor: float, form: str | None, expected: int) -> str:
-    """Mean ± standard error over rows, and their number if it is not the wanted one."""
+    """Mean ± standard error over rows, and their number if it is not the expected one."""
     numbers = np.array([row[name] for row in rows if name in row], dtype=float)
     values = factor * numbers[np.isfinite(numbers)]
     if not len(values):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from granforce.packing.compaction import number_of_disks
-from granforce.paper import claims, documents, drawings, findings, tables
+from granforce.paper import claims, documents, drawings, filled, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, friction, positive, whole, worker_count
@@ -41,7 +41,7 @@ def main(arguments: argparse.Namespace) -> int:
     worker_count(arguments.workers, "--workers")
     if arguments.minutes is not None:
         positive(arguments.minutes, "--minutes")
-    renewed = documents.named(arguments.documents)
+    renewed = filled.named(arguments.documents, documents.KIND)
     if arguments.status:
         return status(arguments)
     _check_apart(arguments)

@@ -14,7 +14,7 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
-from granforce.paper import claims, documents, drawings, findings, tables
+from granforce.paper import claims, documents, drawings, filled, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, verdicts
 from granforce.records import InputError
@@ -373,7 +373,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "others", "sweeps", "preparation", "counts", "claims", "findings")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
-    (path,) = documents.named(str(page))
+    (path,) = filled.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
     text = page.read_text()
     assert text.startswith("before\n<!-- study: measures -->\n| μ | packings |")

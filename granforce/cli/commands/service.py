@@ -139,9 +139,9 @@ def completion(arguments: argparse.Namespace) -> None:
 def bench(arguments: argparse.Namespace) -> None:
     """Print the benchmark's report, and update documents by it, or by that in a file."""
     from granforce.bench import main
-    from granforce.paper import benchmarks
+    from granforce.paper import benchmarks, filled
 
-    documents = benchmarks.named(arguments.documents)
+    documents = filled.named(arguments.documents, benchmarks.KIND)
     if arguments.table is None:
         results = main(arguments.out, arguments.quick, arguments.json)
     else:
