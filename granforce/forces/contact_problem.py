@@ -204,10 +204,7 @@ def make_system(ensemble: Ensemble) -> certified_values.System:
 
 
 def _new_system(ensemble: Ensemble) -> certified_values.System:
-    count, known, size = len(ensemble.index), ensemble.known, ensemble.per_contact
-    block = np.array([[0.5, 0.5], [0.5, -0.5]])[:size]
-    T = sparse.kron(sparse.identity(count), block, format="csc")
-    T.data *= ensemble.units[:, :size].ravel()[T.indices]
+    count, known, T = len(ensemble.index), ensemble.known, ensemble.from_cones
     A, b = (ensemble.A @ T).tocsr(), ensemble.b / ensemble.force_scale
     loads = ensemble.A.tocsc()[:, :: ensemble.per_contact]
     sides = slice(len(b), len(b) + (0 if known is None else len(known.contact)))

@@ -101,6 +101,15 @@ class Ensemble:
         return knowledge.units(self.slopes)
 
     @property
+    def from_cones(self) -> sparse.csc_matrix:
+        """T (unknowns, 2 N_c): forces T y, in ⟨f_n⟩, of y = f_n ± f_t/μ."""
+        size = self.per_contact
+        block = np.array([[0.5, 0.5], [0.5, -0.5]])[:size]
+        T = sparse.kron(sparse.identity(len(self.index)), block, format="csc")
+        T.data *= self.units[:, :size].ravel()[T.indices]
+        return T
+
+    @property
     def informed(self) -> Mask:
         """Mask (N_c,) of contacts with a known force, besides f_t = 0 for want of friction."""
         if self.known is None:
@@ -200,9 +209,7 @@ class Ensemble:
         if self.mu == 0:
             T = sparse.identity(self.A.shape[1], format="csc")
         else:
-            block = np.array([[0.5, 0.5], [0.5, -0.5]])
-            T = sparse.kron(sparse.identity(len(self.index)), block, format="csc")
-            T.data *= self.units.ravel()[T.indices]
+            T = self.from_cones
         return sparse.csc_matrix(self.A @ T), T
 
     @cached_property
