@@ -48,7 +48,7 @@ class Scale {
 export class QuantityPlot {
   /** axes: {x, y}, y null for a single quantity. hears: {marker(value), dot(x, y)}: called when dragged. */
   constructor(host, { x, y = null }, hears) {
-    Object.assign(this, { host, axes: { x, y }, hears, movable: null, state: {} })
+    Object.assign(this, { host, axes: { x, y }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
     this.frame = element(svg, "g")
     this.exact = element(svg, "path", { class: "exact" })
@@ -152,9 +152,12 @@ export class QuantityPlot {
     text.textContent = what.words
   }
 
-  /** The handle that can be dragged: "marker", "dot" or none. */
+  /** The handle that can be dragged: none before the plot is laid out. */
+  get movable() { return this.x ? this.allowed : null }
+
+  /** Allow a handle to be dragged: "marker", "dot" or none. */
   allow(handle) {
-    this.movable = handle
+    this.allowed = handle
     for (const [one, group] of [["marker", this.marker.group], ["dot", this.dot]]) {
       group.setAttribute("tabindex", one === handle ? 0 : -1)
       group.classList.toggle("movable", one === handle)
@@ -191,14 +194,13 @@ export class QuantityPlot {
   }
 
   move(px, py) {
-    if (!this.x) return // not laid out yet
     if (this.movable === "marker") this.hears.marker(this.x.value(px))
     if (this.movable === "dot") this.hears.dot(this.x.value(px), this.y ? this.y.value(py) : 0)
   }
 
   key(event) {
     const [right, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? []
-    if (right === undefined || !this.movable || !this.x) return // or not laid out yet
+    if (right === undefined || !this.movable) return
     event.preventDefault()
     event.stopPropagation()
     if (this.movable === "marker") return this.hears.marker(this.x.step(this.state.marker.value, right || up))
