@@ -261,12 +261,12 @@ def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
 
 
 def cell_of(cells: Sequence[Cell], selection: Selection | None) -> Cell | None:
-    """The cell of the wanted Selection, or None."""
+    """The cell of the Selection, or None."""
     return next((c for c in cells if selection is not None and c.selection.names(selection)), None)
 
 
 def best_cell(cells: Sequence[Cell], selection: Selection | None = None) -> Cell | None:
-    """The cell of the wanted Selection, or the best one to open; None without cells."""
+    """The cell of the Selection, or the best one to open; None without cells."""
     best = cell_of(cells, selection)
     if best is not None or not cells:
         return best

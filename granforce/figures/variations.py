@@ -57,7 +57,7 @@ def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
 def opened(rows: Rows, packed: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """η2 and 0.15 η3 of frictionless packings whose cones are opened to μ.
 
-    rows: dicts with mu (of the cones), eta2, eta3; own: the same for packings made at that μ.
+    rows: dicts with mu (of the cones), eta2, eta3; packed: the same for packings made at that μ.
     """
     sources = (("made at μ = 0", rows, "solid"), ("made at μ", packed, "dashed"))
     names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))

@@ -182,9 +182,9 @@ def nearly_touching(gaps: Sequence[float], tolerance: float) -> str:
     )
 
 
-def _legend(names: Sequence[str] | None) -> str:
+def _legend(names: Sequence[str]) -> str:
     """Numbers of bodies with their names, where these differ."""
-    if names is None or list(names) == [str(k) for k in range(len(names))]:
+    if list(names) == [str(k) for k in range(len(names))]:
         return ""
     listed = brief_list([f"{k} {name}" for k, name in enumerate(names)])
     return f"; the bodies are {listed}"

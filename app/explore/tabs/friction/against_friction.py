@@ -65,7 +65,7 @@ class AgainstFriction:
         self.points.append(draw_means(fig, line.label, columns, k, rows, line_dash=line.dash))
 
     def mark(self, points_of_page: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
-        """Open symbols at `own` points, of each line, and rings at `here`, (μ, value)."""
+        """Open symbols at the points of the page, of each line, and rings at `here`, (μ, value)."""
         for source, points in zip(self.page_sources, points_of_page, strict=True):
             x, y, _ = shown(points)
             source.data = {"x": x, "y": y}

@@ -72,7 +72,7 @@ class BarsFigure:
     ) -> int:
         """Draw these contacts; return how many bars extend beyond the axis.
 
-        before: exact bounds without known forces; own: forces in units of that as packed.
+        before: exact bounds without known forces; relative: forces in units of that as packed.
         """
         self.contacts = contacts
         original = replay.normal[0, contacts]

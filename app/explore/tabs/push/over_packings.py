@@ -24,7 +24,7 @@ LINES = {"critical_force": "critical force", "limit_load": "limit load"}
 def responses(page_rows: list[Row]) -> tuple[list[Figure], str, str]:
     """⟨F_crit⟩, limit load and α against η2, joined in order of μ: figures, lead and caption.
 
-    own: rows of the page's packings, drawn as open symbols.
+    page_rows: rows of the page's packings, drawn as open symbols.
     """
     table = study_data.study()
     study = [] if table is None else table.answers()
