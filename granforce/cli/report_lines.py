@@ -119,7 +119,8 @@ MEANINGS = {
     "critical_factor_low": "largest multiple at which bodies stayed at rest",
     "critical_factor_high": "smallest multiple at which they moved, or the load factor",
     "breach": "violation of Coulomb's law by the first motion, relative to the fastest contact",
-    "converged": "whether the two critical factors are close and the motion is steady",
+    "precision": "requested distance of the two critical factors, as a fraction of the load factor",
+    "converged": "whether the two critical factors are that close and the motion is steady",
     "measured_components": "number of measured f_n and f_t",
     "measured_where_nothing_can_carry": "measured f_n and f_t outside the backbone, ignored",
     "chi_square": "χ² of the likeliest network",
@@ -174,7 +175,7 @@ LIMIT_LOADS = (
 )
 LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
-    *("critical_factor_high", "residual", "breach", "converged"),
+    *("critical_factor_high", "precision", "residual", "breach", "converged"),
 )
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),

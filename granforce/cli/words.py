@@ -487,6 +487,13 @@ def add_load_factor(commands: Commands) -> None:
         action="store_true",
         help="also raise the load, starting from the packing's own forces, until bodies move",
     )
+    command.add_argument(
+        "--precision",
+        type=float,
+        default=1e-4,
+        help="precision of the critical factor, as a fraction of the load factor (default 0.0001)",
+    )
+    command.leaves_out("without --critical", lambda given: not given.critical, {"precision"})
 
 
 def add_stress(commands: Commands) -> None:

@@ -26,6 +26,7 @@ from granforce.motion.inertia import make_step
 from granforce.motion.works import follow, relax
 from granforce.numerics.certified_values import most_under
 from granforce.perturb.critical_force import (
+    LEAST_PRECISION,
     STEADY,
     STEADY_STEPS,
     Protocol,
@@ -34,10 +35,21 @@ from granforce.perturb.critical_force import (
     motion_of,
     raised,
 )
-from granforce.records import InputError, Packing, UndecidedError, brief, float_array, takes
+from granforce.records import (
+    InputError,
+    Packing,
+    UndecidedError,
+    brief,
+    float_array,
+    positive,
+    takes,
+)
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats
+
+# Precision of a critical load by default, and the coarsest, as fractions of the load factor.
+LOAD_PRECISION, MOST_LOAD_PRECISION = 1e-4, 0.1
 
 
 @notebook.brief
@@ -56,6 +68,7 @@ class CriticalLoad(NamedTuple):
 
     low: float  # largest λ that ended at rest
     high: float  # smallest λ that did not, or the load factor if none was tried
+    precision: float  # of the bracket, high − low, as a fraction of the load factor
     load_factor: float  # λ
     load: Floats  # (N, 3) the load, force and torque
     forces: Floats  # (contacts, 2) equilibrium under `low`, on all contacts of the packing, force
@@ -64,7 +77,7 @@ class CriticalLoad(NamedTuple):
     displacement: Floats  # (N, 2) the first motion, rms |u| = 1; NaN for fixed bodies
     rotation: Floats  # (N,) rotation times radius; NaN likewise
     breach: float  # of Coulomb's law by that motion, relative to the fastest contact
-    converged: bool  # high − low ≤ precision, and the motion is steady
+    converged: bool  # high − low ≤ precision · load_factor, and the motion is steady
     counts: dict[str, float]  # as in CriticalForce
 
 
@@ -111,23 +124,27 @@ def critical_load(
     ensemble: Ensemble,
     load: npt.ArrayLike | str = "horizontal",
     *,
+    precision: float = LOAD_PRECISION,
     cancel: Cancel | None = None,
     **protocol: Any,
 ) -> CriticalLoad:
     """The largest λ at which bodies stay at rest as λ times a load is raised, and the motion.
 
     load: as for `load_factor`. The start is the packing's own network: another one may give another
-    critical load. protocol: fields of Protocol; `precision` is that of λ times the largest force of
-    the load, in ⟨f_n⟩. cancel() returning True raises Cancelled.
+    critical load. precision: of the bracket, as a fraction of the load factor. protocol: the other
+    fields of Protocol. cancel() returning True raises Cancelled.
 
-    Raises the errors of `load_factor`, and InputError if no load moves the bodies.
+    Raises the errors of `load_factor`, and InputError if no load moves the bodies, and for a
+    precision finer than that of the load factor.
     """
     S, asked = with_idle(ensemble), checked(Protocol(**protocol))
+    precision = positive(precision, "precision", most=MOST_LOAD_PRECISION)
     limit = _limit(S, load)
     if not np.isfinite(limit.factor):
         raise InputError("this load has no limit: no multiple of it moves the bodies")
     direction, unit = _direction(S, limit.load)
     unit /= S.force_scale
+    asked = asked._replace(precision=_bracket(limit, precision, unit))
     step, start = make_step(S), starting_network(S) / S.force_scale
     push = Push(start, 0, 0.0, STEADY_STEPS, STEADY, direction)
     ends: list[Raised] = []
@@ -143,6 +160,7 @@ def critical_load(
     return CriticalLoad(
         low=found.low / unit,
         high=found.high / unit,
+        precision=precision,
         load_factor=limit.factor,
         load=limit.load,
         forces=S.expand(forces),
@@ -154,6 +172,18 @@ def critical_load(
         converged=bool(found.high - found.low <= asked.precision and moving.converged),
         counts={name: n for name, n in found.counts.items() if name != "seconds"},
     )
+
+
+def _bracket(limit: LoadFactor, precision: float, unit: float) -> float:
+    """Width of the bracket in ⟨f_n⟩, for a fraction of the load factor; unit: λ = 1 in ⟨f_n⟩."""
+    if limit.factor == 0:  # the bracket has no width
+        return LEAST_PRECISION
+    if precision * limit.factor * unit < LEAST_PRECISION:
+        raise InputError(
+            f"the load factor {limit.factor:.6g} is known to {LEAST_PRECISION / unit:.1g} only: "
+            f"precision must be at least {LEAST_PRECISION / unit / limit.factor:.1g}"
+        )
+    return precision * limit.factor * unit
 
 
 def _motion(S: Ensemble, moving: Outcome) -> tuple[Floats, Floats]:

@@ -48,7 +48,7 @@ LINES = {
     "limit-loads": [MU, "p.npz", f"{MU} --slice 0,0.9,0,0.9"],
     "load-factor": [
         "blocks.npz --load horizontal",
-        "blocks.npz --load horizontal --critical",
+        "blocks.npz --load horizontal --critical --precision 0.01",
     ],
     "stress": [f"{MU} --angles 4", "p.npz --angles 4"],
     "perturb": [

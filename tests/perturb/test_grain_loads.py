@@ -56,8 +56,25 @@ def test_the_critical_load_of_a_wall_is_at_rest_and_below_its_limit():
     assert 0.55 < found.low < 0.57
     blocks = ~np.isnan(found.displacement[:, 0])
     assert blocks.sum() == 55 and found.displacement[blocks, 0].max() > 0.5
+    assert found.high - found.low <= found.precision * found.load_factor * (1 + 1e-9)
     again = gf.critical_load(S, "horizontal", precision=0.003)
     assert (again.low, again.high) == (found.low, found.high)
+
+
+@pytest.mark.parametrize("precision", [None, 0.02, 1e-6])
+@pytest.mark.parametrize("thickness", [0.12, 0.3])
+def test_the_precision_of_a_critical_load_is_relative_to_the_load_factor(thickness, precision):
+    S = gf.ensemble(gf.scene("arch", 0.6, thickness=thickness))
+    found = gf.critical_load(S, **({} if precision is None else {"precision": precision}))
+    assert found.precision == (precision or 1e-4)
+    assert found.converged and found.low > 0
+    assert found.high - found.low <= found.precision * found.load_factor * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("precision", [0, -1, 0.5, np.nan, 1e-12])
+def test_a_precision_that_cannot_be_reached_is_refused(precision):
+    with pytest.raises(gf.InputError, match="precision must be"):
+        gf.critical_load(gf.ensemble(gf.scene("slope")), precision=precision)
 
 
 def test_a_push_between_two_blocks_is_a_load():

@@ -151,10 +151,11 @@ def load_factor(arguments: argparse.Namespace) -> None:
     lines: dict[str, Any] = {"bodies": bodies, "contacts": len(S.packing.contacts.i)}
     lines |= {"load_factor": limit.factor, "certified_error": limit.gap}
     if arguments.critical:
-        critical = grain_loads.critical_load(S, arguments.load)
+        critical = grain_loads.critical_load(S, arguments.load, precision=arguments.precision)
         lines |= {
             "critical_factor_low": critical.low,
             "critical_factor_high": critical.high,
+            "precision": critical.precision,
             "residual": critical.residual,
             "breach": critical.breach,
             "converged": critical.converged,
