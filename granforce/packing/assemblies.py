@@ -60,15 +60,16 @@ def blocks(
     """A Packing of rigid bodies, with the admissible network nearest to equal normal forces.
 
     bodies: corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for
-    each. mu: friction coefficient, or those (N_c,) of all contacts. fixed: numbers of the bodies
-    that cannot move. weights (N,): by default the areas; masses are in proportion, and gravity
-    points along −y. materials (N,): labels of the materials of the bodies, and friction: μ of pairs
-    of them if it is not mu, {("stone", "wood"): 0.4, …}. tolerance: distance up to which surfaces
-    touch or may overlap, in the unit of the bodies; by default TOUCHING times the largest body.
-    balanced: whether to look for a network; otherwise forces are 0, even if nothing balances. An
-    edge on an edge touches at both ends of the shared part. Doubtful pairs are listed in info:
-    corner_on_corner [i, j], which have no normal and no contact, and nearly_touching [i, j, gap],
-    up to 100 tolerances apart. names: of the bodies, for messages; by default their numbers.
+    each; a fixed body may be a thin wall, (2, 2). mu: friction coefficient, or those (N_c,) of all
+    contacts. fixed: numbers of the bodies that cannot move. weights (N,): by default the areas;
+    masses are in proportion, and gravity points along −y. materials (N,): labels of the materials
+    of the bodies, and friction: μ of pairs of them if it is not mu, {("stone", "wood"): 0.4, …}.
+    tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
+    default TOUCHING times the largest body. balanced: whether to look for a network; otherwise
+    forces are 0, even if nothing balances. An edge on an edge touches at both ends of the shared
+    part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
+    contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. names: of the bodies, for
+    messages; by default their numbers.
 
     Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights.
     """
@@ -77,6 +78,9 @@ def blocks(
     if not outlines:
         raise InputError("there are no bodies; give at least one")
     held = _fixed(fixed, len(outlines))
+    thin = np.array([body.shape == (2, 2) for body in outlines])
+    for k in np.flatnonzero(thin & ~held)[:1]:
+        raise InputError(f"body {names[k]} has two corners; only a fixed body can be a thin wall")
     area, x, polar, r = (np.array(part) for part in zip(*map(_measured, outlines), strict=True))
     if materials is not None and len(materials) != len(outlines):
         raise InputError(f"give the material of each of the {len(outlines)} bodies")

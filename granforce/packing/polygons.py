@@ -37,9 +37,13 @@ class Meeting(NamedTuple):
 def polygon(corners: npt.ArrayLike, name: str) -> Floats:
     """The corners (k, 2) of a convex polygon, anticlockwise, without corners that do not bend it.
 
-    Raises InputError naming it if there are fewer than three, or it is not convex.
+    Two corners are kept: the ends of a thin wall, whose two edges face its two sides.
+
+    Raises InputError naming it if they lie on one line otherwise, or it is not convex.
     """
     corners = float_array(corners, (-1, 2), name)
+    if len(corners) == 2 and np.any(corners[0] != corners[1]):
+        return corners
     while len(corners) > 2:
         edges = np.roll(corners, -1, axis=0) - corners
         bend = _bends(np.roll(edges, 1, axis=0), edges)
@@ -76,7 +80,13 @@ def _bends(before: Floats, after: Floats) -> Floats:
 
 
 def moments(corners: Floats) -> tuple[float, Floats, float]:
-    """Area, centre of area (2,), and polar second moment of area about it, of a polygon (k, 2)."""
+    """Area, centre of area (2,), and polar second moment of area about it, of a polygon (k, 2).
+
+    Of two corners: length, middle, and polar second moment of length.
+    """
+    if len(corners) == 2:
+        length = float(np.hypot(*(corners[1] - corners[0])))
+        return length, corners.mean(axis=0), length**3 / 12
     first = corners.mean(axis=0)
     a = corners - first
     b = np.roll(a, -1, axis=0)
@@ -137,7 +147,7 @@ def disk_meets(x: Floats, r: float, corners: Floats, tolerance: float) -> Meetin
     """The Meeting of a disk, centre x (2,) and radius r, with a convex polygon (k, 2)."""
     sides = _Sides(corners, x[None])
     outside = int(np.argmax(sides.least))
-    if sides.least[outside] <= 0:
+    if sides.least[outside] < 0:
         return Meeting(float(sides.least[outside] - r), None, False)
     place = np.clip(sides.place[:, 0], 0.0, sides.length)
     nearest = sides.one + place[:, None] * sides.along

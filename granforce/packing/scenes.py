@@ -206,11 +206,11 @@ def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: fl
     grain[held] = len(lids) + np.arange(held.sum())
     grain[~held] = np.searchsorted(lids, wall[~held])
     stud, lid = STUD * r[disk[held]], STUD * r.max()
-    inwards = [_inwards(x, walls[k], away[wall == k]) for k in lids]
-    inwards = np.reshape(inwards, (-1, 2))
+    facing = [inwards(x, walls[k], away[wall == k]) for k in lids]
+    facing = np.reshape(facing, (-1, 2))
     load = np.full((len(lids) + len(stud), 3), np.nan)
-    load[: len(lids)] = np.column_stack([inwards * pressing[lids, None], np.zeros(len(lids))])
-    centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - inwards * lid
+    load[: len(lids)] = np.column_stack([facing * pressing[lids, None], np.zeros(len(lids))])
+    centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - facing * lid
     return Behind(
         disk=disk,
         grain=grain,
@@ -222,15 +222,15 @@ def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: fl
     )
 
 
-def _inwards(x: Floats, wall: Floats, away: Floats) -> Floats:
-    """Unit vector (2,) in which a wall presses: towards the disks, which touch it along away."""
+def inwards(x: Floats, wall: Floats, away: Floats) -> Floats:
+    """Unit vector (2,) in which a wall presses: towards the bodies, which touch it along away."""
     along = wall[2:] - wall[:2]
     across = np.array([-along[1], along[0]]) / np.hypot(*along)
     side = -away @ across
     if np.any(np.abs(side) < 1 - SNAPPED):
-        raise InputError("a disk touches the end of a wall that presses: make the wall longer")
+        raise InputError("a body touches the end of a wall that presses: make the wall longer")
     if np.any(side < 0) and np.any(side > 0):
-        raise InputError("disks lie on both sides of a wall that presses: move them to one")
+        raise InputError("bodies lie on both sides of a wall that presses: move them to one")
     if not len(side):
         side = (x - wall[:2]).mean(axis=0, keepdims=True) @ across
     return across * np.copysign(1.0, side[0])

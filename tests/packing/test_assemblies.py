@@ -350,11 +350,26 @@ def test_files_and_stores_carry_shapes(tmp_path):
     assert not {"levers", "mass", "friction_ratio"} & set(packing_dataset(disks))
 
 
+def test_a_thin_wall_bears_on_both_sides_and_at_its_ends():
+    crate, disk = rectangle(0, 0, 2, 1), [5, 0, 0.5]  # the disk is in line with the wall
+    thin = gf.blocks([crate, disk, [[-1, 0], [3, 0]]], 0.5, fixed=[1, 2])
+    thick = gf.blocks([crate, rectangle(-1, -1, 3, 0)], 0.5, fixed=[1])
+    np.testing.assert_allclose(thin.contact_points, thick.contact_points, atol=1e-12)
+    for end in range(2):
+        bounds = [gf.intervals(gf.ensemble(packing))[end] for packing in (thin, thick)]
+        np.testing.assert_allclose(*bounds, atol=1e-9)
+    walls = [[[0.5, -1], [0.5, 0]], [[1.5, 0], [1.5, -1]], [[-1, 1], [3, 1]]]
+    held = gf.blocks([crate, [3.5, 1, 0.5], *walls], 0.5, fixed=[1, 2, 3, 4])
+    ends = [[0.5, 0], [1.5, 0], [0, 1], [2, 1]]
+    assert sorted(np.round(held.contact_points, 12).tolist()) == sorted(ends)
+
+
 @pytest.mark.parametrize(
     "call, words",
     [
         (lambda: gf.blocks([], 0.5), "no bodies"),
         (lambda: gf.blocks([[[0, 0], [1, 0], [2, 0]]], 0.5), "body 0 needs three corners"),
+        (lambda: gf.blocks([[[0, 0], [1, 0]]], 0.5), "only a fixed body can be a thin wall"),
         (lambda: gf.blocks([[[0, 0], [2, 0], [1, 0.5], [1, 2]]], 0.5), "not convex"),
         (lambda: gf.blocks([[0, 0, -1]], 0.5), "above 0"),
         (
