@@ -1,7 +1,7 @@
 // The exact intervals of all normal forces in a small scene, with the present force in each. Only
 // changes are applied and nothing moving is laid out again, so that a frame is cheap.
 
-import { forceName, number } from "../model/sentences.js"
+import { number, placeName } from "../model/sentences.js"
 
 const SEEN = 0.03 // fraction of the rail: least width of a bar, to be visible next to the mark of the force
 
@@ -19,7 +19,7 @@ export class Bars {
     this.rows.forEach((row, c) => {
       const [low, high] = both[c], value = F[2 * c]
       row.tell("class", lit.has(c) ? "lit" : "")
-      row.tell("label", forceName(body.scene, 2 * c))
+      row.tell("label", placeName(body.scene, c))
       const wide = high - low < 1e-9 * body.scaleOf() ? 0 : Math.max(SEEN, (at(high) - at(low)) / 100)
       row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
       row.tell("dot", `translateX(${at(value)}%)`)

@@ -50,7 +50,8 @@ export function drawNames(arrows, F) {
     const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
     const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n)}`).find(fits) ?? number(n)
     const lines = [name, pressed, ...both]
-    write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
+    const side = Math.abs(ux) < 0.3 ? name.match(/(left|right) end/)?.[1] : ux > 0 ? "right" : "left" // away from the other end
+    write(x, py + 34 * uy, lines, { left: "right", right: "left" }[side] ?? "center")
   }
   const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])
   if (load > 1e-9) write(cx, cy - 0.55 * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")

@@ -1,12 +1,14 @@
 // The small scene: disks, walls, the force on each disk at each contact as an arrow within its
 // cone, and, for a highlighted disk, the closed polygon of its forces.
 
+import { shape } from "../model/contact_curves.js"
 import { distance, dot } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { ASIDE, drawNames, drawValues } from "./force_labels.js"
 import { circle, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is room
+const LONG = 0.27 // of the picture: largest radius
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // positions of the number: the centre, and around it
 const NAMED = 3 // most disks, and most contacts of a single one, for which the numbered components of forces are drawn
 
@@ -36,9 +38,11 @@ export class Arrows {
   fit(body, same = false) {
     this.body = body
     this.easel.measure()
-    const mean = body.sumAt(body.u) / body.count
+    const heaviest = Math.max(...body.scene.load.map(Math.abs)) // a weight on many contacts remains in the picture
+    const mean = Math.max(body.sumAt(body.u) / body.count || 0, heaviest / 2)
     const size = (body.scene.box[0] ? Math.min : Math.max)(...body.scene.r) // many arrows are shorter
-    this.forceUnit = (0.75 * size) / (Math.max(Math.abs(mean), 1e-6) || 1)
+    const long = same ? Math.min(size, LONG * Math.min(this.easel.wide, this.easel.high) / this.unit) : size
+    this.forceUnit = (0.75 * long) / Math.max(mean, 1e-6)
     if (same) return // in the builder only what is dragged moves
     const { scene } = body, { x, r, walls, box } = scene
     const xs = [], ys = []
@@ -54,7 +58,7 @@ export class Arrows {
     const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
     const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
     this.unit = Math.min(width / across, height / up)
-    this.unit = Math.min(this.unit, 0.27 * Math.min(width, height) / Math.max(...r))
+    this.unit = Math.min(this.unit, LONG * Math.min(width, height) / Math.max(...r))
     this.x0 = width / 2 - (this.unit * (left + right)) / 2
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
   }
@@ -113,7 +117,8 @@ export class Arrows {
     if (F) drawValues(this, F)
     if (body.scene.r.length > 1) this.drawNumbers()
     else if (F && body.count <= NAMED) drawNames(this, F)
-    if (look.carried) this.drawCarried(look.carried)
+    if (look.carried) this.drawCarried(shape(look.carried))
+    if (look.handle) this.drawHandle(...look.handle.map((end) => this.px(...end)))
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
@@ -138,12 +143,25 @@ export class Arrows {
     g.setLineDash([])
   }
 
-  /** A disk being dragged, before its scene arrives. */
-  drawCarried([x, y, r]) {
-    const { context: g, look } = this
-    circle(g, this.px(x, y), r * this.unit)
+  /** A body being dragged, before its scene arrives. */
+  drawCarried({ corners, round }) {
+    const { context: g, look } = this, ends = corners.map((corner) => this.px(...corner))
+    if (round) circle(g, ends[0], round * this.unit)
+    else polygon(g, ends)
     g.strokeStyle = look.hand
     g.lineWidth = 2
+    g.stroke()
+  }
+
+  /** The handle by which a block is turned, in px. */
+  drawHandle(from, to) {
+    const { context: g, look } = this
+    g.strokeStyle = look.hand
+    g.lineWidth = 1.5
+    line(g, from, to)
+    circle(g, to, 6)
+    g.fillStyle = look.paper
+    g.fill()
     g.stroke()
   }
 

@@ -14,10 +14,12 @@ const AT_BOTH = {
 }
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
-export function forceName({ names, one }, index) {
-  const place = names[index >> 1]
-  return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith(one) ? "on " : ""}${place}`
+export function forceName(scene, index) {
+  return `${index % 2 ? "tangential" : "normal"} force ${placeName(scene, index >> 1)}`
 }
+
+/** Where the force of a contact acts, in words. */
+export function placeName({ names, one }, contact) { return `${names[contact].startsWith(one) ? "on " : ""}${names[contact]}` }
 
 /** The event at a side of S, in words: which contacts are about to slide or to open there. */
 export function stopping({ scene }, side) {
@@ -36,7 +38,7 @@ export function stopping({ scene }, side) {
 /** The direction in which a disk is about to slide: against the friction on it; for two disks, the sense of
  * rotation. */
 function way(scene, contact, what) {
-  if (scene.j[contact] < scene.r.length) return what > 0 ? " clockwise" : " anticlockwise"
+  if (scene.j[contact] < scene.r.length) return scene.one !== "disk" ? "" : what > 0 ? " clockwise" : " anticlockwise"
   const [x, y] = [-what * scene.normal[2 * contact + 1], what * scene.normal[2 * contact]]
   return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
 }

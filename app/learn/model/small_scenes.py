@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing import assemblies, importers, scenes
+from granforce.packing import assemblies, importers, masonry, scenes
 from granforce.records import InputError, NotJammedError, Packing, float_array, friction
 from granforce.study import hulls
 from granforce.types import Floats, Integers
 
 from ...state.scene_links import OWN
 
-MOST_DISKS, MOST_WALLS = 30, 12
+MOST_BODIES, MOST_WALLS = 30, 12
 BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builder
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
 DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
 ONE = {"ladder": "ladder", "stones": "stone"}  # a body of these scenes
-SNAP = 1e-6  # fraction of the largest radius: gaps left by hand are closed up to here
+SNAP = (
+    1e-6  # gaps left by hand are closed up to here, relative to the largest radius if all are disks
+)
 
 
 def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]:
@@ -44,14 +46,14 @@ def geometry(packing: Packing) -> dict[str, Any]:
     contacts, count, shapes = packing.contacts, _count(packing), packing.shapes
     walls = np.reshape(packing.info.get("walls", []), (-1, 4))
     outlines = [] if shapes is None else shapes.polygons()
-    if outlines:
+    if outlines and not len(walls):
         walls = _touched_sides(outlines[count:], packing.contact_points[contacts.j >= count])
     lids = packing.info.get("pressing", [])
     loaded = bool(np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any())
     found = hulls.hull(packing) if len(contacts.i) and loaded else None
     box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
     return {
-        "one": ONE.get(packing.info.get("scene", ""), "disk"),
+        "one": _one(packing),
         "outlines": [body.ravel().tolist() for body in outlines[:count]],
         "x": packing.x[:count].ravel(),
         "r": packing.r[:count],
@@ -97,18 +99,26 @@ def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
 
 def _count(packing: Packing) -> int:
     """The number of disks, or of bodies that can move, which come first."""
-    free = int(np.isfinite(packing.load[:, 0]).sum())
+    free = int(np.isfinite(packing.load[:, 0]).sum()) - len(packing.info.get("pressing", []))
     return int(packing.info.get("disks", len(packing.r) if packing.shapes is None else free))
+
+
+def _one(packing: Packing) -> str:
+    """The word for one body of a scene."""
+    if packing.info.get("scene") != OWN or packing.shapes is None:
+        return ONE.get(packing.info.get("scene", ""), "disk")
+    return "block" if packing.shapes.sides[: _count(packing)].all() else "body"
 
 
 def names(packing: Packing, count: int) -> list[str]:
     """The position of each contact, in words."""
     contacts, places = packing.contacts, []
     several, lids = count > 1, len(packing.info.get("pressing", []))
-    one, ends = ONE.get(packing.info.get("scene", ""), "disk"), _ends(packing)
+    one, ends = _one(packing), _ends(packing)
+    many = "bodies" if one == "body" else f"{one}s"
     for i, j, (n_x, n_y), end in zip(contacts.i, contacts.j, contacts.normal, ends, strict=True):
         if j < count:
-            places.append(f"between {one}s {i + 1} and {j + 1}{end}")
+            places.append(f"between {many} {i + 1} and {j + 1}{end}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
         wall = "left wall" if wall == "right wall" and n_x < 0 else wall
@@ -125,7 +135,7 @@ def _ends(packing: Packing) -> list[str]:
         for other in np.flatnonzero((i == i[c]) & (j == j[c]) & (np.arange(len(i)) != c)):
             x, y = points[c] - points[other]
             upright = ("upper" if y > 0 else "lower", "right" if x > 0 else "left")
-            found[c] = f", {upright[int(abs(y) < abs(x))]} end"
+            found[c] = f" ({upright[int(abs(y) < abs(x))]} end)"
     return found
 
 
@@ -189,42 +199,89 @@ def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
 
 
 def own(text: str, mu: float | None = None) -> Packing:
-    """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity.
+    """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", bodies and walls, under gravity.
 
-    With a third part, such as "p1,2", there is no gravity, and walls 1 and 2 press with 1 per
-    length.
+    A body of five numbers is a block: x, y of its centre, width, height and turn in degrees. With a
+    third part, such as "p1,2", there is no gravity, and walls 1 and 2 press with 1 per length.
     """
-    disks, walls, press = ([*(text or BEGIN).split("|"), "", ""])[:3]
-    disks, walls = _numbers(disks, 3, MOST_DISKS, "disks"), _numbers(walls, 4, MOST_WALLS, "walls")
-    if not len(disks):
-        raise InputError("there is no disk; add one")
-    x, r = disks[:, :2], disks[:, 2]
-    load, pressing = scenes.weights(r), np.zeros(len(walls))
-    if press:
-        load, lids = 0 * load, _pressing(press, len(walls))
-        pressing[lids] = np.hypot(*(walls[lids, 2:] - walls[lids, :2]).T)
+    bodies, walls, press = ([*(text or BEGIN).split("|"), "", ""])[:3]
+    bodies = _rows(bodies, (3, 5), MOST_BODIES, "bodies")
+    walls = np.reshape(_rows(walls, (4,), MOST_WALLS, "walls"), (-1, 4))
+    if not len(bodies):
+        raise InputError("there is no body; add one")
+    lids = _pressing(press, len(walls)) if press else np.zeros(0, dtype=np.int64)
+    pressing = np.zeros(len(walls))
+    pressing[lids] = np.hypot(*(walls[lids, 2:] - walls[lids, :2]).T)
     mu = 0.5 if mu is None else friction(mu)
-    made = scenes.assembled(x, r, walls, load, mu, pressing=pressing, tolerance=SNAP)
+    if any(len(body) == 5 for body in bodies):
+        made = _of_blocks(bodies, walls, mu, None if not press else pressing)
+    else:
+        x, r = np.hsplit(np.array(bodies), [2])
+        load = scenes.weights(r[:, 0]) * (not press)
+        made = scenes.assembled(x, r[:, 0], walls, load, mu, pressing=pressing, tolerance=SNAP)
     return made._replace(info=made.info | {"scene": OWN})
 
 
+def _of_blocks(
+    bodies: Sequence[Floats], walls: Floats, mu: float, pressing: Floats | None
+) -> Packing:
+    """The Packing of disks and blocks among thin walls; pressing (k,): forces of walls, if any.
+
+    Pressing walls come first among the walls; they may slide along themselves, but not tilt.
+    """
+    count, force = len(bodies), np.zeros(len(walls)) if pressing is None else pressing
+    lids = np.flatnonzero(force)
+    order = np.argsort(force == 0, kind="stable")
+    packing = assemblies.blocks(
+        [*map(outline, bodies), *walls[order].reshape(-1, 2, 2)],
+        mu,
+        fixed=np.arange(count, count + len(walls)),
+        tolerance=SNAP,
+        balanced=False,
+    )
+    load, contacts = packing.load.copy(), packing.contacts
+    levers = contacts.offsets.copy()
+    if pressing is not None:
+        load[:count] = 0
+    for k, lid in enumerate(lids, start=count):
+        touching = contacts.j == k
+        inwards = scenes.inwards(packing.x[:count], walls[lid], contacts.normal[touching])
+        load[k], levers[touching, 1] = [*inwards * force[lid], 0], 0
+    return packing._replace(
+        load=load,
+        contacts=contacts._replace(levers=levers),
+        info=packing.info | {"walls": walls.tolist(), "pressing": lids.tolist()},
+    )
+
+
+def outline(body: Floats) -> Floats:
+    """A disk as it is; the corners (4, 2) of a block."""
+    if len(body) == 3:
+        return body
+    x, (width, height), turn = body[:2], body[2:4], np.radians(body[4])
+    along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    return x + masonry.rectangle(-width / 2, -height / 2, width / 2, height / 2) @ along
+
+
 def _pressing(text: str, walls: int) -> Integers:
-    """Mask of the pressing walls."""
+    """Numbers of the pressing walls."""
     lids = [int(k) for k in text[1:].split(",") if k] if PRESSED.fullmatch(text) else [walls]
     if max(lids, default=0) >= walls and lids:
         raise InputError("the pressing walls in this link cannot be read")
     return np.unique(np.array(lids, dtype=np.int64))
 
 
-def _numbers(text: str, width: int, most: int, what: str) -> Floats:
+def _rows(text: str, widths: Sequence[int], most: int, what: str) -> list[Floats]:
+    """The rows of a part of a built scene, each of one of these widths."""
     try:
         rows = [[float(part) for part in row.split(",")] for row in text.split(";") if row.strip()]
-        found = np.array(rows, dtype=float).reshape(-1, width)
     except ValueError:
-        raise InputError(f"this link's {what} cannot be read") from None
-    if len(found) > most:
-        raise InputError(f"a scene may have {most} {what} at most, got {len(found)}")
-    return float_array(found, (-1, width), what)
+        rows = [[]]
+    if any(len(row) not in widths for row in rows):
+        raise InputError(f"this link's {what} cannot be read")
+    if len(rows) > most:
+        raise InputError(f"a scene may have {most} {what} at most, got {len(rows)}")
+    return [float_array(row, (-1,), what) for row in rows]
 
 
 def file_of(packing: Packing, load: npt.ArrayLike | None = None) -> bytes:

@@ -1,20 +1,28 @@
-// Build your own: disks and walls are placed, moved and removed; nearby disks snap into contact.
+// Build your own: disks, blocks and walls are placed, moved, turned and removed; nearby bodies snap into contact.
 
-import { distance, solve } from "../model/polytope.js"
+import { beside, contactCurves, foot, gap, meet, shape } from "../model/contact_curves.js"
 
-const NEAR = 0.45 // of the largest radius, within which a disk snaps into contact
-const MOST_DISKS = 30, MOST_WALLS = 12
-// One disk on the floor, under gravity or under a pressing wall.
-const BARE = "2,1,1|0,0,4,0", BARE_UNDER_PRESS = "2,1,1|0,0,4,0;0.4,2,3.6,2|p1"
+const NEAR = 0.45 // within which a body snaps into contact
+const FLAT = 5 // degrees within which a block that is moved or turned by hand aligns with an edge
+const STEP = 5 // degrees per key press
+const MOST_BODIES = 30, MOST_WALLS = 12
+const GRIP = 16, LEVER = 30 // px: reach and length of the handle of a block
+const SIZES = [0.1, 12] // of the sides of a block
+// One body on the floor, under gravity or under a pressing wall.
+const BARE = {
+  disk: ["2,1,1|0,0,4,0", "2,1,1|0,0,4,0;0.4,2,3.6,2|p1"],
+  block: ["4,0.5,2,1,0|0,0,8,0", "4,0.5,2,1,0|0,0,8,0;2.4,1,5.6,1|p1"],
+}
 // The initial scene with pressing walls: three disks under a pressing wall.
 const UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 
 // The explanation of each tool.
 const HOW = {
-  disk: "Click an empty place to add a disk; drag a disk to move it.",
+  disk: "Click an empty place to add a disk; drag a body to move it.",
+  block: "Click an empty place to add a block; drag a body to move it; drag the round handle, or press Q or E, to turn it.",
   wall: "Drag from one end of the wall to the other.",
   press: "Click a wall: it presses, or no longer does.",
-  remove: "Click a disk or a wall.",
+  remove: "Click a body or a wall.",
   pull: "Drag the tip of an arrow: all forces follow.",
 }
 
@@ -23,38 +31,43 @@ export class Builder {
   constructor(host, changed) {
     this.changed = changed
     this.tool = "disk"
-    this.size = 1
-    this.disks = []
+    this.sizes = { disk: [1], block: [2, 1, 0] } // of new bodies: radius; width, height, degrees
+    this.bodies = [] // rows, see shape
     this.walls = []
     this.held = null
+    this.chosen = null // number of the body that was placed or moved last
+    this.unit = 1 // px
     this.cursor = null // of the keyboard
     this.pressure = false // instead of gravity
     this.pressing = new Set() // numbers of walls
     this.untouched = true // the scene is an initial one
     this.host = host
     host.innerHTML = `
-      <span role="radiogroup" aria-label="What presses the disks">
+      <span role="radiogroup" aria-label="What presses the bodies">
         <button type="button" class="soft" role="radio" data-load="gravity">Gravity</button>
         <button type="button" class="soft" role="radio" data-load="pressure">Pressure</button>
       </span>
       <span role="radiogroup" aria-label="What the hand does">
-        <button type="button" class="soft" role="radio" data-tool="disk">Add or move</button>
+        <button type="button" class="soft" role="radio" data-tool="disk">Disks</button>
+        <button type="button" class="soft" role="radio" data-tool="block">Blocks</button>
         <button type="button" class="soft" role="radio" data-tool="wall">Draw a wall</button>
         <button type="button" class="soft" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Make a wall press</button>
         <button type="button" class="soft" role="radio" data-tool="remove">Remove</button>
         <button type="button" class="soft" role="radio" data-tool="pull">Drag arrows</button>
       </span>
-      <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
-      <button type="button" class="soft anew" title="Begin anew, with one disk on the floor">Clear</button>
+      <label data-for="disk">radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
+      ${["width", "height", "degrees"].map((name, k) => `<label data-for="block">${name} <input class="side" data-side="${k}" inputmode="decimal"></label>`).join("")}
+      <button type="button" class="soft anew" title="Begin anew, with one body on the floor">Clear</button>
       <span class="how"></span>
       <span class="presses">No gravity. A pressing wall pushes with a force equal to its length.</span>`
     host.addEventListener("click", (event) => {
       const { tool, load } = event.target.dataset
       if (tool) { this.tool = tool; this.tell() }
       if (load) this.choose(load === "pressure")
-      if (event.target.classList.contains("anew")) this.begin(this.pressure ? BARE_UNDER_PRESS : BARE)
+      if (event.target.classList.contains("anew")) this.begin((BARE[this.tool] ?? BARE.disk)[Number(this.pressure)])
     })
-    host.querySelector(".size").addEventListener("input", (event) => { this.size = Number(event.target.value) })
+    host.querySelector(".size").addEventListener("input", (event) => { this.sizes.disk = [Number(event.target.value)] })
+    host.addEventListener("change", ({ target: { dataset: { side }, value } }) => { if (side) this.size(Number(side), value) })
     this.tell()
   }
 
@@ -67,6 +80,19 @@ export class Builder {
     }
     this.host.querySelector(".how").textContent = HOW[this.tool]
     for (const name of ["[data-tool=press]", ".presses"]) this.host.querySelector(name).hidden = !this.pressure
+    for (const label of this.host.querySelectorAll("[data-for]")) label.hidden = label.dataset.for !== this.tool
+    for (const field of this.host.querySelectorAll(".side")) field.value = String(Number((this.block?.slice(2) ?? this.sizes.block)[field.dataset.side].toFixed(2)))
+  }
+
+  /** The chosen body if it is a block, while blocks are placed. */
+  get block() { return this.tool === "block" ? this.bodies[this.chosen] : undefined }
+
+  /** Typed width, height or degrees (side 0, 1, 2) of new blocks, and of the chosen one if there is room. */
+  size(side, text) {
+    const value = Number(text.replace(",", ".")), { block, sizes } = this
+    const given = (block?.slice(2) ?? sizes.block).with(side, side < 2 ? Math.min(SIZES[1], Math.max(SIZES[0], value)) : value % 360)
+    if (text.trim() && Number.isFinite(value) && (!block || this.reshape(this.chosen, given))) sizes.block = given
+    this.tell()
   }
 
   /** Choose pressure or gravity. */
@@ -90,8 +116,8 @@ export class Builder {
     if (text === this.text || this.held) return false
     this.untouched = begins || text === UNDER_PRESS
     const rows = (part) => (part ?? "").split(";").filter(Boolean).map((row) => row.split(",").map(Number))
-    const [disks, walls, press] = text.split("|")
-    Object.assign(this, { disks: rows(disks), walls: rows(walls), text, pressure: press !== undefined })
+    const [bodies, walls, press] = text.split("|")
+    Object.assign(this, { chosen: null, bodies: rows(bodies), walls: rows(walls), text, pressure: press !== undefined })
     this.pressing = new Set((press ?? "").slice(1).split(",").filter(Boolean).map((k) => this.walls[k]))
     this.tell()
     return true
@@ -101,14 +127,15 @@ export class Builder {
     const spelled = (rows) => rows.map((row) => row.map((v) => Number(v.toFixed(12))).join()).join(";")
     const press = this.walls.flatMap((wall, k) => (this.pressing.has(wall) ? [k] : [])).join()
     this.untouched = false
-    this.text = `${spelled(this.disks)}|${spelled(this.walls)}${this.pressure ? `|p${press}` : ""}`
+    this.text = `${spelled(this.bodies)}|${spelled(this.walls)}${this.pressure ? `|p${press}` : ""}`
     this.changed(this.text)
   }
 
-  /** Whether the builder handles the press at this position. */
-  press(at) {
+  /** Whether the builder handles the press at this position; unit: px. */
+  press(at, unit = this.unit) {
+    this.unit = unit
     if (this.tool === "pull") return false
-    const own = this.disks.findIndex(([x, y, r]) => Math.hypot(at[0] - x, at[1] - y) < r)
+    const point = shape([...at, 0]), own = this.bodies.findIndex((body) => gap(shape(body), point) < 0)
     if (this.tool === "remove") return this.remove(own, at)
     if (this.tool === "press") return this.switchWall(at)
     if (this.tool === "wall") {
@@ -117,21 +144,32 @@ export class Builder {
       this.held = { wall: this.walls.length - 1 }
       return true
     }
-    if (own < 0 && this.disks.length >= MOST_DISKS) return true
-    this.held = { disk: own < 0 ? this.disks.length : own }
-    if (own < 0) {
-      const put = this.snapped(at, this.size, -1)
-      if (!put) { this.held = null; return true }
-      this.disks.push([...put, this.size])
-      this.publish()
-    }
+    if (this.block && Math.hypot(...this.handle[1].map((v, k) => v - at[k])) < GRIP / unit) this.held = { body: this.chosen, turns: true }
+    else if (own >= 0) this.take(own, at)
+    else if (this.bodies.length < MOST_BODIES) this.add(at)
     return true
+  }
+
+  take(own, at) {
+    const [x, y] = this.bodies[own]
+    this.chosen = own
+    this.held = { body: own, grip: [x - at[0], y - at[1]] }
+  }
+
+  /** Add a body; a block lies flat on the nearest edge. */
+  add(at) {
+    const put = this.placed([...at, ...this.sizes[this.tool]], -1, 45)
+    if (!put) return
+    this.chosen = this.bodies.push(put) - 1
+    this.held = { body: this.chosen, grip: [put[0] - at[0], put[1] - at[1]] }
+    this.publish()
   }
 
   remove(own, at) {
     const wall = this.wallAt(at)
-    if (own >= 0) this.disks.splice(own, 1)
+    if (own >= 0) this.bodies.splice(own, 1)
     else if (wall >= 0) this.walls.splice(wall, 1)
+    this.chosen = null
     if (own >= 0 || wall >= 0) this.publish()
     return true
   }
@@ -147,7 +185,7 @@ export class Builder {
 
   /** Number of the wall at this position, −1 if none. */
   wallAt(at) {
-    const far = this.walls.map(([a, b, c, d]) => distance([a, b], [c, d], ...at)), least = Math.min(...far)
+    const far = this.walls.map((wall) => gap(shape(wall), shape([...at, 0]))), least = Math.min(...far)
     return least < 0.4 ? far.indexOf(least) : -1
   }
 
@@ -158,25 +196,60 @@ export class Builder {
       this.walls[held.wall] = [...this.walls[held.wall].slice(0, 2), ...this.straight(this.walls[held.wall], at)]
       return
     }
-    const [, , r] = this.disks[held.disk], put = this.snapped(at, r, held.disk)
-    if (!put) return
-    if (put.every((v, k) => v === this.disks[held.disk][k])) return
-    this.disks[held.disk] = [...put, r]
+    const body = this.bodies[held.body], [x, y] = body
+    if (held.turns) {
+      const degrees = Math.round((Math.atan2(at[1] - y, at[0] - x) * 180) / Math.PI - 90)
+      this.reshape(held.body, body.slice(2).with(2, this.flat(body.with(4, degrees), held.body, FLAT)))
+    } else this.replace(held.body, this.placed([at[0] + held.grip[0], at[1] + held.grip[1], ...body.slice(2)], held.body, FLAT))
+  }
+
+  /** Give a body another size or turn, and move it as far as contacts need; returns whether there is room. */
+  reshape(own, size) {
+    const row = [...this.bodies[own].slice(0, 2), ...size], at = this.settled(row, own) ?? this.settled(row, own, Math.hypot(...size.slice(0, 2)) / 2)
+    if (at) this.replace(own, [...at, ...size])
+    return Boolean(at)
+  }
+
+  /** Put another row in place of a body, if there is one and it differs. */
+  replace(own, row) {
+    if (!row || row.every((v, k) => v === this.bodies[own][k])) return
+    this.bodies[own] = row
+    this.tell()
     this.publish()
+  }
+
+  /** Turn the chosen block by an angle. */
+  turn(degrees) {
+    if (!this.block) return false
+    const size = this.block.slice(2)
+    this.reshape(this.chosen, size.with(2, size[2] + degrees))
+    return true
+  }
+
+  /** The handle of the chosen block, above its middle: from its edge to its end; null if there is none. */
+  get handle() {
+    if (!this.block) return null
+    const [x, y, , high, degrees] = this.block, turn = (degrees * Math.PI) / 180
+    return [high / 2, high / 2 + LEVER / this.unit].map((far) => [x - far * Math.sin(turn), y + far * Math.cos(turn)])
   }
 
   release() {
     const { held } = this
     this.held = null
+    if (held?.body !== undefined) { // only now, because it can move the picture
+      this.tool = this.bodies[held.body].length > 3 ? "block" : "disk"
+      this.tell()
+    }
     if (held?.wall === undefined) return
     const [a, b, c, d] = this.walls[held.wall], short = Math.hypot(a - c, b - d) < 0.3
-    const through = this.disks.some(([x, y, r]) => distance([a, b], [c, d], x, y) < r - 1e-9)
-    if (short || through) this.walls.splice(held.wall, 1)
+    if (short || this.bodies.some((body) => gap(shape(body), shape([a, b, c, d])) < -1e-9)) this.walls.splice(held.wall, 1)
     else this.publish()
   }
 
-  /** By keyboard: arrow keys move a cursor from the position `from`, Enter takes and releases. */
+  /** By keyboard: arrow keys move a cursor from the position `from`, Enter takes and releases, Q and E turn a block. */
   key(key, from) {
+    const turn = { q: STEP, e: -STEP }[key.toLowerCase()]
+    if (turn) return this.turn(turn)
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
     if (!step && key !== "Enter") return false
     this.cursor ??= from
@@ -195,59 +268,42 @@ export class Builder {
     return [x, y]
   }
 
-  /** The nearest position where a disk touches two others, one, or none; null if there is none. */
-  snapped([x, y], r, own) {
-    const curves = []
-    this.disks.forEach(([a, b, R], k) => { if (k !== own) curves.push({ centre: [a, b], reach: R + r }) })
-    for (const [a, b, c, d] of this.walls) {
-      const size = Math.hypot(c - a, d - b), [nx, ny] = [-(d - b) / size, (c - a) / size]
-      for (const side of [r, -r]) curves.push({ from: [a + side * nx, b + side * ny], along: [(c - a) / size, (d - b) / size] })
-      for (const end of [[a, b], [c, d]]) curves.push({ centre: end, reach: r })
-    }
-    const near = curves.filter((curve) => away(curve, [x, y]) < NEAR)
-    const twice = near.flatMap((one, k) => near.slice(k + 1).flatMap((other) => meet(one, other)))
-    for (const [places, reach] of [[twice, NEAR * 1.5], [near.map((curve) => foot(curve, [x, y])), NEAR * 1.5], [[[x, y]], 1]]) {
-      const there = places.filter((p) => Math.hypot(p[0] - x, p[1] - y) < reach && this.free(p, r, own))
-      if (there.length) return there.sort((p, q) => Math.hypot(p[0] - x, p[1] - y) - Math.hypot(q[0] - x, q[1] - y))[0]
+  /** A row at the nearest position in contact, a block after turning by up to `most` degrees onto an edge; null if there
+   * is no room. */
+  placed(row, own, most) {
+    const degrees = row.length > 3 ? [this.flat(row, own, most), row[4]] : [undefined]
+    for (const turned of degrees.map((angle) => (angle === undefined ? row : row.with(4, angle)))) {
+      const at = this.settled(turned, own)
+      if (at) return [...at, ...turned.slice(2)]
     }
     return null
   }
 
-  free([x, y], r, own) {
-    return this.disks.every(([a, b, R], k) => k === own || Math.hypot(a - x, b - y) > R + r - 1e-9) &&
-      this.walls.every(([a, b, c, d]) => distance([a, b], [c, d], x, y) > r - 1e-9)
+  /** Degrees of a block that lies flat on the nearest edge, if it turns by `most` at most. */
+  flat(row, own, most) {
+    const edges = this.others(own).filter((other) => other.length > 3).map((other) => {
+      const angle = other[4] ?? (Math.atan2(other[3] - other[1], other[2] - other[0]) * 180) / Math.PI
+      const turned = angle - 90 * Math.round((angle - row[4]) / 90)
+      return { turned, far: gap(shape(row.with(4, turned)), shape(other)) }
+    })
+    const [nearest] = edges.filter(({ far, turned }) => far < NEAR && Math.abs(turned - row[4]) <= most).sort((a, b) => a.far - b.far)
+    return nearest?.turned ?? row[4]
   }
-}
 
-/** Centres are on circles around disks and ends of walls, and on lines parallel to walls. */
-function foot(curve, [x, y]) {
-  if (curve.along) {
-    const s = (x - curve.from[0]) * curve.along[0] + (y - curve.from[1]) * curve.along[1]
-    return [curve.from[0] + s * curve.along[0], curve.from[1] + s * curve.along[1]]
-  }
-  const [dx, dy] = [x - curve.centre[0], y - curve.centre[1]], size = Math.hypot(dx, dy) || 1
-  return [curve.centre[0] + (curve.reach * dx) / size, curve.centre[1] + (curve.reach * dy) / size]
-}
+  others(own) { return [...this.bodies.filter((_, k) => k !== own), ...this.walls] }
 
-function away(curve, at) {
-  const [x, y] = foot(curve, at)
-  return Math.hypot(x - at[0], y - at[1])
-}
-
-function meet(one, other) {
-  if (one.along && other.along) {
-    const s = solve([[one.along[0], -other.along[0]], [one.along[1], -other.along[1]]],
-      [other.from[0] - one.from[0], other.from[1] - one.from[1]])
-    return s ? [[one.from[0] + s[0] * one.along[0], one.from[1] + s[0] * one.along[1]]] : []
+  /** The nearest position where a body touches two others, one, or none; null if there is none. */
+  settled([x, y, ...size], own, near = NEAR) {
+    const others = this.others(own).map(shape), moved = shape([0, 0, ...size])
+    const far = (place) => Math.hypot(place[0] - x, place[1] - y)
+    const free = (place) => { const there = shape([...place, ...size]); return others.every((other) => gap(there, other) > -1e-9) }
+    const curves = others.flatMap((other) => contactCurves(moved, other)).filter((curve) => far(foot(curve, [x, y])) < near)
+    const feet = curves.filter((curve) => beside(curve, [x, y])).map((curve) => foot(curve, [x, y]))
+    const twice = curves.flatMap((curve, k) => curves.slice(k + 1).flatMap((other) => meet(curve, other)))
+    for (const places of [twice, feet, [[x, y]]]) {
+      const there = places.filter((place) => far(place) < 1.5 * near).sort((a, b) => far(a) - far(b)).find(free)
+      if (there) return there
+    }
+    return null
   }
-  if (other.along) return meet(other, one)
-  if (one.along) {
-    const base = foot(one, other.centre), gap = Math.hypot(base[0] - other.centre[0], base[1] - other.centre[1])
-    const half = Math.sqrt(Math.max(0, other.reach ** 2 - gap ** 2))
-    return gap > other.reach ? [] : [-half, half].map((s) => [base[0] + s * one.along[0], base[1] + s * one.along[1]])
-  }
-  const [dx, dy] = [other.centre[0] - one.centre[0], other.centre[1] - one.centre[1]], far = Math.hypot(dx, dy)
-  if (!far || far > one.reach + other.reach || far < Math.abs(one.reach - other.reach)) return []
-  const s = (far ** 2 + one.reach ** 2 - other.reach ** 2) / (2 * far), half = Math.sqrt(Math.max(0, one.reach ** 2 - s ** 2))
-  return [-half, half].map((t) => [one.centre[0] + (s * dx - t * dy) / far, one.centre[1] + (s * dy + t * dx) / far])
 }

@@ -81,8 +81,8 @@ class Workbench {
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = this.builds && root.getRootNode().activeElement === canvas ? builder.cursor : null
     const axes = new Map(space.axed.map((force, k) => [force, [colours.across, colours.up][k]]))
-    const { disk, contact, side, fall, enough, lit } = hand, carried = builder.disks[builder.held?.disk]
-    const look = { ...colours, carried, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
+    const { disk, contact, side, fall, enough, lit } = hand, carried = builder.bodies[builder.held?.body], handle = own && builder.handle
+    const look = { ...colours, carried, handle, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== canvas.clientWidth) {
       arrows.fit(body, own && arrows.own === canvas.clientWidth)
       arrows.own = own ? canvas.clientWidth : 0
@@ -96,7 +96,7 @@ class Workbench {
 
   /** Write text into a part of the page if it differs: unchanged parts are not laid out again. */
   write(name, said, how = "textContent") {
-    const text = said.replaceAll("disk", this.hand?.scene.one ?? "disk")
+    const one = this.hand?.scene.one ?? "disk", text = said.replaceAll("disks", one === "body" ? "bodies" : `${one}s`).replaceAll("disk", one)
     if (this.written[name] !== text) this.part(name)[how] = this.written[name] = text
   }
 
@@ -135,6 +135,7 @@ class Workbench {
     this.part("name").value = scene.name
     this.part("ranges").open = body.count <= FEW || tall(scene)
     this.root.classList.toggle("explained", Boolean(scene.box[0]) || own)
+    this.root.classList.toggle("building", own)
     this.root.classList.toggle("tall", tall(scene))
     this.address.returning = false
     if (before && !(own && before.name === "own")) this.address.write(this.hand, this.model.dark)
@@ -273,7 +274,7 @@ class Workbench {
   }
 
   press({ found, at }) {
-    if (this.builds) return this.builder.press(at)
+    if (this.builds) return this.builder.press(at, this.arrows.unit)
     if (!this.push.on || found?.disk === undefined) return false
     this.walk.pause()
     this.push.take(found.disk, at, this.arrows.forceUnit)

@@ -69,7 +69,7 @@ def test_the_ladder_is_drawn_between_two_lines_and_stones_have_two_ends():
     assert ladder["names"] == ["at the floor", "at the right wall"] and ladder["h"] == 1
     assert len(ladder["walls"]) == 2 * 4 and len(ladder["outlines"]) == 1
     assert stones["names"][:2] == [
-        f"between stones 1 and 2, {end} end" for end in ("lower", "upper")
+        f"between stones 1 and 2 ({end} end)" for end in ("lower", "upper")
     ]
     assert len(set(stones["names"])) == len(stones["i"]) and len(stones["x"]) == 2 * 3
 
@@ -120,6 +120,31 @@ def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
     S = gf.ensemble(packing)
     assert S.admits(packing.forces) and S.dimension == 1
     assert packing.info["pressing"] == [1]
+
+
+def test_blocks_are_built_as_the_library_places_them():
+    angle = np.radians(20)
+    x = [-0.5 * np.sin(angle), 0.5 * np.cos(angle)]
+    text = f"{x[0]},{x[1]},1,1,20|{-np.cos(angle)},{-np.sin(angle)},1,{np.tan(angle)}"
+    built, made = small_scenes.own(text, 0.5), gf.scene("slope", 0.5)
+    for end in range(2):
+        bounds = [gf.intervals(gf.ensemble(packing))[end] for packing in (built, made)]
+        np.testing.assert_allclose(*(np.sort(bound, axis=0) for bound in bounds), atol=1e-9)
+    drawn = small_scenes.drawn(scene_links.OWN, 0.5, text)
+    assert (drawn["one"], len(drawn["walls"]), len(drawn["outlines"])) == ("block", 4, 1)
+    assert sorted(drawn["names"]) == ["at the floor (left end)", "at the floor (right end)"]
+    again = gf.load_packing(io.BytesIO(small_scenes.file_of(built)))
+    assert gf.ensemble(again).admits(again.forces) and again.shapes.sides.tolist() == [4, 2]
+
+
+def test_a_wall_presses_a_block_and_a_disk():
+    text = "1,0.5,2,1,0;2.5,0.5,0.5|0,0,4,0;0,1,4,1|p1"
+    built, drawn = small_scenes.own(text, 0.5), small_scenes.drawn(scene_links.OWN, 0.5, text)
+    assert not built.load[:2].any() and built.load[2].tolist() == [0, -4, 0]
+    assert drawn["one"] == "body" and drawn["names"][0] == "between bodies 1 and 2"
+    forces = gf.load_packing(io.BytesIO(small_scenes.file_of(built))).forces
+    above = np.array(["press" in name for name in drawn["names"]])
+    np.testing.assert_allclose(forces[above].sum(axis=0), [4, 0], atol=1e-9)
 
 
 def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
@@ -177,6 +202,7 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
     [
         *("1,1", "a,b,c", ";".join(["1,1,0.1"] * 31), "0,0,1;1,0,1", "nan,0,1", "1,1,-1"),
         *("1,1,1|0,0,3,0|p1", "1,1,1|0,0,3,0|px", "1,1,1|0,0,3,0|0"),
+        *("1,1,1,1", "1,1,1,1,0;1,1,1,1,0", "1,1,1,0,0", "1,1,1,1,0|0,1,0,1"),
     ],
 )
 def test_what_cannot_be_built_is_refused(text):

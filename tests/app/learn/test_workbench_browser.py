@@ -135,6 +135,66 @@ def test_a_scene_is_built_by_keyboard_and_its_link_carries_it(look, tmp_path):
     assert gf.load_packing(tmp_path / "own.npz").info["disks"] == 3
 
 
+def blocks(page):
+    """Begin with one block, 2 × 1 at (4, 0.5) on the floor; the px of a position of the scene."""
+    page.get_by_role("radio", name="Blocks").click()
+    page.get_by_role("button", name="Clear").click()
+    free(page, 1)
+    box = page.get_by_role("img", name="Disks").bounding_box()
+    wide, high, r = box["width"] - 2, box["height"] - 2, 1.25**0.5
+    unit = min(wide / 9.6, high / (2.4 * r), 0.27 * high / r)
+    return lambda x, y: (
+        box["x"] + 1 + wide / 2 + unit * (x - 4),
+        box["y"] + 1 + high / 2 - unit * (y - 0.5),
+    )
+
+
+def test_a_block_dragged_over_the_edge_falls(look):
+    page = look("?scene=own")
+    px = blocks(page)
+    page.mouse.click(*px(4.2, 1.7))  # lands on the other
+    free(page, 2)
+    page.get_by_text("between blocks 1 and 2 (left end)").wait_for()
+    page.mouse.move(*px(4.2, 1.4))
+    page.mouse.down()
+    page.mouse.move(*px(5.3, 1.45), steps=5)
+    says(page, "orange arrows show how block 2 gives way")
+    page.mouse.move(*px(4.8, 1.45), steps=5)
+    page.mouse.up()
+    free(page, 2)
+    searched(page, "%3B4.8")
+
+
+def test_a_ladder_is_leant_by_keys_and_its_link_and_file_carry_it(look, tmp_path):
+    page = look("?scene=own")
+    px = blocks(page)
+    page.get_by_role("radio", name="Draw a wall").click()
+    page.mouse.move(*px(0.5, 0))
+    page.mouse.down()
+    page.mouse.move(*px(0.5, 2.7), steps=3)
+    page.mouse.up()
+    page.get_by_role("radio", name="Blocks").click()
+    page.mouse.click(*px(4, 0.4))
+    for name, value in (("width", "3"), ("height", "0.1"), ("degrees", "-50")):
+        page.get_by_role("textbox", name=name).fill(value)
+        page.get_by_role("textbox", name=name).press("Enter")
+    page.get_by_role("img", name="Disks").press("e")
+    page.get_by_role("img", name="Disks").press("e")
+    assert page.get_by_role("textbox", name="degrees").input_value() == "-60"
+    page.mouse.move(*px(4, 1.35))
+    page.mouse.down()
+    page.mouse.move(*px(1.3, 1.4), steps=8)
+    page.mouse.up()
+    free(page, 1)
+    searched(page, "%2C-60%7C")
+    page.reload()
+    page.get_by_text("at the left wall").first.wait_for()
+    with page.expect_download() as file:
+        page.get_by_role("button", name="Download data").click()
+    file.value.save_as(tmp_path / "own.npz")
+    assert gf.load_packing(tmp_path / "own.npz").shapes.sides.tolist() == [4, 2, 2]
+
+
 def test_walls_press_in_place_of_gravity(look):
     page = look("?scene=own")
     page.get_by_role("radio", name="Pressure").click()
