@@ -138,7 +138,7 @@ TERMS = {
     ),
     "residual": Term(
         "residual",
-        "The largest unbalanced force on any disk, in ⟨fₙ⟩: 0 is perfect balance.",
+        "The largest unbalanced force on any body, in ⟨fₙ⟩: 0 is perfect balance.",
     ),
     "distance": Term(
         "distance from the centre",
@@ -204,10 +204,11 @@ TERMS = {
     "now": Term("now", "The network on screen."),
     "rattler": Term(
         "rattler",
-        "A loose disk that carries no force; it is drawn pale and left out of the equations.",
+        "A loose disk or block that carries no force; it is drawn pale and left out of the "
+        "equations.",
     ),
     "unloaded": Term(
-        "unloaded contact", "The disks touch, but no balanced network has a force at this contact."
+        "unloaded contact", "The bodies touch, but no balanced network has a force at this contact."
     ),
     "no_friction": Term(
         "forces along contacts",
@@ -235,7 +236,7 @@ TERMS = {
         "One line for each contact, as thick as its force. A contact across the edge of the box "
         "is drawn on both sides, so there are more lines than contacts.",
     ),
-    "backbone": Term("backbone", "The disks and contacts that can carry a force."),
+    "backbone": Term("backbone", "The bodies and contacts that can carry a force."),
     # Sources of states
     "walk": Term(
         "the paper's random walk",

@@ -128,7 +128,7 @@ class Packing(NamedTuple):
     """N disks, or bodies of other shapes, their contacts, and one force network on them."""
 
     x: Floats  # (N, 2) centres, length
-    r: Floats  # (N,) radii, length
+    r: Floats  # (N,) radii, of polygons those of their farthest corner, length
     box: Floats  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
     contacts: Contacts
     forces: Floats  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force

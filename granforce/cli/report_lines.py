@@ -52,7 +52,7 @@ MEANINGS = {
     "mean_normal_force": "mean normal force ⟨f_n⟩, weighted by the distance between centres",
     "residual": "largest unbalance of a grain, in ⟨f_n⟩",
     "violation": "largest excess over Coulomb's law, in ⟨f_n⟩",
-    "largest_overlap": "largest overlap of two bodies, in largest radii",
+    "largest_overlap": "largest overlap of two bodies, in radii of the largest body",
     "largest_contact_gap": "largest gap of a contact, in largest radii",
     "least_other_gap": "smallest gap of a pair that is not a contact, in largest radii, or 0.1",
     "steps": "time steps of the compaction",

@@ -141,7 +141,7 @@ def with_network(packing: Packing) -> Packing:
     found = nearest(S, S.original)
     if not S.admits(found.forces):
         raise UndecidedError(
-            f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
+            f"no network was found: residual {found.residual:.2g} ⟨f_n⟩; change μ or a body"
         )
     return packing._replace(forces=S.expand(found.forces))
 

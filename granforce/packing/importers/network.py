@@ -127,10 +127,10 @@ def report(packing: Packing) -> dict[str, Any]:
 
     grains: those whose balance is required; grains_left_open: all others, such as walls.
     backbone_grains: grains that can carry force; rattlers: grains that cannot. Lengths are in
-    largest radii, residual and violation of the packing's own network in ⟨f_n⟩. mean_normal_force:
-    ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure. largest_contact_gap,
-    least_other_gap: the `margin` of its contacts, undefined for soft disks (overlaps beyond
-    RIGID_OVERLAP) and for bodies of other shapes.
+    largest radii (`Packing.r`), residual and violation of the packing's own network in ⟨f_n⟩.
+    mean_normal_force: ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure.
+    largest_contact_gap, least_other_gap: the `margin` of its contacts, undefined for soft disks
+    (overlaps beyond RIGID_OVERLAP) and for bodies of other shapes.
 
     Raises NotJammedError if no admissible network exists.
     """
