@@ -333,9 +333,9 @@ def brief(value: Any) -> str:
 
 
 def brief_list(values: Collection[Any], most: int = 8) -> str:
-    """The first values for a message, separated by commas."""
-    first = [str(value)[:40] for value in list(values)[:most]]
-    return ", ".join([*first, *(["…"] if len(values) > most else [])])
+    """The first values for a message, separated by commas, and how many more there are."""
+    first = ", ".join(str(value)[:40] for value in list(values)[:most])
+    return first if len(values) <= most else f"{first} and {len(values) - most} more"
 
 
 def friction(mu: Any) -> float:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from granforce import notebook
 from granforce.forces import balance, knowledge
@@ -282,24 +283,33 @@ class Ensemble:
 
     def unbounded(self) -> UnboundedError:
         """The error for unbounded forces: which can grow without a load, and what bounds them."""
-        ray = certificates.recession(self.scaled_form[0])
+        ray = certificates.widest_recession(self.scaled_form[0])
         locked = np.zeros(0, dtype=np.int64)
         if ray is not None:
             cones = ray[: self.per_contact * len(self.index)].reshape(len(self.index), -1)
             locked = np.flatnonzero(cones.max(axis=1) > LOCKED * ray.max())
-        ends = np.concatenate([self.contacts.i[locked], self.contacts.j[locked]])
-        held = balance.left_open_in(self.packing)[ends]
+        left_open = balance.left_open_in(self.packing)
+        i, j = self.contacts.i[locked], self.contacts.j[locked]
+        group = _groups(i, j, left_open)
         error = UnboundedError(certificates.UNBOUNDED)
-        if held.any() and not held.all():
-            free = np.unique(ends[~held])
+        ends = np.union1d(i, j)
+        if left_open[ends].any() and not left_open[ends].all():
+            free = ends[~left_open[ends]]
             grains, are = ("Grain", "is") if len(free) == 1 else ("Grains", "are")
+            numbers = self.index[locked]
+            one = numbers[np.unique(group, return_index=True)[1]]
+            smaller = (
+                "" if self.mu == 0 else "a smaller friction coefficient (--ensemble-mu, mu=), "
+            )
+            some = "of one of these contacts"
+            if len(one) > 1:
+                some = f"of one contact in each of {len(one)} groups, such as {brief_list(one)},"
             error = UnboundedError(
                 "the forces in S are not bounded: some can press against each other without a "
                 f"load. {grains} {brief_list(free)} (counted from 0) {are} wedged between walls or "
-                f"fixed grains, where friction {self.mu:g} holds however strongly contacts "
-                f"{brief_list(self.index[locked])} press. Use a smaller friction coefficient "
-                "(--ensemble-mu, mu=), an upper bound on f_n of one of these contacts (f_n_high in "
-                "--known, known=), or a wall that is not held but carries a weight"
+                f"fixed grains by contacts {brief_list(numbers)} at friction {self.mu:g}. Use "
+                f"{smaller}an upper bound on f_n {some} (f_n_high in --known, known=), or a wall "
+                "that is not held but carries a weight"
             )
         error.named = True
         return error
@@ -473,6 +483,13 @@ class Ensemble:
         A bool for forces (N_c, 2), a mask (…,) for (…, N_c, 2).
         """
         return (self.residual(forces) <= residual) & (self.violation(forces) <= violation)
+
+
+def _groups(i: Integers, j: Integers, held: Mask) -> Integers:
+    """Number (k,) of the group of each contact i, j that shares grains which are not held."""
+    both = ~held[i] & ~held[j]
+    bonds = sparse.coo_matrix((np.ones(both.sum()), (i[both], j[both])), (len(held),) * 2)
+    return csgraph.connected_components(bonds, directed=False)[1][np.where(held[i], j, i)]
 
 
 def _plain(values: Floats) -> Floats | float:

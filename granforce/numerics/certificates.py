@@ -95,6 +95,19 @@ def recession(A: sparse.csr_matrix) -> Floats | None:
     return None
 
 
+def widest_recession(A: sparse.csr_matrix) -> Floats | None:
+    """The same, positive wherever any such d is: A (s + e) = 0, s ≤ 1, for the largest Σ s."""
+    count = A.shape[1]
+    zero, cost = np.zeros(A.shape[0]), np.concatenate([-np.ones(count), np.zeros(count)])
+    limits = np.zeros(2 * count), np.concatenate([np.ones(count), np.full(count, np.inf)])
+    model = programs.bounded(sparse.hstack([A, A]), (zero, zero), limits, cost)
+    for _, y in programs.solutions(model):
+        d = np.maximum(y[:count] + y[count:], 0.0) if len(y) else np.zeros(count)
+        if d.any() and np.abs(A @ d).max(initial=0.0) <= _BALANCED_DIRECTION * d.sum():
+            return d / d.sum()
+    return recession(A)
+
+
 def bounding_rows(A: sparse.csr_matrix) -> Floats | None:
     """π (m,) with Aᵀπ > 0, so that Aᵀπ · y = b·π bounds every y in S; None if not found."""
     ray = empty_ray(*_with_sum(A))

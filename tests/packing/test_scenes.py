@@ -1,5 +1,7 @@
 """Scenes against school mechanics: every answer here can be had with pencil and paper."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -67,6 +69,20 @@ def test_a_groove_locks_itself_where_friction_is_as_steep_as_its_walls(angle):
     limit = [np.inf, np.inf]
     bounded = gf.Known([1], [np.negative(limit)], [[2 * S.force_scale, np.inf]])
     assert np.isfinite(gf.intervals(gf.ensemble(S.packing, known=bounded)).high).all()
+
+
+@pytest.mark.parametrize("mu", [0, 0.3])
+def test_all_wedged_rows_are_named_at_once(mu):
+    x = np.array([(i + 0.5, j + 0.5) for j in range(3) for i in range(4)])
+    packing = gf.from_disks(x, np.full(12, 0.5), mu, walls="box", gravity=1.0)
+    with pytest.raises(InputError, match=r"Grains 0, 1, 2, 3, 4, 5, 6, 7 and 4 more") as raised:
+        gf.intervals(gf.ensemble(packing))
+    message = str(raised.value)
+    assert ("a smaller friction" in message) == (mu > 0)
+    if mu == 0:  # three rows, which share no direction: bounds on one contact of each are enough
+        found = re.search(r"each of 3 groups, such as (\d+), (\d+), (\d+),", message)
+        known = gf.Known(list(map(int, found.groups())), [-np.inf] * 2, [9.0, np.inf])
+        assert gf.intervals(gf.ensemble(packing, known=known)).converged
 
 
 def test_two_disks_in_a_box_carry_their_weight():
