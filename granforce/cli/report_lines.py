@@ -24,8 +24,8 @@ MEANINGS = {
     "original_distance": "distance of the original network from the centre",
     "determined_contacts": "contacts with the same force in all networks",
     "undetermined_clusters": "connected groups of undetermined contacts",
-    "position_of_f_n_in_tenths": "number of contacts whose own f_n is in the first, …, last "
-    "tenth of its interval",
+    "position_of_f_n_in_tenths": "number of undetermined contacts whose own f_n is in the first, "
+    "…, last tenth of its interval",
     "programs": "linear programs solved",
     "again": "programs solved a second time, with refined steps or by HiGHS",
     "expected_reduction": "fraction by which errors of f_n fall once this one is known, from "

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from granforce import measures, notebook
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.knowledge import ordered
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
@@ -213,8 +214,8 @@ def _intervals(
     value *= ensemble.force_scale
     max_gap, converged = _judged(gap)
     backbone = value[:, 0, 1] > CARRYING * ensemble.force_scale
-    low, high, numbers = value[..., 0], value[..., 1], ensemble.index[places]
-    return Intervals(numbers, low, high, gap, backbone, max_gap, converged, counts)
+    low, high = ordered(value[..., 0], value[..., 1])
+    return Intervals(ensemble.index[places], low, high, gap, backbone, max_gap, converged, counts)
 
 
 @takes(Ensemble)

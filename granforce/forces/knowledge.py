@@ -15,7 +15,7 @@ from granforce import notebook
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import InputError, NotJammedError, are_whole
-from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
+from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT, REVERSED
 from granforce.types import Floats, Integers, Mask
 
 _NAMES = "f_n", "f_t"
@@ -54,7 +54,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     """Bounds (count, 2, 2) [contact, component, low or high] of all contacts, force.
 
     known: a Known. Several bounds on one contact are combined. Raises InputError for
-    contacts that do not exist, bounds of another shape or NaN, and low > high.
+    contacts that do not exist, bounds of another shape or NaN, and low > high beyond rounding.
     """
     try:
         contacts, low, high = known  # type: ignore[misc]  # other types are refused below
@@ -81,6 +81,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
     np.maximum.at(bounds[..., 0], contacts, low)
     np.minimum.at(bounds[..., 1], contacts, high)
+    bounds[..., 0], bounds[..., 1] = ordered(bounds[..., 0], bounds[..., 1])
     wrong = np.argwhere((bounds[..., 0] > bounds[..., 1]) | (bounds[..., 0] == np.inf))
     wrong = wrong if len(wrong) else np.argwhere(bounds[..., 1] == -np.inf)
     if len(wrong):
@@ -90,6 +91,22 @@ def bounds_of(known: Known | None, count: int) -> Floats:
             f"{bounds[c, k, 0]:.6g}, at most {bounds[c, k, 1]:.6g}"
         )
     return bounds
+
+
+def ordered(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """The same bounds, both at their midpoint where they differ by rounding.
+
+    That is up to FLAT of the largest finite bound, and up to REVERSED where low exceeds high.
+    """
+    both = np.concatenate([low.ravel(), high.ravel()])
+    largest = np.abs(both[np.isfinite(both)]).max(initial=0.0)
+    with np.errstate(invalid="ignore"):
+        over = low - high
+    rounded = (-FLAT * largest <= over) & (over <= REVERSED * largest)
+    middle = 0.5 * (low[rounded] + high[rounded])
+    low, high = low.copy(), high.copy()
+    low[rounded] = high[rounded] = middle
+    return low, high
 
 
 def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polygons | None:

@@ -208,16 +208,17 @@ def growing(states: Floats) -> dict[str, Floats]:
 
 
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
-    """Position of each f_n in its interval, from 0 (least) to 1 (largest); nan if ΔF_n = 0.
+    """Position of each f_n in its interval, from 0 (least) to 1 (largest).
 
+    NaN where the force is determined: ΔF_n is at most REVERSED of the largest force.
     normal_forces (N_c,); low, high (N_c, 2). Raises InputError as `eta3` does, and for another
     number of forces.
     """
     low, high = _bounds(low, high)
     normal_forces = float_array(normal_forces, (len(low),), "normal forces")
-    extent = high[:, 0] - low[:, 0]
+    extent, rounding = high[:, 0] - low[:, 0], REVERSED * np.nanmax(np.abs(high), initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(extent > 0, (normal_forces - low[:, 0]) / extent, np.nan)
+        return np.where(extent > rounding, (normal_forces - low[:, 0]) / extent, np.nan)
 
 
 def undetermined_clusters(

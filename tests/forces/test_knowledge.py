@@ -346,9 +346,22 @@ def test_a_contact_that_carries_nothing_cannot_be_known_to_carry():
     assert np.array_equal(K.index, S.index)
 
 
+def test_bounds_of_determined_forces_are_in_order_and_are_read_back(tmp_path):
+    packing = gf.scene("box", 0)
+    exact = gf.intervals(gf.ensemble(packing))
+    assert np.array_equal(exact.low, exact.high)
+    # As written by earlier versions, with rounding errors in either direction.
+    table = tmp_path / "bounds.csv"
+    rows = [f"{c},{f + 4e-16!r},{f!r}" for c, f in enumerate(exact.low[:, 0].tolist())]
+    table.write_text("\n".join(["contact,f_n_low,f_n_high", *rows]))
+    again = gf.intervals(gf.ensemble(packing, known=gf.read_known(table)))
+    np.testing.assert_allclose(again.low, exact.low, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("known", "words"),
     [
+        (gf.Known([1], [1.001, 0], [1.0, 1]), "are contradictory"),
         (gf.Known([1, 1], [[2.0, -1], [0, -1]], [[9.0, 1], [1, 1]]), "are contradictory"),
         (gf.Known([1], [np.nan, 0], [1, 1]), "a bound is NaN"),
         (gf.Known([164], [0, 0], [1, 1]), "does not exist; the packing's contacts are 0 … 163"),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from granforce import measures
 from granforce.cli.results import (
     StoredResult,
     conditions,
@@ -92,9 +93,11 @@ def intervals(arguments: argparse.Namespace) -> None:
     """Compute or load exact intervals, and report them."""
     _, parameters, dataset, ends = _exact(arguments, kinds.INTERVALS)
     forces = unit(arguments, dataset)
-    position = dataset["position"].values
+    low, high = (dataset[side].values for side in ("low", "high"))
+    position = measures.position_in_interval(dataset["original"].values[:, 0], low, high)
     cluster = dataset["cluster"].values
-    histogram = np.histogram(position[np.isfinite(position)], bins=10, range=(0, 1))[0]
+    undetermined = np.isfinite(position)
+    histogram = np.histogram(np.clip(position[undetermined], 0, 1), bins=10, range=(0, 1))[0]
     lines = {
         "contacts": dataset.sizes["contact"],
         **extension(dataset),
@@ -104,7 +107,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
-        "position_of_f_n_in_tenths": histogram.tolist(),
+        **({"position_of_f_n_in_tenths": histogram.tolist()} if undetermined.any() else {}),
         **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
