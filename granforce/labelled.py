@@ -102,6 +102,7 @@ _RENAMED = {
 # Units of variables; forces are in the packing's unit.
 _VARIABLE_UNITS = {
     **dict.fromkeys(("states", "forces", "low", "high", "load", "limit_load", "origin"), "force"),
+    **dict.fromkeys(("mean", "error"), "force"),
     **dict.fromkeys(("f_n_least", "critical_low", "critical_high"), "force"),
     **dict.fromkeys(("residual", "violation", "gap", "mean_interval_after"), UNITS["mean"]),
     **dict.fromkeys(("centre", "radius"), "length"),
@@ -172,6 +173,8 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         dimensions, arrays = {"states": " ".join(words)}, {"states": result}
     else:
         dimensions = _DIMENSIONS.get(type(result).__name__, {})
+        if getattr(result, "draws", None) is not None:  # of an Inference
+            dimensions = dimensions | dict.fromkeys(("mean", "error"), "contact component")
         arrays = _arrays(result, list(dimensions))
     if not dimensions:
         known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))

@@ -344,6 +344,17 @@ def test_states_of_several_chains_are_drawn_and_labelled_as_they_come():
         gf.plot(S.packing, sample.states[..., 1:, :], contacts=S.index)
 
 
+@pytest.mark.parametrize("function", [gf.infer, gf.remeasured])
+def test_inferred_forces_have_their_means_and_errors_in_tables(function):
+    S = gf.ensemble(packed(12, 0.3))
+    found = function(S, S.original, 0.1, states=8)
+    table = gf.to_dataframe(found, S)
+    for k, name in enumerate(("f_n", "f_t")):
+        assert table[f"{name}_mean [packing]"].tolist() == found.mean[:, k].tolist()
+        assert table[f"{name}_error [packing]"].tolist() == found.error[:, k].tolist()
+    assert "f_n_mean [packing]" not in gf.to_dataframe(gf.infer(S, S.original, 0.1), S)
+
+
 def test_loads_volumes_and_shapes_are_labelled():
     S = gf.ensemble(packed(30, 0.3))
     first, second = (int(contact) for contact in S.index[[1, 4]])
@@ -670,7 +681,9 @@ def test_what_to_measure_next(cache, capsys):
     *_, heads, first, _, _, _ = capsys.readouterr().out.splitlines()
     assert heads.split()[:5] == ["contact", "i", "j", "x", "y"]
     assert int(first.split()[0]) == best.contacts[0]
-    assert pd.read_csv("next.csv")["contact"].tolist() == told["contact"]
+    table = pd.read_csv("next.csv")
+    assert table["contact"].tolist() == told["contact"]
+    assert table["number_of_twins"].tolist() == [len(others) for others in best.twins]
 
 
 def test_the_store_says_where_it_is_and_makes_nothing(cache, capsys):

@@ -28,12 +28,14 @@ MEANINGS = {
     "…, last tenth of its interval",
     "programs": "linear programs solved",
     "again": "programs solved a second time, with refined steps or by HiGHS",
-    "expected_reduction": "fraction by which errors of f_n fall once this one is known, from "
-    "covariances",
-    "reduction": "fraction by which the mean interval of f_n shortens, by exact bounds; undefined "
-    "beyond --check",
-    "mean_interval_after": "mean length of the interval of f_n once this one is known, in ⟨f_n⟩",
-    "twins": "other contacts whose f_n this one determines; the table gives their number",
+    "expected_reduction": "fraction by which the mean error of f_n falls once this one is known, "
+    "from covariances",
+    "reduction": "fraction by which the mean interval of f_n of all contacts, including this one, "
+    "shortens, by exact bounds; undefined beyond --check",
+    "mean_interval_after": "mean length of the intervals of f_n once this one is known (its own is "
+    "then 0), in ⟨f_n⟩",
+    "twins": "other contacts whose f_n this one determines; the file of --out has number_of_twins "
+    "instead",
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
     "shear_stress_from_to": "range of σ_xy/P that the contacts can carry",
     "admissible_stress": "a stress well inside these ranges, to copy into --stress",

@@ -240,7 +240,8 @@ def add_informative(commands: Commands) -> None:
     command = subcommand(
         commands,
         "informative",
-        "rank contacts by how much measuring their normal force would narrow all others",
+        "rank contacts by how much measuring their normal force would shorten the intervals of all "
+        "contacts, including their own",
         "granforce informative -n 400 --mu 0.1 --seed 1 --best 5 --known known.csv",
         lines=report_lines.INFORMATIVE,
     )

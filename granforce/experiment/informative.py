@@ -1,4 +1,4 @@
-"""Which measurement next: the contact whose force would say most about all others."""
+"""Which measurement next: the contact whose force, once known, leaves the shortest intervals."""
 
 from __future__ import annotations
 
@@ -61,6 +61,7 @@ def informative(
 ) -> Informative:
     """The k contacts whose f_n, if known, would shorten the mean interval most; an Informative.
 
+    The mean is over all contacts, including the measured one, whose interval vanishes.
     Based on `states` uniform states: if forces were normally distributed, a known f_n of contact c
     would leave √(1 − ρ²) of the standard deviation of another one, where ρ is their correlation.
     The best `check` contacts are then sorted by exact bounds, with f_n fixed at its mean over the

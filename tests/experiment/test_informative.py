@@ -45,6 +45,13 @@ def test_the_best_measurement_shortens_the_exact_intervals_most(S):
     assert np.mean(np.array(after) < found.after[0]) < 0.1
 
 
+def test_the_interval_of_the_measured_contact_counts(S):
+    """It vanishes: the gain is at least its own part of the sum."""
+    found, now = informative(S, 5, check=5), intervals(S)
+    own = (now.high - now.low)[S.positions(found.contacts), 0]
+    assert np.all(found.reduction >= own / (now.high - now.low)[:, 0].sum() - 1e-9)
+
+
 def test_a_shorter_list_is_the_head_of_a_longer_one(S):
     """Candidates are compared by exact bounds before the list is cut."""
     assert np.array_equal(informative(S, 2).contacts, informative(S, 10).contacts[:2])

@@ -43,10 +43,11 @@ def informative(arguments: argparse.Namespace) -> None:
         "expected_reduction": dataset["part_expected"].values,
         "reduction": 1 - after / now,
         "mean_interval_after [mean]": after,
-        "twins": np.array([len(others) for others in twins]),
+        "number_of_twins": np.array([len(others) for others in twins]),
     }
     lines = {"entry": entry, "mean_interval_now [mean]": now, **ends}
     ranked = {name: values.tolist() for name, values in columns.items()} | {"twins": twins}
+    del ranked["number_of_twins"]
     with report_after(lines | ranked if arguments.json else lines, arguments.json):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
