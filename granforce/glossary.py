@@ -239,9 +239,10 @@ TERMS = {
     "backbone": Term("backbone", "The bodies and contacts that can carry a force."),
     # Sources of states
     "walk": Term(
-        "the paper's random walk",
-        "At each step, all forces are kicked at random and then brought back into balance. Most "
-        "of its states lie on the boundary of S; in a two-dimensional shadow of many "
+        "random walk",
+        "At each step, all forces are kicked at random and then brought back into balance: in the "
+        "nearest-network walk by moving to the nearest network, in the paper's walk by sweeps. "
+        "Most of its states lie on the boundary of S; in a two-dimensional shadow of many "
         "dimensions, even boundary points can fall near the middle.",
     ),
     "uniform": Term(
@@ -249,21 +250,21 @@ TERMS = {
         "States drawn so that every part of S is visited in proportion to its volume.",
     ),
     "accelerated": Term(
-        "nearest admissible state",
+        "nearest-network walk",
         "After a kick, the balanced network nearest to the kicked forces in force space: fast, "
         "and always found.",
     ),
     "nearest": Term(
-        "nearest admissible state, by PIQP",
+        "nearest-network walk, by PIQP",
         "The same network nearest to the kicked forces, computed by another program as a check.",
     ),
     "gauss_seidel": Term(
-        "Gauss–Seidel, finished exactly",
+        "walk by sweeps, finished exactly",
         "After a kick, contacts are adjusted one by one, again and again (Gauss–Seidel), until "
         "nearly in balance, as in the paper; the nearest network supplies the last digits.",
     ),
     "gauss_seidel_only": Term(
-        "paper's plain Gauss–Seidel",
+        "the paper's walk, by sweeps alone",
         "After a kick, contacts are adjusted one by one, again and again (Gauss–Seidel), until "
         "all disks are in balance, as in the paper: slow, and some attempts fail.",
     ),

@@ -72,7 +72,7 @@ def rest(replay: Replay) -> str:
         "tenth.</p><p><b>Where the networks "
         f"come from.</b> {term('walk')}: perturb all forces at random, move to the nearest "
         f"network in balance, and repeat. The {term('original')} is the one it came to rest with. "
-        f"All this follows {term('paper')}.</p>"
+        f"The definitions follow {term('paper')}, whose own walk relaxes by sweeps.</p>"
     )
     around = (
         f"<p><b>Around the picture.</b> Dashed: the box{_sides(replay)}; disks outside it are "

@@ -13,7 +13,7 @@ import xarray as xr
 from granforce.measures.sampling import FEWEST, MIXED
 
 from ..results.replays import Replay, worded
-from ..results.selection import KINDS, SOLVERS, Selection
+from ..results.selection import SOLVERS, Selection
 from ..state.app_state import AppState
 from ..widgets.hints import term
 
@@ -34,7 +34,7 @@ class Quantity(NamedTuple):
 class Sampling(NamedTuple):
     """How the states were generated, and whether they are reliable, in words."""
 
-    sampler: str  # "random walk, nearest admissible state"
+    sampler: str  # "nearest-network walk"
     networks: str  # "1000 of 1000 attempts accepted, 50 kept"
     verdict: str  # "mixed", "not mixed", or empty if undecided
     mixing: str  # the reason: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20"
@@ -126,7 +126,7 @@ def sampler(selection: Selection) -> str:
     """The sampler, in words."""
     if selection.kind == "uniform":
         return "uniform sample of S"
-    return f"{KINDS['walk'].removeprefix('the ')}, {SOLVERS[selection.relax]}"
+    return SOLVERS[selection.relax]
 
 
 def _networks(replay: Replay) -> str:

@@ -18,12 +18,12 @@ from ..background.limits import Limits
 
 # Names on screen of kinds.RELAXATIONS; the first is the default of a new walk.
 SOLVERS = {
-    "accelerated": "nearest admissible state",
-    "nearest": "nearest admissible state, by PIQP",
-    "gauss_seidel": "Gauss–Seidel, finished exactly",
-    "gauss_seidel_only": "paper's plain Gauss–Seidel",
+    "accelerated": "nearest-network walk",
+    "nearest": "nearest-network walk, by PIQP",
+    "gauss_seidel": "walk by sweeps, finished exactly",
+    "gauss_seidel_only": "the paper's walk, by sweeps alone",
 }
-KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
+KINDS = {"walk": "random walk", "uniform": "uniform in S"}
 # Command-line options of a packing, apart from N, μ and seed.
 OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
 WORDS = {"accuracy": "step-accuracy"}  # those with other names on the command line
@@ -132,7 +132,7 @@ def differing(requested: Selection, shown: Selection | None) -> str:
         words.append(f"packed at μ = {requested.packing['mu']:g}")
     if requested.kind != shown.kind:
         words.append(
-            f"states {KINDS[requested.kind]}" if requested.kind == "uniform" else KINDS["walk"]
+            f"states {KINDS[requested.kind]}" if requested.kind == "uniform" else "a random walk"
         )
     if requested.states != shown.states:
         words.append(f"{requested.states} states")

@@ -270,9 +270,10 @@ def add_walk_options(command: Parser) -> None:
         "--relax",
         choices=list(RELAXATIONS),
         default="nearest",
-        help="relaxation of a state: nearest (default) and nearest_piqp (a check by PIQP) find the "
-        "nearest admissible network; gauss_seidel uses the paper's contact dynamics and finishes "
-        "with the nearest network; gauss_seidel_only does not finish (slower, to 1e-6)",
+        help="relaxation of a state: nearest (default: the nearest-network walk) and nearest_piqp "
+        "(a check by PIQP) move to the nearest network; gauss_seidel_only is the paper's walk, by "
+        "Gauss–Seidel sweeps to a residual of 1e-6; gauss_seidel sweeps to 1e-3 and finishes with "
+        "the nearest network",
     )
     group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")

@@ -412,7 +412,7 @@ def add_study(commands: Commands) -> None:
     group.add_argument("--packings", type=int, help="packings at each μ (default 30)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
     group.add_argument(
-        "--gauss-seidel-packings", type=int, help="packings with the paper's walks (10)"
+        "--gauss-seidel-packings", type=int, help="packings with the paper's walk (10)"
     )
     group.add_argument(
         "--response-packings", type=int, help="packings pushed at contacts (default 10)"

@@ -1,8 +1,9 @@
-"""The paper's random walk in S: perturb every force, relax to an equilibrium, accept or stay.
+"""Random walks in S: perturb every force, relax to an equilibrium, accept or stay.
 
-The paper relaxes by contact dynamics: relax=gauss_seidel with rest=None and tolerance=EQUILIBRIUM.
-By default the walk moves to the network nearest to the perturbed one, which is 10 to 400 times
-faster and always exists; it visits the same kind of states (see `granforce bench`, part walks).
+The paper's walk relaxes by contact dynamics: relax=gauss_seidel with rest=None and
+tolerance=EQUILIBRIUM. The nearest-network walk, the default, moves to the network nearest to the
+perturbed one, which is 10 to 400 times faster and always exists. The two spread differently (see
+the page on results).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Uniform sampling of S: states of equal density in the affine hull of S, with diagnostics.
 
-Unlike the paper's walk, whose measure is not known, these walks have the uniform measure as their
-stationary one (see `billiard`), for any initial state.
+Unlike walks that relax kicked forces, these have a known stationary measure, the uniform one (see
+`billiard`), for any initial state.
 """
 
 from __future__ import annotations

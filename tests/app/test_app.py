@@ -83,7 +83,7 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     cells = library.cells()
     assert [cell.mu for cell in cells] == [0, 0.1, 1]
     assert {cell.series for cell in cells} == {
-        f"N = {DISKS}, seed 1, {STATES} states, nearest admissible state, by PIQP"
+        f"N = {DISKS}, seed 1, {STATES} states, nearest-network walk, by PIQP"
     }
 
 
@@ -617,7 +617,7 @@ def test_a_link_keeps_what_single_tabs_show(state, visited):
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
     line = StatusLine(state)
-    assert "random walk" in line.facts[-1] and "Still showing" not in line.facts[0]
+    assert "nearest-network walk" in line.facts[-1] and "Still showing" not in line.facts[0]
     state.param.update(missing=True)
     assert f"Still showing μ = {state.cell.mu:g}" in line.facts[0]
 

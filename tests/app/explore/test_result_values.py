@@ -37,7 +37,7 @@ def test_free_dimensions_are_derived(ready):
 
 def test_the_walk_says_how_it_was_sampled(ready):
     told = result_values.sampling(ready)
-    assert str(told).startswith("paper's random walk, nearest admissible state, 1000 of 1000")
+    assert str(told).startswith("nearest-network walk, 1000 of 1000")
     assert "50 kept" in told.networks and "at least" in told.mixing and not told.doubt
     assert told.verdict == "mixed" and "≤ 1.1" in told.mixing and ">mixed</span>" in str(told)
 

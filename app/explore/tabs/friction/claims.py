@@ -19,8 +19,8 @@ VERDICTS = {
 }
 # Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
-    "gauss_seidel": "paper’s sweeps, to 10⁻³",
-    "nearest": "random walk",
+    "gauss_seidel": "the paper’s walk, to 10⁻³",
+    "nearest": "nearest-network walk",
     "uniform": "uniform in S",
     "exact": "exact",
     "": "packings alone",

@@ -21,11 +21,11 @@ from .against_friction import COLOURS, MARKERS, AgainstFriction, Line, Points
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃", 0.15))
 # Parts of the study, and their labels.
 SAMPLERS = {
-    "walk": "random walk",
-    "sweeps_1e-3": "by Gauss–Seidel, to 10⁻³",
+    "walk": "nearest-network walk",
+    "sweeps_1e-3": "the paper’s walk, to 10⁻³",
     "uniform": "uniform in S",
     "exact": "exact",
-    "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
+    "sweeps_1e-4": "the paper’s walk, to 10⁻⁴",
 }
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
@@ -72,7 +72,8 @@ class Indeterminacy:
         mu, value, error = max(points, key=lambda point: point[1])
         z = statistics.means(walks, "coordination")
         return (
-            f"<b>Forces are least determined at μ = {mu:g}: η₂ = {with_error(value, error)}.</b> "
+            f"<b>In nearest-network walks, η₂ is largest at μ = {mu:g}: "
+            f"{with_error(value, error)}.</b> "
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
             f"As in the paper's Figure 1. Points: means over {packings(walks)} packings of 400 "
@@ -178,8 +179,9 @@ class Correlations:
         return (
             "<b>Are the strong contacts the undetermined ones?</b> (Figure 6) The "
             f"{term('correlation')} of fₙ as packed with ΔFₙ lies between {min(values):.2f} and "
-            f"{max(values):.2f} for the walk; it is largest, {with_error(most, error)}, at "
-            f"μ = {mu:g}. 1: the strongest contacts are the least determined; 0: unrelated."
+            f"{max(values):.2f} for nearest-network walks; it is largest, "
+            f"{with_error(most, error)}, at μ = {mu:g}. 1: the strongest contacts are the least "
+            "determined; 0: unrelated."
         )
 
 
