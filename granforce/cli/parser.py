@@ -42,8 +42,8 @@ def _main(argv: Sequence[str] | None) -> int:
     with interrupts.noted():
         try:
             return _run(arguments, parser)
-        except KeyboardInterrupt:
-            return _report_interrupt()
+        except KeyboardInterrupt as error:
+            return _report_interrupt(str(error))
         except streams.OutputError:
             raise
         except Exception:
@@ -118,8 +118,8 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
         raise InputError(strange)
 
 
-def _report_interrupt() -> int:
-    print("granforce: interrupted; finished entries are saved", file=sys.stderr)
+def _report_interrupt(saved: str = "") -> int:
+    print(f"granforce: interrupted{saved and f'; {saved}'}", file=sys.stderr)
     return 130
 
 

@@ -29,9 +29,10 @@ from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
 from granforce.records import InputError, Packing, choice, real_array, whole, worker_count
 from granforce.study import kinds
-from granforce.study.cells import StudyCell, get, load, row
+from granforce.study.cells import StudyCell, entry_name, get, load, row
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import open_store
+from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.system.terminal import one_line
 from granforce.types import Progress
@@ -147,7 +148,7 @@ def run(
     decreases; on_done(position in cells, whether it was stored) is called after each. Once enough()
     is true no further cell is started; running ones are finished (not called with a scheduler,
     which gets all cells at once). An interruption loses only running cells, and workers end with
-    this process.
+    this process; the KeyboardInterrupt says how many cells are saved.
 
     Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """
@@ -173,9 +174,11 @@ def run(
         ended += 1
         tell(ended)
 
-    if todo:
-        tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
-        needs = _needs({k: cells[k] for k in todo})
+    if not todo:
+        return []
+    tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
+    needs = _needs({k: cells[k] for k in todo})
+    try:
         if scheduler is None:
             store.make()
             waits = Waits(needs, failed)
@@ -187,6 +190,9 @@ def run(
                 for part in (first, tasks.keys() - first):
                     some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
                     _over_dask(client, some, scheduler, finished)
+    except KeyboardInterrupt:
+        saved = sum(entry_name(store, *cell) in store for cell in cells)
+        raise KeyboardInterrupt(f"saved {saved} of {len(cells)} cells") from None
     return [(cells[k], failed[k]) for k in sorted(failed)]
 
 
@@ -240,7 +246,8 @@ def _over_processes(
     advanced: Callable[[float], object],
     enough: Callable[[], bool],
 ) -> None:
-    warm_up({cell.kind for _, cell, _ in tasks.values()})
+    with cancelling.watched():  # the compiler cannot be interrupted
+        cancelling.apart(warm_up, {cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
