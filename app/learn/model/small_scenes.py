@@ -238,6 +238,7 @@ def _of_blocks(
         fixed=np.arange(count, count + len(walls)),
         tolerance=SNAP,
         balanced=False,
+        names=[str(k + 1) for k in range(count)] + [f"wall {k + 1}" for k in order],
     )
     load, contacts = packing.load.copy(), packing.contacts
     levers = contacts.offsets.copy()

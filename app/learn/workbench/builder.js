@@ -85,14 +85,19 @@ export class Builder {
   }
 
   /** The chosen body if it is a block, while blocks are placed. */
-  get block() { return this.tool === "block" ? this.bodies[this.chosen] : undefined }
+  get block() {
+    const body = this.tool === "block" ? this.bodies[this.chosen] : undefined
+    return body?.length > 3 ? body : undefined
+  }
 
   /** Typed width, height or degrees (side 0, 1, 2) of new blocks, and of the chosen one if there is room. */
   size(side, text) {
     const value = Number(text.replace(",", ".")), { block, sizes } = this
     const given = (block?.slice(2) ?? sizes.block).with(side, side < 2 ? Math.min(SIZES[1], Math.max(SIZES[0], value)) : value % 360)
-    if (text.trim() && Number.isFinite(value) && (!block || this.reshape(this.chosen, given))) sizes.block = given
+    const meant = text.trim() && Number.isFinite(value), fits = meant && (!block || this.reshape(this.chosen, given))
+    if (fits) sizes.block = given
     this.tell()
+    if (!fits) this.host.querySelector(".how").textContent = meant ? "There is no room to change the block like this." : "Type a number."
   }
 
   /** Choose pressure or gravity. */
@@ -118,6 +123,7 @@ export class Builder {
     const rows = (part) => (part ?? "").split(";").filter(Boolean).map((row) => row.split(",").map(Number))
     const [bodies, walls, press] = text.split("|")
     Object.assign(this, { chosen: null, bodies: rows(bodies), walls: rows(walls), text, pressure: press !== undefined })
+    if (this.tool === "disk" && this.bodies.every((body) => body.length > 3)) this.tool = "block"
     this.pressing = new Set((press ?? "").slice(1).split(",").filter(Boolean).map((k) => this.walls[k]))
     this.tell()
     return true

@@ -163,6 +163,15 @@ def test_a_block_dragged_over_the_edge_falls(look):
     page.mouse.up()
     free(page, 2)
     searched(page, "%3B4.8")
+    page.get_by_role("radio", name="Disks").click()
+    page.mouse.click(*px(1.5, 1.1))
+    says(page, "holds the same bodies at rest")
+    page.get_by_role("radio", name="Blocks").click()
+    page.mouse.move(*px(1.5, 1))  # a disk is moved, and chosen
+    page.mouse.down()
+    page.mouse.move(*px(1.4, 1.1), steps=2)
+    page.mouse.up()
+    page.get_by_role("radio", name="Disks", checked=True).wait_for()
 
 
 def test_a_ladder_is_leant_by_keys_and_its_link_and_file_carry_it(look, tmp_path):
@@ -181,6 +190,9 @@ def test_a_ladder_is_leant_by_keys_and_its_link_and_file_carry_it(look, tmp_path
     page.get_by_role("img", name="Disks").press("e")
     page.get_by_role("img", name="Disks").press("e")
     assert page.get_by_role("textbox", name="degrees").input_value() == "-60"
+    page.get_by_role("textbox", name="height").fill("thin")
+    page.get_by_role("textbox", name="height").press("Enter")
+    page.get_by_text("Type a number.").wait_for()
     page.mouse.move(*px(4, 1.35))
     page.mouse.down()
     page.mouse.move(*px(1.3, 1.4), steps=8)
