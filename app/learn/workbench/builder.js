@@ -166,8 +166,7 @@ export class Builder {
   add(at) {
     const put = this.placed([...at, ...this.sizes[this.tool]], -1, 45)
     if (!put) return
-    this.chosen = this.bodies.push(put) - 1
-    this.held = { body: this.chosen, grip: [put[0] - at[0], put[1] - at[1]] }
+    this.take(this.bodies.push(put) - 1, at)
     this.publish()
   }
 
@@ -277,12 +276,9 @@ export class Builder {
   /** A row at the nearest position in contact, a block after turning by up to `most` degrees onto an edge; null if there
    * is no room. */
   placed(row, own, most) {
-    const degrees = row.length > 3 ? [this.flat(row, own, most), row[4]] : [undefined]
-    for (const turned of degrees.map((angle) => (angle === undefined ? row : row.with(4, angle)))) {
-      const at = this.settled(turned, own)
-      if (at) return [...at, ...turned.slice(2)]
-    }
-    return null
+    const turned = row.length > 3 ? row.with(4, this.flat(row, own, most)) : row, at = this.settled(turned, own)
+    if (at) return [...at, ...turned.slice(2)]
+    return turned[4] === row[4] ? null : this.placed(row, own, 0)
   }
 
   /** Degrees of a block that lies flat on the nearest edge, if it turns by `most` at most. */
