@@ -205,7 +205,7 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "pack -n 12 --mu 0.3": set(),
     "walk P --states 4": set(),
     "measure P --states 4": set(),
-    "uniform P --states 8": set(),
+    "uniform P --states 8": {"reached"},
     "volume P --accuracy 0.5": set(),
     "intervals P": set(),
     "limit-loads P --contacts 0": set(),
@@ -393,7 +393,7 @@ def test_a_result_is_printed_in_few_lines():
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf"])
-@pytest.mark.parametrize("colour", ["mobilisation", "force", "spread"])
+@pytest.mark.parametrize("colour", ["mobilisation", "force", "spread", "interval"])
 def test_a_packing_is_drawn_with_states_and_walls(suffix, colour, tmp_path):
     packing = gf.scene("groove", 0.5)
     states = gf.walk(gf.ensemble(packing), 5).states
@@ -404,6 +404,26 @@ def test_a_packing_is_drawn_with_states_and_walls(suffix, colour, tmp_path):
     assert (tmp_path / f"picture.{suffix}").stat().st_size > 5000
     with pytest.raises(gf.InputError, match=r"contacts=S\.index"):
         gf.plot(packing, states[:, :1])
+
+
+def test_the_colour_bar_names_the_quantity_and_its_unit():
+    S = gf.ensemble(gf.scene("box", 0.3))
+    exact = gf.intervals(S)
+    column = gf.to_dataframe(exact, S)["f_n_high [packing]"]
+
+    def bar(colour, **options):
+        drawn = list(gf.plot(S.packing, colour=colour, backend="matplotlib", **options))
+        return drawn[-1].get_dimension("value").label, drawn[-1].dimension_values("value")
+
+    assert bar(column)[0] == "f_n_high [packing]"
+    assert bar(column.to_numpy(), label="largest f_n, N")[0] == "largest f_n, N"
+    label, values = bar("interval")
+    extent = gf.measures.normal_extent(exact.low, exact.high) / S.force_scale
+    assert label == "interval of f_n / ⟨f_n⟩" and sorted(values) == pytest.approx(sorted(extent))
+    with pytest.raises(gf.InputError, match="leave it out"):
+        bar("force", label="N")
+    with pytest.raises(gf.InputError, match="states must be real numbers"):
+        gf.plot(S.packing, exact.low.flatten)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "zarr"])

@@ -59,6 +59,7 @@ MEANINGS = {
     "least_other_gap": "smallest gap of a pair that is not a contact, in largest radii, or 0.1",
     "steps": "time steps of the compaction",
     "sweeps_done": "Gauss–Seidel sweeps in these steps",
+    "at_rest": "whether exact dynamics leaves the packing at rest, also with noise on its forces",
     "distance_to_rest": "largest change of a force until exact dynamics is at rest, in ⟨f_n⟩",
     "scene": "name of the scene",
     "timestep": "time step of the snapshot",
@@ -142,7 +143,7 @@ PACKING = (
     *("mean_normal_force", "residual", "violation", "largest_overlap", "largest_contact_gap"),
     "least_other_gap",
 )
-PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "cached")
+PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "at_rest", "cached")
 IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
 WALK = (
     *("entry", *_STATES, "acceptance", "accepted", "rejected", "unconverged", "skipped"),
@@ -198,7 +199,7 @@ INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_contacts"),
     *("carry_for_certain", "states", "mean_standard_error", *_MIXING, "held", "setup_seconds"),
-    *("sampling_seconds", "reached", "seconds", "cached"),
+    *("sampling_seconds", "seconds", "cached"),
 )
 
 

@@ -71,13 +71,13 @@ def _write_arrays(path: str, arrays: Mapping[str, Any]) -> None:
         np.savez(file, **arrays)
 
 
-def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns {name: array} as a table; integers stay integers."""
+def write_csv(path: str | Path, columns: Mapping[str, Any], *, digits: int = 17) -> None:
+    """Write columns {name: array} as a table; integers stay integers, 17 digits are exact."""
     with written(path) as file:
         np.savetxt(
             file,
             np.column_stack(list(columns.values())),
-            fmt=["%d" if v.dtype.kind == "i" else "%.17g" for v in columns.values()],
+            fmt=["%d" if v.dtype.kind == "i" else f"%.{digits}g" for v in columns.values()],
             delimiter=",",
             header=",".join(columns),
             comments="",

@@ -345,10 +345,11 @@ def add_plot(commands: Commands) -> None:
     )
     command.add_argument(
         "--colour",
-        choices=["mobilisation", "force", "spread"],
+        choices=["mobilisation", "force", "spread", "interval"],
         default="mobilisation",
-        help="quantity shown as colour: mobilisation f_t/(μ f_n) (default), force f_n, or spread, "
-        "the standard deviation of f_n over the networks",
+        help="quantity shown as colour: mobilisation f_t/(μ f_n) (default); or, in ⟨f_n⟩: force "
+        "f_n, spread (standard deviation of f_n over the networks) or interval (length of the "
+        "exact interval of f_n)",
     )
     command.leaves_out("without --states", lambda arguments: arguments.states is None, {"state"})
 
@@ -664,7 +665,14 @@ def add_import(commands: Commands) -> None:
     add_series(mercury)
     table = import_format(
         *(formats, "table", "import a table of grains and, optionally, a table of contacts"),
-        *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and f_n, f_t if known"),
+        *(
+            "grains.csv contacts.csv",
+            "columns x, y, r; optionally id, fx, fy, torque "
+            "(external load, without --box) and open (1: balance not required, 0)",
+            "columns i, j (ids, "
+            "or row numbers from 0); optionally nx, ny, length (otherwise the nearest images touch), "
+            "and f_n, f_t",
+        ),
         contacts_needed=False,
     )
     add_cell(table)

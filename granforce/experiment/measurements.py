@@ -24,7 +24,11 @@ class Measurement(NamedTuple):
     sigma: Floats  # (k, 2) standard errors
 
     def on(self, count: int) -> tuple[Floats, Floats]:
-        """Forces and σ (count, 2) of all contacts of a packing; InputError for unknown contacts."""
+        """Forces and σ of all contacts of a packing, two arrays (count, 2); NaN if not measured.
+
+        count: the number of contacts of the packing (not of S: pick those by `Ensemble.index`).
+        Raises InputError for contacts that the packing does not have.
+        """
         if self.contacts.max(initial=0) >= count:
             raise InputError(
                 f"contact {self.contacts.max()} was measured, but the packing's contacts are "

@@ -8,24 +8,31 @@ import holoviews as hv
 import numpy as np
 import numpy.typing as npt
 
+from granforce.explore.intervals import intervals
 from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
-from granforce.records import InputError, Packing, brief, float_array, takes
+from granforce.records import InputError, Packing, brief, float_array, real_array, takes
 from granforce.system.plain import counted
 from granforce.tolerances import ADMISSIBLE
 from granforce.types import Floats
 
-COLOURS = ("mobilisation", "force", "spread")
+COLOURS = ("mobilisation", "force", "spread", "interval")
 WIDEST = 4.0  # f_n / ⟨f_n⟩ beyond which lines have constant width
 FILL, EDGE = "#eeeeee", "#aaaaaa"  # of disks
 MOST_DISKS = 4000  # disks are not drawn in larger packings
-_MAPS = {"mobilisation": "coolwarm", "force": "viridis_r", "spread": "magma_r"}
+_MAPS = {
+    "mobilisation": "coolwarm",
+    "force": "viridis_r",
+    "spread": "magma_r",
+    "interval": "magma_r",
+}
 _WORDS = {
     "mobilisation": "f_t / (μ f_n)",
     "force": "f_n / ⟨f_n⟩",
     "spread": "spread of f_n / ⟨f_n⟩",
+    "interval": "interval of f_n / ⟨f_n⟩",
 }
 
 
@@ -36,6 +43,7 @@ def plot(
     colour: str | npt.ArrayLike = "mobilisation",
     *,
     contacts: npt.ArrayLike | None = None,
+    label: str | None = None,
     backend: str = "bokeh",
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
@@ -44,8 +52,10 @@ def plot(
     states: a network (k, 2) or networks (…, k, 2), also of several chains, whose mean is drawn,
     force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
     there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
-    "force", "spread" (standard deviation of f_n over states), or numbers (k,). Walls are drawn
-    as given, or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
+    "force", "spread" (standard deviation of f_n over states), "interval" (length
+    of the exact interval of f_n, computed here), or numbers (k,). label: their quantity and unit,
+    for the colour bar; by default the name of a pandas or xarray object. Walls are drawn as given,
+    or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
     .html with the first, and .pdf, .png, .svg with the second.
 
     Raises InputError for states that do not match these contacts, and for an unknown colour.
@@ -53,7 +63,7 @@ def plot(
     style.ready(backend)
     count = len(packing.contacts.i)
     numbers = np.arange(count) if contacts is None else np.asarray(contacts)
-    drawn = packing.forces[numbers] if states is None else np.asarray(states, dtype=float)
+    drawn = packing.forces[numbers] if states is None else real_array(states, "states")
     if drawn.shape[-2:] != (len(numbers), 2):
         raise InputError(
             f"states have shape {drawn.shape}, for {len(numbers)} contacts of the packing; give "
@@ -61,12 +71,14 @@ def plot(
         )
     several = drawn.reshape(-1, len(numbers), 2)
     mean = several.mean(axis=0)
-    if isinstance(colour, str) and colour in ("force", "spread"):
+    if isinstance(colour, str) and colour in COLOURS[1:]:
         unit, scale = _unit(packing, mean)
     else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
         unit, scale = mean[:, 0].mean() or 1.0, ""
-    friction = packing.contacts.friction(packing.mu)[numbers]
-    values, label, look = _coloured(friction, several, mean, colour, unit)
+    values, name, look = _coloured(packing, numbers, several, mean, colour, unit)
+    if name and label is not None:
+        raise InputError(f"label is for numbers as colour; with {brief(colour)} leave it out")
+    label = name or label or str(getattr(colour, "name", None) or "value")
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
     elements += _walls(packing, numbers, backend)
     elements.append(_lines(packing, numbers, mean / unit, values, label, look, backend))
@@ -89,24 +101,41 @@ def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:
 
 
 def _coloured(
-    friction: Floats, several: Floats, mean: Floats, colour: str | npt.ArrayLike, unit: float
+    packing: Packing,
+    numbers: npt.NDArray[Any],
+    several: Floats,
+    mean: Floats,
+    colour: str | npt.ArrayLike,
+    unit: float,
 ) -> tuple[Floats, str, dict[str, Any]]:
-    """Numbers (k,) for the colour, their name, and the colour scale."""
+    """Numbers (k,) for the colour, their name (empty for given numbers), and the colour scale."""
     if not isinstance(colour, str):
         values = float_array(colour, (len(mean),), "colour")
-        return values, "colour", {"cmap": "viridis_r"}
+        return values, "", {"cmap": "viridis_r"}
     if colour not in COLOURS:
         raise InputError(f"colour must be {', '.join(COLOURS)} or numbers, got {brief(colour)}")
     look: dict[str, Any] = {"cmap": _MAPS[colour]}
     if colour == "mobilisation":
-        limit = friction * mean[:, 0]
+        limit = packing.contacts.friction(packing.mu)[numbers] * mean[:, 0]
         values = np.divide(mean[:, 1], limit, np.zeros(len(mean)), where=limit > 0)
         # The colour bar gets an arrow at an end beyond which there are values; rounding is none.
         admitted = np.abs(mean[:, 1]) - limit <= ADMISSIBLE * unit
         values[admitted] = np.clip(values[admitted], -1, 1)
         return values, _WORDS[colour], look | {"clim": (-1, 1)}
-    values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
+    if colour == "interval":
+        values = _extents(packing)[numbers]
+    else:
+        values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
     return values / unit, _WORDS[colour], look
+
+
+def _extents(packing: Packing) -> Floats:
+    """Lengths (N_c,) of the exact intervals of f_n, force; 0 where no network presses."""
+    S = ensemble(packing)
+    bounds = intervals(S)
+    extents = np.zeros(len(packing.contacts.i))
+    extents[S.index] = bounds.high[:, 0] - bounds.low[:, 0]
+    return extents
 
 
 def _lines(

@@ -25,11 +25,11 @@ _WEIGHTY = 1e-6
 
 @notebook.brief
 class Known(NamedTuple):
-    """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high."""
+    """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high; a side left out is open."""
 
     contacts: Integers  # (k,) numbers in the packing
-    low: Floats  # (k, 2) force; −inf where nothing is known
-    high: Floats  # (k, 2) force; inf where nothing is known; equal to low for a pin
+    low: Floats = np.array(-np.inf)  # (k, 2) force; −inf where nothing is known
+    high: Floats = np.array(np.inf)  # (k, 2) force; inf where nothing is known; low for a pin
 
 
 class Polygons(NamedTuple):

@@ -30,9 +30,9 @@ def renew(paths: Sequence[Path], results: Mapping[str, Any]) -> None:
 
 
 def _table(rows: Any) -> str:
-    """The rows of a part as a table."""
+    """The rows of a part as a table; empty for a part that was not measured."""
     if not rows:
-        return "*Not measured in this run.*\n"
+        return ""
     if isinstance(rows, dict):  # the environment
         libraries = {name: version for name, version in rows["libraries"].items() if version}
         values = {name: value for name, value in rows.items() if name != "libraries"} | libraries

@@ -346,6 +346,19 @@ def test_a_contact_that_carries_nothing_cannot_be_known_to_carry():
     assert np.array_equal(K.index, S.index)
 
 
+def test_a_side_left_out_is_open():
+    packing, contact = gf.scene("groove", 0.3), 0
+    for given, both in (
+        ({"high": [[0.6, np.inf]]}, ([[-np.inf] * 2], [[0.6, np.inf]])),
+        ({"low": [[0.6, -np.inf]]}, ([[0.6, -np.inf]], [[np.inf] * 2])),
+    ):
+        one = gf.intervals(gf.ensemble(packing, known=gf.Known([contact], **given)))
+        two = gf.intervals(gf.ensemble(packing, known=gf.Known([contact], *both)))
+        assert np.array_equal(one.low, two.low) and np.array_equal(one.high, two.high)
+        free = gf.intervals(gf.ensemble(packing))
+        assert not np.array_equal(one.low, free.low) or not np.array_equal(one.high, free.high)
+
+
 def test_bounds_of_determined_forces_are_in_order_and_are_read_back(tmp_path):
     packing = gf.scene("box", 0)
     exact = gf.intervals(gf.ensemble(packing))

@@ -114,7 +114,6 @@ def infer(arguments: argparse.Namespace) -> int | None:
         lines |= {"states": dataset.sizes["state"]}
         lines |= forces.reported({"mean_standard_error": error.mean()})
         lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
-        lines |= {"reached": bool(dataset["reached"].item())}
         for k, part in enumerate(("f_n", "f_t")):
             expected = dataset["expected"].values[:, k]
             columns |= forces.named({f"{part}_mean": expected, f"{part}_error": error[:, k]})

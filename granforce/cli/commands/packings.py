@@ -39,7 +39,12 @@ def pack(arguments: argparse.Namespace) -> None:
     packing, cached = get_packing(store, parameters, max_steps=max_steps)
     reported = "steps", "sweeps_done", "largest_contact_gap", "least_other_gap", "distance_to_rest"
     work = {name: packing.info[name] for name in reported}
-    lines = {**importers.report(packing), **work, "cached": cached}
+    lines = {
+        **importers.report(packing),
+        **work,
+        "at_rest": bool(np.isfinite(work["distance_to_rest"])),
+        "cached": cached,
+    }
     _report(lines, packing, arguments)
 
 

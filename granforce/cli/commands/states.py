@@ -30,6 +30,10 @@ from granforce.system.terminal import Bar, print_report, report_after, table
 from granforce.types import Rows
 
 
+# Digits in the table of a scan, whose numbers are means; the store has them exactly.
+DIGITS = 9
+
+
 def walk(arguments: argparse.Namespace) -> None:
     """Make or load a random walk, and report its course."""
     entry, parameters, dataset, ends = walked(arguments, arguments.out)
@@ -70,7 +74,7 @@ def uniform(arguments: argparse.Namespace) -> int:
         "states": dataset.sizes["state"],
         **extension(dataset),
         **{name: dataset[name].item() for name in UNIFORM_LINES},
-        "reached": reached,
+        **({} if arguments.effective is None else {"reached": reached}),
         "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
         "original_distance": dataset["original_distance"].item(),
         "largest_residual": float(dataset["residual"].max()),
@@ -165,9 +169,8 @@ def scan(arguments: argparse.Namespace) -> int:
     try:
         if to_table and rows:
             names = [name for name in rows[0] if name != "cached"]
-            write_csv(
-                arguments.out, {name: np.array([row[name] for row in rows]) for name in names}
-            )
+            columns = {name: np.array([row[name] for row in rows]) for name in names}
+            write_csv(arguments.out, columns, digits=DIGITS)
     finally:
         _report_scan(rows, failed, arguments.json)
     return 1 if failed else 0
