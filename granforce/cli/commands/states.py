@@ -29,7 +29,6 @@ from granforce.study.store import open_store
 from granforce.system.terminal import Bar, print_report, report_after, table
 from granforce.types import Rows
 
-
 # Digits in the table of a scan, whose numbers are means; the store has them exactly.
 DIGITS = 9
 
