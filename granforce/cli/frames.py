@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, with_units
+from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, different, with_units
 from granforce.cli.tables import write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
@@ -104,12 +104,7 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
     """The numbers of the requested frames."""
     if text == "all":
         return list(there)
-    try:
-        numbers = {float(part) for part in text.split(",")}
-    except ValueError:
-        raise InputError(
-            f"--frames {text[:40]!r}: give all, or numbers separated by commas"
-        ) from None
+    numbers = set(different("--frames", text, float) or [])
     for number in sorted(numbers - set(there)):
         raise InputError(f"no frame {number:g}; the frames are {min(there):g} … {max(there):g}")
     return [number for number in there if number in numbers]

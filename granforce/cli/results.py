@@ -269,6 +269,15 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
     return lines
 
 
+# Work of the samplers, which only the JSON report has.
+_WORK = ("turns", "refused", "dropped", "held")
+
+
+def without_work(lines: Mapping[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
+    """The lines of a report; those on the samplers' work only for --json."""
+    return {name: v for name, v in lines.items() if arguments.json or name not in _WORK}
+
+
 def contact_labels(
     arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
 ) -> dict[str, Any]:

@@ -669,9 +669,8 @@ def add_import(commands: Commands) -> None:
             "grains.csv contacts.csv",
             "columns x, y, r; optionally id, fx, fy, torque "
             "(external load, without --box) and open (1: balance not required, 0)",
-            "columns i, j (ids, "
-            "or row numbers from 0); optionally nx, ny, length (otherwise the nearest images touch), "
-            "and f_n, f_t",
+            "columns i, j (ids, or row numbers from 0); optionally nx, ny, length (otherwise the "
+            "nearest images touch), and f_n, f_t",
         ),
         contacts_needed=False,
     )

@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Collection
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -143,11 +144,13 @@ def _at(plan: Plan, frictions: tuple[float, ...]) -> Plan:
 
 def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, ...]:
     try:
-        numbers = sorted({cast(part) for part in text.split(",")}) if text else []
+        numbers = sorted(cast(part) for part in text.split(",")) if text else []
     except InputError as error:
         raise InputError(f"--{option}: {error}") from None
     except ValueError:
         raise InputError(f"--{option} {text!r}: give numbers separated by commas") from None
+    if twice := [one for one, other in pairwise(numbers) if one == other]:
+        raise InputError(f"--{option} {twice[0]} is given twice; give it once")
     return tuple(numbers)
 
 

@@ -15,10 +15,12 @@ import pytest
 from packings import packed
 
 from granforce.cli import commands, parser, parsing
+from granforce.cli import frames as series_of_frames
 from granforce.forces.build import ensemble
-from granforce.packing.importers import load_packing, save_packing
+from granforce.packing.importers import load_packing, read_table, save_packing
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.scenes import scene
+from granforce.records import InputError
 from granforce.study.store import open_store
 
 MU = "-n 8 --mu 0.3"
@@ -264,20 +266,35 @@ def test_values_that_begin_with_a_minus_need_no_equals_sign(command):
             assert getattr(found, action.dest) in (value, [value])
 
 
-@pytest.mark.parametrize("line", ["intervals -n 8 --mu 0.3 --contacts 3,0,3", "scan --mu 0.3,0.30"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "intervals -n 8 --mu 0.3 --contacts 3,0,3",
+        "scan --mu 0.3,0.30",
+        "study --mu 0.1,0.1 --out s",
+    ],
+)
 def test_a_case_given_twice_is_refused(line, here, capsys):
     assert parser.main(line.split()) == 2
     assert "is given twice; give it once" in capsys.readouterr().err
 
 
-def test_a_sign_that_changes_nothing_is_refused(here, capsys, monkeypatch):
-    smooth = load_packing("p.npz")
-    smooth = smooth._replace(forces=smooth.forces * [1, 0])
-    monkeypatch.setitem(commands.packings.READERS, "table", lambda *files, **options: smooth)
-    line = "import table grains.csv grains.csv --mu 0.3 --reverse --out new.npz"
+def test_a_frame_given_twice_is_refused():
+    assert series_of_frames._chosen([1, 2, 3], "3,1") == [1, 3]
+    with pytest.raises(InputError, match="given twice"):
+        series_of_frames._chosen([1, 2], "1,1")
+
+
+def test_a_sign_that_changes_nothing_is_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("two.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
+    Path("pair.csv").write_text("i,j,f_n,f_t\n0,1,1,0\n")
+    line = "import table two.csv pair.csv --mu 0.3 --reverse --out new.npz"
     assert parser.main(line.split()) == 2
     assert "every tangential force is 0" in capsys.readouterr().err
-    assert not (here / "new.npz").exists()
+    assert not (tmp_path / "new.npz").exists()
+    with pytest.raises(InputError, match="leave it out"):
+        read_table("two.csv", "pair.csv", mu=0.3, reverse=True)
 
 
 def test_the_suffix_of_a_scan_decides_between_table_and_store(here, capsys, monkeypatch):

@@ -12,6 +12,7 @@ from granforce.cli.results import (
     contact_labels,
     found,
     unit,
+    without_work,
 )
 from granforce.cli.tables import write_columns, write_csv
 from granforce.experiment.measurements import read_measurement
@@ -117,7 +118,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         for k, part in enumerate(("f_n", "f_t")):
             expected = dataset["expected"].values[:, k]
             columns |= forces.named({f"{part}_mean": expected, f"{part}_error": error[:, k]})
-    with report_after(lines | ends, arguments.json):
+    with report_after(without_work(lines | ends, arguments), arguments.json):
         if arguments.csv is not None:
             write_csv(arguments.csv, columns)
     return None

@@ -25,7 +25,6 @@ from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
 from granforce.system.terminal import print_report
-from granforce.types import Floats
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -120,7 +119,6 @@ def import_(arguments: argparse.Namespace) -> int | None:
     packing = READERS[arguments.format](*files, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
         raise InputError("--pressure applies only to a table without forces or loads: leave it out")
-    _check_reverse(arguments, packing.forces)
     named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
@@ -130,11 +128,6 @@ def import_(arguments: argparse.Namespace) -> int | None:
         lines |= {"nearly_touching": packing.info["nearly_touching"]}
     _report(lines, packing, arguments, packing.info.get("notes", []))
     return None
-
-
-def _check_reverse(arguments: argparse.Namespace, forces: Floats) -> None:
-    if getattr(arguments, "reverse", False) and not np.nan_to_num(forces[:, 1]).any():
-        raise InputError("--reverse has no effect, as every tangential force is 0: leave it out")
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:
@@ -147,7 +140,8 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         columns=named_columns(arguments),
         **flaws_and_walls(arguments),
     )
-    _check_reverse(arguments, found.measured)
+    if arguments.reverse and not np.nan_to_num(found.measured[:, 1]).any():
+        raise InputError("--reverse has no effect, as every tangential force is 0: leave it out")
     _report(found.report, found.packing, arguments, found.report.get("notes", []))
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T

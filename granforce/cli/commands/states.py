@@ -18,6 +18,7 @@ from granforce.cli.results import (
     packing_options,
     unit,
     walked,
+    without_work,
 )
 from granforce.cli.tables import write_columns, write_csv, write_states
 from granforce.records import whole, worker_count
@@ -82,7 +83,7 @@ def uniform(arguments: argparse.Namespace) -> int:
         "sampling_seconds": dataset["sampling_seconds"].item(),
         **ends,
     }
-    print_report(lines, arguments.json)
+    print_report(without_work(lines, arguments), arguments.json)
     return 1 if arguments.effective is not None and not reached else 0
 
 
@@ -109,7 +110,7 @@ def volume(arguments: argparse.Namespace) -> int:
         **{name: n for name, n in json.loads(dataset.attrs["counts"]).items() if name != "rungs"},
         **ends,
     }
-    print_report(lines, arguments.json)
+    print_report(without_work(lines, arguments), arguments.json)
     return 0 if reached else 1
 
 

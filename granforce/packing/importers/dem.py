@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import check_disks, components, listed, once
-from granforce.packing.importers.network import LOAD_MISFIT, adopt
+from granforce.packing.importers.network import LOAD_MISFIT, adopt, refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -135,10 +135,11 @@ def read_yade(
     links = links.some(np.delete(np.arange(len(one)), at_wall))
     i, j = links.lookup("id1", ids), links.lookup("id2", ids)
     normal, shear = _yade_forces(links, plane)
-    return _packing(
+    packing = _packing(
         *(grains, plane, links, i, j, normal + shear, friction(mu), cell),
         *(on_walls, walls, reverse, most_grains, "yade"),
     )
+    return refuse_idle_reverse(packing, reverse)
 
 
 def _yade_forces(links: Table, plane: str) -> tuple[Floats, Floats]:
@@ -174,7 +175,7 @@ def read_mercury(
         reverse=reverse,
         most_grains=most_grains,
     )
-    return found.snapshot(frame).packing
+    return refuse_idle_reverse(found.snapshot(frame).packing, reverse)
 
 
 def open_mercury(

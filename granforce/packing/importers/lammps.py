@@ -10,7 +10,7 @@ import numpy as np
 
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed, once
-from granforce.packing.importers.network import LOAD_MISFIT, adopt
+from granforce.packing.importers.network import LOAD_MISFIT, adopt, refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -120,7 +120,7 @@ def read_lammps(
     found = open_lammps(
         particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
     )
-    return found.snapshot(frame).packing
+    return refuse_idle_reverse(found.snapshot(frame).packing, reverse)
 
 
 def open_lammps(

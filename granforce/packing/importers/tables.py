@@ -11,7 +11,7 @@ import numpy.typing as npt
 from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
-from granforce.packing.importers.network import LOAD_MISFIT, adopt, find
+from granforce.packing.importers.network import LOAD_MISFIT, adopt, find, refuse_idle_reverse
 from granforce.packing.importers.text import (
     Source,
     Table,
@@ -114,6 +114,7 @@ def read_table(
             "--walls and --gravity (walls=, gravity=) apply to tables without forces: leave out "
             "f_n and f_t"
         )
+    refuse_idle_reverse(packing, reverse)
     found = adopt(packing, reverse=reverse, forces="given")
     return found if closed or load.any() else _with_edge(found)
 
