@@ -710,7 +710,8 @@ def add_import(commands: Commands) -> None:
         "bodies.csv",
         "CSV with one row per corner: columns body, x, y, and optionally r (of disks), density and "
         'fixed (0 or 1); or JSON: {"bodies": [{"corners": [[x, y], …], "fixed": true}, {"disk": '
-        '[x, y, r], "density": 2}, …]}',
+        '[x, y, r], "density": 2, "material": "wood"}, …], "friction": [["stone", "wood", '
+        "0.4], …]}, with μ of pairs of materials, where it is not --mu",
         None,
     )
     blocks.add_argument(

@@ -180,10 +180,14 @@ def _missed(packing: Packing) -> str:
 def nearly_touching(gaps: Sequence[float], tolerance: float) -> str:
     """Words on pairs of bodies with these gaps, which are no contacts."""
     pairs = counted(len(gaps), "pair of bodies nearly touches", "pairs of bodies nearly touch")
-    return (
-        f"{pairs}, with gaps from {min(gaps):.2g}, and no contact at the tolerance "
-        f"{tolerance:.2g}: a larger --tolerance (tolerance=) makes them contacts"
+    return larger_tolerance(
+        f"{pairs}, with gaps from {min(gaps):.2g}, and no contact at the tolerance {tolerance:.2g}"
     )
+
+
+def larger_tolerance(pairs: str) -> str:
+    """Words on pairs that nearly touch, with what makes them contacts."""
+    return f"{pairs}: a larger --tolerance (tolerance=) makes them contacts"
 
 
 def _legend(names: Sequence[str]) -> str:

@@ -491,3 +491,11 @@ def test_options_that_a_scene_lacks_are_refused_with_those_it_has(capsys):
     ):
         assert main(["pack", *words]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("column", ["material", "friction"])
+def test_a_table_of_corners_with_materials_is_refused(column, tmp_path):
+    table = tmp_path / "bodies.csv"
+    table.write_text(f"body,x,y,{column}\na,0,0,1\na,1,0,1\na,0,1,1\n")
+    with pytest.raises(gf.InputError, match=f"column {column}: .* as JSON"):
+        gf.read_blocks(table, mu=0.3)

@@ -85,6 +85,12 @@ def _notes(packing: Packing) -> dict[str, list[str]]:
 
 
 def _from_table(table: Table) -> _Bodies:
+    for name in ("material", "friction"):
+        if name in table.header:
+            raise InputError(
+                f"{table.name}: column {name}: a table has one friction coefficient, --mu (mu=); "
+                "give materials and the friction of their pairs as JSON"
+            )
     labels = table.fields("body")
     first = {label: labels.index(label) for label in dict.fromkeys(labels)}
     body = np.array([list(first).index(label) for label in labels])

@@ -11,6 +11,7 @@ from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
+from granforce.packing.assemblies import larger_tolerance
 from granforce.packing.closing import apart, margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
@@ -252,10 +253,7 @@ def _missed(packing: Packing) -> str:
     if not len(gap):
         return ""
     pairs = counted(len(gap), "pair nearly touches", "pairs nearly touch")
-    return (
-        f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius: a larger --tolerance "
-        "(tolerance=) makes them contacts"
-    )
+    return larger_tolerance(f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius")
 
 
 def _settled(packing: Packing) -> Packing:
