@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
 from granforce.cli.report_lines import IMPORT, explained
@@ -162,7 +162,7 @@ def spec_or_file(word: str) -> str:
     return word if ":" in word else Input(word)
 
 
-def add_packing(command: Parser, several: bool = False) -> None:
+def add_packing(command: Parser, several: bool = False, expert: bool = False) -> None:
     group = command.add_argument_group("the packing")
     group.add_argument("-n", type=int, default=400, help="number of disks (default 400)")
     if not several:
@@ -176,22 +176,6 @@ def add_packing(command: Parser, several: bool = False) -> None:
         "per line (default uniform:0.5,1)",
     )
     group.add_argument("--pressure", type=float, default=1.0, help="pressure P0 (default 1)")
-    group.add_argument("--dt", type=float, help="longest time step (default 0.1; 0.03 for μ ≥ 0.2)")
-    group.add_argument(
-        "--box-mass", type=float, default=100.0, help="inertia of the box (default 100)"
-    )
-    group.add_argument(
-        "--sweeps",
-        type=int,
-        help="most sweeps per step (default 600; 150 for μ ≥ 0.2)",
-    )
-    group.add_argument(
-        "--step-accuracy",
-        type=float,
-        default=0.01,
-        help="largest violation of the contact laws at the end of a step, relative to the speed of "
-        "the fastest grain (default 0.01)",
-    )
     group.add_argument(
         "--box",
         choices=("square", "isotropic"),
@@ -199,6 +183,26 @@ def add_packing(command: Parser, several: bool = False) -> None:
         help="square (default), or a cell whose sides and tilt adapt until the stress is "
         "isotropic, so that the packing is also jammed against shear",
     )
+    _add_compaction(command, shown=expert)
+
+
+def _add_compaction(command: Parser, shown: bool) -> None:
+    """Add the settings of the compaction, which only commands that are about packings explain."""
+    settings: tuple[tuple[str, type, Any, str], ...] = (
+        ("--dt", float, None, "longest time step (default 0.1; 0.03 for μ ≥ 0.2)"),
+        ("--box-mass", float, 100.0, "inertia of the box (default 100)"),
+        ("--sweeps", int, None, "most sweeps per step (default 600; 150 for μ ≥ 0.2)"),
+        (
+            *("--step-accuracy", float, 0.01),
+            "largest violation of the contact laws at the end of a step, relative to the speed of "
+            "the fastest grain (default 0.01)",
+        ),
+    )
+    group = command.add_argument_group("expert settings of the compaction") if shown else command
+    for name, kind, usual, words in settings:
+        group.add_argument(
+            name, type=kind, default=usual, help=words if shown else argparse.SUPPRESS
+        )
 
 
 def add_packing_file(command: Parser, needed: bool = True) -> None:

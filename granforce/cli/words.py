@@ -66,7 +66,7 @@ def add_pack(commands: Commands) -> None:
         "voussoirs, thickness, opening (arch); books, overhang (books); angle, width, height "
         "(slope); angle (ladder, groove, pyramid); disks, angle (column)",
     )
-    add_packing(command)
+    add_packing(command, expert=True)
     add_store(command)
     command.add_argument(
         "--max-steps", type=int, default=100_000, help="most time steps (default 100000)"
@@ -289,7 +289,7 @@ def add_scan(commands: Commands) -> None:
         "--mu", type=str, required=True, help="friction coefficients, separated by commas"
     )
     command.add_argument("--seeds", type=int, default=1, help="packings per μ: seeds 1 … SEEDS")
-    add_packing(command, several=True)
+    add_packing(command, several=True, expert=True)
     add_walk_options(command)
     command.add_argument(
         "--out",

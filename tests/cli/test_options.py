@@ -493,3 +493,12 @@ def test_a_working_folder_that_was_removed_is_one_line(here, monkeypatch, capsys
     words = ["intervals", str(here / "p.npz"), "--out", "x.csv"]
     assert parser.main(words) == 2
     assert "x.csv: the working folder was removed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command, shown", [("pack", True), ("scan", True), ("walk", False)])
+def test_only_commands_about_packings_explain_the_compaction(command, shown, capsys):
+    with pytest.raises(SystemExit):
+        parser.main([command, "--help"])
+    said = capsys.readouterr().out
+    for option in ("--dt", "--box-mass", "--sweeps", "--step-accuracy"):
+        assert (f"  {option} " in said) == shown
