@@ -33,8 +33,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     frames = frames_of(*arguments.files, columns=options["columns"])
     numbers = _chosen([frame.number for frame in frames], arguments.frames)
     frames = [frame for frame in frames if frame.number in numbers]
-    if arguments.out is not None:
-        series.check_folder(arguments.out)
+    _check_out(arguments.out)
     store = open_store(arguments.cache)
     with Bar("frames", "frame") as progress:
         dataset, failed = series.infer_series(
@@ -66,9 +65,8 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     states = whole(arguments.states, "--states", 0)
     worker_count(arguments.workers, "--workers")
     numbers = _chosen(snapshots.numbers, arguments.frames)
-    if arguments.out is not None and not arguments.out.endswith(".zarr"):
-        raise InputError(f"--out {arguments.out}: with --frames the name must end with .zarr")
-    check_outputs(arguments.csv, arguments.out)
+    _check_out(arguments.out)
+    check_outputs(arguments.csv)
     store = open_store(arguments.cache)
     if snapshots.lost:
         print(f"granforce: {snapshots.lost}", file=sys.stderr)
@@ -98,6 +96,13 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
         if arguments.csv is not None:
             write_csv(arguments.csv, columns)
     return 1 if failed else 0
+
+
+def _check_out(path: str | None) -> None:
+    """InputError if many frames cannot be written to --out."""
+    if path is not None and not path.endswith(".zarr"):
+        raise InputError(f"--out {path}: with --frames the name must end with .zarr")
+    check_outputs(path)
 
 
 def _chosen(there: Sequence[Number], text: str) -> list[Number]:

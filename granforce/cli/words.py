@@ -200,21 +200,28 @@ def add_infer(commands: Commands) -> None:
     )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument("--csv", type=Output, metavar="FILE.csv", help="write a per-contact table")
+    add_out(group, "the result per contact", "; with --frames all frames, as one dataset (.zarr)")
     add_unit(group)
     add_conditions(command)
     add_store(command)
     single = command.options.keys() - {"files"}
     # Those of a single packing, shared by many frames, and those of many frames.
-    shared = {"json", "mu", "cache", "workers", "unmeasured", "states", "sample_seed", "unit"}
+    shared = {
+        "json",
+        "mu",
+        "cache",
+        "workers",
+        "unmeasured",
+        "states",
+        "sample_seed",
+        "unit",
+        "out",
+    }
     series = command.add_argument_group("many photoelastic frames")
     series.add_argument(
         "--frames",
         type=str,
         help="import these frames and infer their forces: all, or numbers separated by commas",
-    )
-    series.add_argument(
-        "--out", type=Output, metavar="FOLDER.zarr", help="write all frames as one dataset"
     )
     add_reading(series)
     add_flaws_and_walls(command, series)

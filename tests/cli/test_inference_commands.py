@@ -32,7 +32,7 @@ def test_a_frame_becomes_a_packing_and_its_forces_are_inferred(folder, capsys):
     packing = load_packing(folder / "frame.npz")
     assert frame["contacts_listed"] + frame["candidates"] == len(packing.contacts.i)
     infer = "infer frame.npz --measured frame.csv --unmeasured 1 --states 40 --certain"
-    found = told(f"{infer} --csv inferred.csv", capsys)
+    found = told(f"{infer} --out inferred.csv", capsys)
     assert not found["cached"] and found["states"] == 40
     assert found["measured_components"] == 2 * frame["contacts_listed"]
     assert found["measured_where_nothing_can_carry"] == 0

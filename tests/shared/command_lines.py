@@ -111,7 +111,7 @@ COMMANDS = {
             "--sample-seed": SEEDS,
             "--ensemble-mu": FRICTION,
             "--chains": [*WHOLE, "1000000000000", LONG],
-            "--csv": OUTPUTS,
+            "--out": OUTPUTS,
         },
     ),
     "intervals": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),

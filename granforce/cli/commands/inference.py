@@ -14,7 +14,7 @@ from granforce.cli.results import (
     unit,
     without_work,
 )
-from granforce.cli.tables import write_columns, write_csv
+from granforce.cli.tables import write_columns
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
@@ -73,7 +73,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
     entry, parameters, dataset, ends = found(
-        *(arguments, kinds.INFERENCE, arguments.csv),
+        *(arguments, kinds.INFERENCE, arguments.out),
         options={"measured": measured},
         measured=measured,
         states=states,
@@ -119,6 +119,6 @@ def infer(arguments: argparse.Namespace) -> int | None:
             expected = dataset["expected"].values[:, k]
             columns |= forces.named({f"{part}_mean": expected, f"{part}_error": error[:, k]})
     with report_after(without_work(lines | ends, arguments), arguments.json):
-        if arguments.csv is not None:
-            write_csv(arguments.csv, columns)
+        if arguments.out is not None:
+            write_columns(arguments.out, columns)
     return None
