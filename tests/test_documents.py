@@ -17,7 +17,7 @@ from packings import packed
 
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
-from granforce.paper import benchmarks, claims, documents, filled, tables
+from granforce.paper import benchmarks, claims, documents, filled, highlights, tables
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
@@ -185,6 +185,50 @@ def test_what_the_study_tells_is_what_is_shipped(document, study, tmp_path):
     shutil.copy(ROOT / document, copied)
     documents.renew([copied], table, told["claims"], told["findings"])
     assert copied.read_text() == text(document)
+
+
+def changed(told, statement, sampler="", **numbers):
+    """The claims and findings with other numbers for one of them."""
+    return [
+        [
+            row | numbers if (row["statement"], row["sampler"]) == (statement, sampler) else row
+            for row in told[name]
+        ]
+        for name in ("claims", "findings")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("statement", "sampler", "numbers", "told_then"),
+    [
+        (
+            "η3(μ) is not monotonic",
+            "exact",
+            {"verdict": "undecided"},
+            "^Whether the exact intervals",
+        ),
+        (
+            "η2(μ) is not monotonic",
+            "uniform",
+            {"verdict": "reproduced"},
+            r"falls again for [^.]*uniform",
+        ),
+        (highlights.PEAK, "", {"high": 4.0}, "longest at μ = "),
+        (highlights.STRONG, "", {"low": -0.1}, "Whether strong contacts have longer"),
+        (highlights.WEAK, "", {"high": 0.1}, "Whether they are shorter relative"),
+        ("⟨F_crit⟩ over ⟨limit load⟩, intermediate μ", "", {"high": 1.1}, None),
+        (highlights.PEAK, "", {"verdict": "too few data"}, None),
+    ],
+)
+def test_findings_say_no_more_than_their_numbers(study, statement, sampler, numbers, told_then):
+    table, told = study
+    before = highlights.highlights(table, told["claims"], told["findings"])
+    after = highlights.highlights(table, *changed(told, statement, sampler, **numbers))
+    if told_then is None:
+        assert len(after) == len(before) - 1
+    else:
+        assert any(re.search(told_then, one.sentence) for one in after)
+        assert not any(re.search(told_then, one.sentence) for one in before)
 
 
 def test_the_claims_are_those_of_the_shipped_study(study):

@@ -35,10 +35,10 @@ def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
-def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
+def sizes(rows: Rows, *, exact: Rows = (), backend: str = "bokeh") -> hv.Layout:
     """η1, η2 and 0.15 η3 against the number of disks, one frame for each μ.
 
-    rows: dicts with n, mu, eta1, eta2, eta3.
+    rows: dicts with n, mu, eta1, eta2, eta3; exact: with n, mu and the eta3 of exact intervals.
     """
     style.ready(backend)
     frames, frictions = [], sorted({row["mu"] for row in rows})
@@ -48,6 +48,10 @@ def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
             (statistics.means(chosen, name, "n", factor), label, style.COLOURS[k], "solid", k)
             for k, (name, label, factor) in enumerate(_MEASURES)
         ]
+        of_exact = [row for row in exact if row["mu"] == mu]
+        if of_exact:
+            points = statistics.means(of_exact, "eta3", "n", 0.15)
+            series.append((points, "0.15 η3 exact", style.COLOURS[2], "dashed", 2))
         words: dict[str, Any] = {"title": f"μ = {mu:g}", "x": "N", "y": "η"}
         legend = "right" if mu == frictions[-1] else None
         frames.append(style.graph(series, backend, **words, logx=True, legend=legend))

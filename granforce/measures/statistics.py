@@ -31,6 +31,19 @@ def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float,
     return mean, float(mean - reach), float(mean + reach)
 
 
+def proportion_interval(
+    values: Iterable[float], level: float = LEVEL
+) -> tuple[float, float, float]:
+    """Fraction of ones among values 0 or 1 and its exact interval (Clopper and Pearson).
+
+    Unlike Student's, the interval has a length if all values are equal.
+    """
+    values = _finite(values)
+    test = stats.binomtest(int(values.sum()), len(values))
+    low, high = test.proportion_ci(level, "exact")
+    return float(values.mean()), float(low), float(high)
+
+
 def difference_interval(
     values: Floats, others: Floats, level: float = LEVEL
 ) -> tuple[float, float, float]:
@@ -129,15 +142,24 @@ def bootstrap(
     return float(statistic(*groups)), float(low), float(high)
 
 
-def resampled_means(
-    groups: Sequence[npt.ArrayLike], seed: int = 0, resamples: int = RESAMPLES
-) -> Floats:
-    """Means (resamples, groups, …) of groups whose items, one per packing, are resampled."""
+def drawn_means(groups: Sequence[npt.ArrayLike], seed: int = 0, draws: int = RESAMPLES) -> Floats:
+    """Means (draws, groups, …) that the values of some packings leave possible, by Student's t.
+
+    groups: arrays (n, …), one item per packing. A mean is drawn as m + (s/√n) T, with mean m and
+    standard deviation s of its group and T from Student's distribution with n − 1 degrees of
+    freedom; the components of an item are drawn jointly. The percentiles of one mean are those of
+    `mean_interval`, while resampled packings (a bootstrap) would give intervals that are too short
+    for few of them. The mean of a single packing does not vary.
+    """
     rng = np.random.default_rng(seed)
     drawn = []
     for group in map(np.asarray, groups):
-        chosen = rng.integers(len(group), size=(resamples, len(group)))
-        drawn.append(group[chosen].mean(axis=1))
+        count, mean = len(group), group.mean(axis=0)
+        freedom = max(1, count - 1)
+        apart = (group - mean).reshape(count, -1) / np.sqrt(count * freedom)
+        scale = np.sqrt(rng.chisquare(freedom, draws) / freedom)
+        offset = rng.standard_normal((draws, count)) @ apart / scale[:, None]
+        drawn.append(mean + offset.reshape(draws, *group.shape[1:]))
     return np.stack(drawn, axis=1)
 
 

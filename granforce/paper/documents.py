@@ -1,15 +1,16 @@
 """The study's tables in documents, written between two marks, so that no number is copied by hand.
 
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
-against μ), "others" (other measures at each μ), "highlights" (ten findings, one sentence each),
-"headlines" (the first four of them), "claims" (all claims), "findings" (numbers beyond the claims),
-"sweeps" (the residual of the paper's sweeps, and their excess over S), "preparation" (how results
-depend on the packing), "counts" (number of packings in each part).
+against μ), "others" (other measures at each μ), "highlights" (findings, one sentence each),
+"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (all
+claims), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's walk, and its
+excess over S), "preparation" (how results depend on the packing), "counts" (number of packings in
+each part), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -17,9 +18,18 @@ from scipy import stats
 from granforce.measures import statistics
 from granforce.paper import filled
 from granforce.paper import plan as plans
+from granforce.paper.claims import OUTSIDE
 from granforce.paper.claims.figure1 import skipped
-from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
-from granforce.paper.formatting import NOTHING, RAISED, markdown_table, with_error
+from granforce.paper.claims.groups import (
+    RANGES,
+    SAMPLERS,
+    WHOLE_WALK,
+    drawn,
+    excesses,
+    outside,
+)
+from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED, UNDECIDED, UNMEASURED
+from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
@@ -27,21 +37,22 @@ from granforce.types import Rows
 
 KIND = "study"
 
-_SWEPT_EXTENT = "sweeps 0.15 η3"
+_SWEPT_EXTENT = "paper's walk 0.15 η3"
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
 HEADLINES = 4  # highlights in the README
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
 _HEADS = {
-    "gauss_seidel": "paper's sweeps, to 10⁻³",
-    "gauss_seidel_1e-4": "to 10⁻⁴",
-    "gauss_seidel_1e-6": "to 10⁻⁶",
-    "nearest": "nearest",
+    "gauss_seidel": "paper's walk, to 10⁻³",
+    "gauss_seidel_1e-4": "paper's walk, to 10⁻⁴",
+    "gauss_seidel_1e-6": "paper's walk, to 10⁻⁶",
+    "nearest": "nearest-network walk",
     "uniform": "uniform",
     "exact": "exact",
     "": "packings alone",
 }
+_VERDICTS = (REPRODUCED, UNDECIDED, FEW, DIFFERS, FAILED, UNMEASURED)
 
 
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
@@ -51,14 +62,16 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     """
     known = {
         "measures": lambda: measures(table),
-        "others": lambda: others(table),
+        "others": lambda: others(table, claims, findings),
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
+        "verdicts": lambda: verdict_counts(claims),
         "claims": lambda: claim_table(claims),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "findings": lambda: finding_table(findings),
         "counts": lambda: counts(table),
+        "certificates": lambda: certificates(table),
     }
 
     def text_of(path: Path, name: str) -> str:
@@ -73,7 +86,7 @@ def measures(table: StudyTable) -> str:
     """φ, z, h and η against μ as a table, from the same packings in every column.
 
     The packings are those with exact intervals; a column with fewer of them states their number.
-    The last column is the ratio of the paper's sweeps to nearest networks, packing by packing.
+    The last column is the ratio of the two walks, packing by packing.
     """
     exact = table.part(SAMPLERS["exact"])
     every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
@@ -85,12 +98,12 @@ def measures(table: StudyTable) -> str:
         ("z", exact, "coordination", 1.0, "{:.3f}"),
         ("h", exact, "dimension", 1.0, "{:.0f}"),
         ("exact 0.15 η3", exact, "eta3", 0.15, None),
-        ("nearest η2", sources["nearest"], "eta2", 1.0, None),
+        ("nearest-network walk η2", sources["nearest"], "eta2", 1.0, None),
         ("uniform η2", sources["uniform"], "eta2", 1.0, None),
-        ("sweeps η1", sources["gauss_seidel"], "eta1", 1.0, None),
-        ("sweeps η2", sources["gauss_seidel"], "eta2", 1.0, None),
+        ("paper's walk η1", sources["gauss_seidel"], "eta1", 1.0, None),
+        ("paper's walk η2", sources["gauss_seidel"], "eta2", 1.0, None),
         (_SWEPT_EXTENT, sources["gauss_seidel"], "eta3", 0.15, None),
-        ("sweeps/nearest η2", ratios, "ratio", 1.0, None),
+        ("paper's walk/nearest-network walk η2", ratios, "ratio", 1.0, None),
     )
     swept_part = SAMPLERS["gauss_seidel"]
     beyond, known = outside(table, swept_part), excesses(table, swept_part)
@@ -98,7 +111,7 @@ def measures(table: StudyTable) -> str:
     for mu, seeds in every.items():
         line = [f"{mu:g}", str(len(seeds))]
         for head, rows, name, factor, form in columns:
-            if mu in beyond and head.startswith("sweeps"):
+            if mu in beyond and head.startswith("paper's walk"):
                 line.append("outside S")
                 continue
             chosen = [row for row in rows if row["mu"] == mu and row["seed"] in seeds]
@@ -109,10 +122,11 @@ def measures(table: StudyTable) -> str:
     return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def others(table: StudyTable) -> str:
+def others(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """Intervals seen by walks, states of contacts, and the width of S against μ, as a table.
 
-    Means ± standard errors over packings; ratios are of the same packing.
+    Means ± standard errors over packings; ratios are of the same packing. Below the table: whether
+    α is the exponent of a law.
     """
     answers = [
         row | {"part": row["critical_force"] / row["limit_load"]}
@@ -121,8 +135,8 @@ def others(table: StudyTable) -> str:
     ]
     walk, uniform, exact = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform", "exact"))
     columns = (
-        ("walk/uniform η2", _over(walk, uniform, "eta2"), "ratio", None),
-        ("walk/exact η3", _over(walk, exact, "eta3"), "ratio", None),
+        ("nearest-network walk/uniform η2", _over(walk, uniform, "eta2"), "ratio", None),
+        ("nearest-network walk/exact η3", _over(walk, exact, "eta3"), "ratio", None),
         ("uniform/exact η3", _over(uniform, exact, "eta3"), "ratio", None),
         ("F_crit, ⟨f_n⟩", answers, "critical_force", None),
         ("F_crit/limit load", answers, "part", None),
@@ -147,7 +161,30 @@ def others(table: StudyTable) -> str:
             for rows, (_, _, name, form) in zip(of_mu, columns, strict=True)
         ]
         lines.append([f"{mu:g}", str(most), *cells])
-    return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
+    text = markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
+    return text + _decay(claims, findings)
+
+
+def _decay(claims: Rows, findings: Rows) -> str:
+    """Whether |u|(r) is known to be a power law, and how α depends on load steps, in sentences."""
+    verdicts = [row for row in claims if row["statement"].startswith("the first motion")]
+    if not verdicts or not np.isfinite(verdicts[0]["value"]):
+        return ""
+    (law,) = verdicts
+    why = f" ({law['why']})" if law["why"] else ""
+    sentences = [
+        "α is the exponent of the best power law for the decay |u| ~ r^−α of the first motion, "
+        "whatever the law is. Whether a power law fits better than an exponential: "
+        f"{law['verdict']}{why}."
+    ]
+    steps = "α with load steps of 0.4"
+    ratios = [row for row in findings if row["statement"].startswith(steps)]
+    values = [f"{_number(row)} at {row['statement'].rpartition(', ')[2]}" for row in ratios]
+    if values:
+        sentences.append(
+            f"Ratio of α with load steps four times as long to that in the table: {listed(values)}."
+        )
+    return "\n" + " ".join(sentences) + "\n"
 
 
 def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
@@ -160,7 +197,7 @@ def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
 
 
 def sweeps(table: StudyTable) -> str:
-    """Walks by sweeps, by their final residual: results and excess over S, as a table.
+    """The paper's walk by its final residual: results and excess over S, as a table with an intro.
 
     Excess: how far the intervals of states exceed the exact ones, over the length of those, as
     means over packings.
@@ -171,7 +208,7 @@ def sweeps(table: StudyTable) -> str:
         ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
         for mu, rows in _by_friction(table.part(part)).items():
             cells = [
-                f"10{str(round(np.log10(residual))).translate(RAISED)}",
+                _power(residual),
                 f"{mu:g}",
                 str(len(rows)),
                 _cell(rows, "reached_part", 1.0, "{:.2f}", len(rows)),
@@ -189,7 +226,30 @@ def sweeps(table: StudyTable) -> str:
             )
             lines.append([*cells, *eta])
     heads = ("residual", "μ", "packings", "fraction reached", "sweeps per state", "excess")
-    return markdown_table([*heads, "η2", "relative to nearest η2"], lines)
+    text = markdown_table([*heads, "η2", "relative to the nearest-network walk"], lines)
+    return f"{_swept(table)}\n{text}"
+
+
+def _swept(table: StudyTable) -> str:
+    """Which residuals there are, and whether walks reached their states, in sentences."""
+    words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
+    if not words:
+        return "No walk by sweeps is part of this study.\n"
+    text = f"Here the sweeps end at {listed(words)} ⟨f_n⟩. "
+    rows = table.part(*plans.SWEEPS)
+    least = min(row["reached_part"] for row in rows)
+    if least >= 1:
+        return text + "Every walk reached all its states.\n"
+    where = sorted({row["mu"] for row in rows if row["reached_part"] < 1})
+    return (
+        text + "Some walks did not reach all their states, at μ = "
+        f"{listed([f'{mu:g}' for mu in where])}; "
+        f"a walk is judged if it has at least the fraction {WHOLE_WALK:g} of them.\n"
+    )
+
+
+def _power(residual: float) -> str:
+    return f"10{str(round(np.log10(residual))).translate(RAISED)}"
 
 
 def _excess(excess: float, length: float) -> str:
@@ -203,11 +263,11 @@ def _excess(excess: float, length: float) -> str:
 def preparation(table: StudyTable) -> str:
     """Dependence on the preparation: packings by how they are made, as a table, and a summary.
 
-    In brackets: the difference from the default for the same seeds, in its own standard errors.
+    In brackets: the difference from the default for the same seeds, in its own standard errors,
+    bold if it is significant. z is left out, as it follows from h.
     """
     columns = (
         ("h", "exact", "dimension"),
-        ("z", "exact", "coordination"),
         ("φ", "exact", "packing_fraction"),
         ("exact η3", "exact", "eta3"),
         ("η2", "walk", "eta2"),
@@ -232,9 +292,9 @@ def preparation(table: StudyTable) -> str:
                 text = with_error(np.array([row[measure] for row in rows])) if rows else ""
                 if name and rows:
                     apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
-                    if np.isfinite(apart):
+                    if apart is not None:
                         differences.append(apart)
-                        text += f" ({apart:+.1f})"
+                        text += f" ({_difference(apart)})"
                 cells.append(text)
             if counted != {0}:
                 word = name.removeprefix("prepared_").replace("_", " ") or "default"
@@ -243,21 +303,76 @@ def preparation(table: StudyTable) -> str:
     text = markdown_table(heads, lines)
     if not differences:
         return text
-    size = np.abs(differences)
-    chance = len(size) * 2 * stats.norm.sf(2)
-    return text + (
-        f"\n{int((size > 2).sum())} of {len(size)} differences exceed two standard errors "
-        f"({chance:.1f} expected by chance); the largest is {size.max():.1f}.\n"
+    return text + "\n" + _tested(differences) + _widest(table, variants)
+
+
+class _Apart(NamedTuple):
+    """A mean difference of paired packings: in its standard errors, and its p-value."""
+
+    errors: float  # infinite if all pairs differ by the same
+    p: float  # of Student's t; NaN without scatter
+
+
+def _difference(apart: _Apart) -> str:
+    if not np.isfinite(apart.p):
+        return "no scatter"
+    return f"**{apart.errors:+.1f}**" if apart.p < 1 - statistics.LEVEL else f"{apart.errors:+.1f}"
+
+
+def _tested(differences: Sequence[_Apart]) -> str:
+    """How many differences are significant, alone and together, in sentences."""
+    p = np.array([apart.p for apart in differences if np.isfinite(apart.p)])
+    same, level = len(differences) - len(p), 1 - statistics.LEVEL
+    text = (
+        f"By Student's t, {int((p < level).sum())} of {len(p)} differences are significant at the "
+        f"level {level:.2g} (bold; {level * len(p):.1f} expected by chance)"
+    )
+    if same:
+        text += f"; {same} left out, as all pairs differ by the same amount"
+    together = int((p < level / max(1, len(p))).sum())
+    last = (
+        f"Significant even among so many (Bonferroni): {together}."
+        if together
+        else "None is significant among so many (Bonferroni): a dependence on options is not shown."
+    )
+    return f"{text}. {last}"
+
+
+def _widest(table: StudyTable, variants: Sequence[str]) -> str:
+    """The μ at which the mean h varies most between options, in a sentence."""
+    spans = {}
+    for mu in sorted({row["mu"] for row in table.part(*variants)}):
+        seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
+        means = [
+            np.mean([row["dimension"] for row in rows])
+            for name in (*(f"{name}_exact" for name in variants), "exact")
+            for rows in [table.part(name, n=table.plan["n"])]
+            for rows in [[r for r in rows if r["mu"] == mu and r["seed"] in seeds]]
+            if rows
+        ]
+        if means and min(means) > 0:
+            spans[mu] = min(means), max(means)
+    if not spans:
+        return "\n"
+    mu = max(spans, key=lambda mu: spans[mu][1] / spans[mu][0])
+    tested = listed([f"{mu:g}" for mu in spans])
+    return (
+        f" The mean h varies most at μ = {mu:g}: from {spans[mu][0]:.2g} to {spans[mu][1]:.2g}. "
+        f"Other options were tried at μ = {tested} only.\n"
     )
 
 
-def _apart(rows: Rows, others: Rows, name: str) -> float:
-    """Mean difference of a number in the same packings, in its standard errors; NaN if unknown."""
+def _apart(rows: Rows, others: Rows, name: str) -> _Apart | None:
+    """The paired difference of a number in the same packings; None if it is unknown."""
     pairs = statistics.paired(rows, [other for other in others if name in other])
     apart = np.array([row[name] - other[name] for row, other in pairs])
-    if len(apart) < 2 or not np.ptp(apart):
-        return 0.0 if len(apart) > 1 and not apart.any() else float("nan")
-    return float(apart.mean() / (apart.std(ddof=1) / np.sqrt(len(apart))))
+    if len(apart) < 2:
+        return None
+    error = apart.std(ddof=1) / np.sqrt(len(apart))
+    if error <= NOTHING * np.abs(apart).max():
+        return _Apart(np.inf, np.nan)
+    errors = float(apart.mean() / error)
+    return _Apart(errors, float(2 * stats.t.sf(abs(errors), len(apart) - 1)))
 
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
@@ -299,6 +414,8 @@ def finding_table(findings: Rows) -> str:
 def _number(finding: dict[str, Any]) -> str:
     if not np.isfinite(finding["value"]):
         return ""
+    if finding["verdict"] == FEW:
+        return f"{finding['value']:.3g}: {FEW}"
     known = np.isfinite(finding["low"])
     ends = f" ({finding['low']:.3g} … {finding['high']:.3g})" if known else ""
     return f"{finding['value']:.3g}{ends}"
@@ -350,8 +467,63 @@ def _cell(rows: Rows, name: str, factor: float, form: str | None, expected: int)
     return text if len(values) == expected else f"{text} ({len(values)})"
 
 
+def certificates(table: StudyTable) -> str:
+    """The largest gap of the exact bounds, and how well uniform samples converged, in sentences."""
+    bounded = [row for row in table.rows if "max_gap" in row]
+    if not bounded:
+        return ""
+    text = (
+        f"The exact intervals of {len(bounded)} packings were computed; their largest duality gap "
+        f"is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
+    )
+    uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
+    if uniform:
+        text += (
+            f" The {len(uniform)} uniform samples have {table.plan['states']} networks each; over "
+            "all their force components, the largest split R̂ is "
+            f"{max(row['worst_r_hat'] for row in uniform):.3f}, and the smallest bulk effective "
+            f"size {min(row['least_bulk_size'] for row in uniform):.0f}."
+        )
+    return text + "\n"
+
+
+def verdict_counts(claims: Rows) -> str:
+    """How many claims have which verdict, by sampler, as a table.
+
+    The last column counts claims with the same verdict in every column that judges them.
+    """
+    heads = _used(claims)
+    by_claim: dict[str, set[str]] = {}
+    for claim in claims:
+        verdicts = by_claim.setdefault(claim["statement"], set())
+        if claim["sampler"] in heads and claim["verdict"] in _VERDICTS:
+            verdicts.add(claim["verdict"])
+    lines = []
+    for word in _VERDICTS:
+        cells = [
+            sum(claim["sampler"] == name and claim["verdict"] == word for claim in claims)
+            for name in heads
+        ]
+        same = sum(verdicts - {UNMEASURED} == {word} for verdicts in by_claim.values())
+        lines.append([word, *map(str, cells), str(same)])
+    sums = [sum(int(line[k]) for line in lines) for k in range(1, len(heads) + 1)]
+    lines.append(["all", *map(str, sums), str(len(by_claim))])
+    columns = [*(_HEADS[name] for name in heads), "same in every column"]
+    return markdown_table(["verdict", *columns], lines)
+
+
+def _used(claims: Rows) -> list[str]:
+    """The samplers with any number, in the order of columns."""
+    known = {claim["sampler"] for claim in claims if np.isfinite(claim["value"])}
+    return [name for name in _HEADS if name in known]
+
+
 def claim_table(claims: Rows) -> str:
-    """Claims with number, interval and verdict: one row per claim, one column per sampler."""
+    """Claims with number, interval and verdict: one row per claim, one column per sampler.
+
+    Below the table: where walks are not judged, as they leave S.
+    """
+    heads = _used(claims)
     lines: dict[Any, Any] = {}
     for claim in claims:
         key = claim["statement"], claim["source"], claim["criterion"]
@@ -359,14 +531,33 @@ def claim_table(claims: Rows) -> str:
     rows = []
     for (statement, source, criterion), by_sampler in lines.items():
         criterion = criterion.replace("[", "(").replace("]", ")")
-        cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in _HEADS]
+        cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
         rows.append([statement, source, criterion, *cells])
-    return markdown_table(["claim", "source", "criterion", *_HEADS.values()], rows)
+    columns = [_HEADS[name] for name in heads]
+    text = markdown_table(["claim", "source", "criterion", *columns], rows)
+    unjudged = {claim["sampler"]: _split(claim["why"])[1] for claim in claims}
+    notes = [
+        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: {unjudged[name]}."
+        for name in heads
+        if unjudged.get(name)
+    ]
+    return text + "".join(f"\n{note}\n" for note in notes)
+
+
+def _split(why: str) -> tuple[str, str]:
+    """Why a claim has its verdict, and where its sampler is not judged."""
+    before, mark, where = why.partition(OUTSIDE)
+    return before.removesuffix("; "), mark + where
 
 
 def _verdict(claim: dict[str, Any]) -> str:
-    why = f" ({claim['why']})" if claim["why"] else ""
+    why, _ = _split(claim["why"])
+    why = f" ({why})" if why else ""
     if not np.isfinite(claim["value"]):
         return claim["verdict"] + why
-    ends = f" ({claim['low']:.3g} … {claim['high']:.3g})" if np.isfinite(claim["low"]) else ""
-    return f"{claim['value']:.3g}{ends}: {claim['verdict']}{why}"
+    known = np.isfinite(claim["low"]) and claim["verdict"] != FEW
+    ends = [f"{claim['low']:.3g} … {claim['high']:.3g}"] if known else []
+    ends += [f"n = {claim['packings']}"] if claim.get("packings") else []
+    ends += [f"μ = {claim['mu']:g}"] if claim.get("mu") is not None else []
+    quoted = f" ({'; '.join(ends)})" if ends else ""
+    return f"{claim['value']:.3g}{quoted}: {claim['verdict']}{why}"

@@ -51,18 +51,19 @@ CAPTIONS = {
     f"friction coefficient μ; {_POINTS}.",
     "effort": "Accepted part of the attempts, and sweeps per accepted state, of walks by "
     f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
-    "figure1_exact": "As Figure 1 by nearest networks; dashed, 0.15 η3 of the exact intervals; "
-    "dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
-    "figure1_uniform": "As Figure 1 by nearest networks; dashed, those of uniform states.",
+    "figure1_exact": "As Figure 1 for the nearest-network walk; dashed, 0.15 η3 of the exact "
+    "intervals; dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
+    "figure1_uniform": "As Figure 1 for the nearest-network walk; dashed, those of uniform states.",
     "figure4_mean": "Distribution of the extent ΔF_n of normal forces, in units of its mean, that "
     f"the random walk ({{walk}}) has seen, {_TAILS}.",
     "figure4_exact": "Distribution of the exact extent ΔF_n of normal forces, in units of ⟨f_n⟩, "
     f"{_TAILS}.",
-    "figure6_exact": "As Figure 6 by nearest networks, beside exact intervals and uniform states.",
+    "figure6_exact": "As Figure 6 for the nearest-network walk, with exact intervals and uniform "
+    "states.",
     "places": "Where the tenth of the contacts with the largest forces f_n is, and the tenth with "
     "the largest extents ΔF_n ({walk}); grey, all contacts. Lengths are in largest radii.",
-    "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the walk by nearest networks against the number "
-    f"N of disks; {_POINTS}.",
+    "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the nearest-network walk, and 0.15 η3 of the "
+    f"exact intervals (dashed), against the number N of disks; {_POINTS}.",
     "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
     "of packings made with μ; bars are standard errors over packings.",
     "frozen": "Part of the contacts without a unique force, and number of their clusters, where "
@@ -82,10 +83,17 @@ CAPTIONS = {
     "distances": "Distance of the original network and of the walk's states from the centre of S, "
     "in units of that of uniform states; bars are standard errors over packings.",
 }
-_SWEPT = {part: part.replace("_", " to ") for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6")}
+_SWEPT = {
+    "sweeps_1e-3": "paper's walk to 1e-3",
+    "sweeps_1e-4": "paper's walk to 1e-4",
+    "sweeps_1e-6": "paper's walk to 1e-6",
+}
+_DRAWN = {name: _SWEPT[part] for name, part in SAMPLERS.items() if part in _SWEPT} | {
+    "nearest": "nearest-network walk"
+}
 _RELAXED = {
-    "gauss_seidel": "relaxed by Gauss–Seidel sweeps that end at 10⁻³ ⟨f_n⟩",
-    "nearest": "relaxed to nearest networks",
+    "gauss_seidel": "the paper's walk, by Gauss–Seidel sweeps that end at 10⁻³ ⟨f_n⟩",
+    "nearest": "the nearest-network walk",
 }
 
 
@@ -176,7 +184,7 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures that the paper does not have."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, drawings = SAMPLERS[paper_sampler(table)], {}
-    sources = {_SWEPT.get(p, name): drawn(table, name) for name, p in SAMPLERS.items()}
+    sources = {_DRAWN.get(name, name): drawn(table, name) for name in SAMPLERS}
     sources = {name: rows for name, rows in sources.items() if rows}
     if len(sources) > 1:
         drawings["samplers"] = _later(figures.samplers, sources)
@@ -203,7 +211,9 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     if places:
         drawings["places"] = _later(figures.places, places)
     if table.part("size"):
-        drawings["sizes"] = _later(figures.sizes, _with_sizes(table))
+        drawings["sizes"] = _later(
+            figures.sizes, _with_sizes(table), exact=table.part("size_exact", "exact")
+        )
     if table.part("opened"):
         drawings["opened"] = _later(figures.opened, table.part("opened"), walk)
     if table.part("frozen"):

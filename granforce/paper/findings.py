@@ -1,7 +1,8 @@
 """Beyond the paper: dependence of its results on sampler, solver and definition.
 
 Numbers with 95 % confidence intervals over packings, without a verdict; ratios are from the same
-packing. They explain why a claim holds or fails.
+packing. They explain why a claim holds or fails. All packings of a range of μ are one sample, with
+Student's interval of their mean; for other numbers see `_trend` and `_finding`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,23 +12,45 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper import tails
+from granforce.paper.claims.figure3 import relative_extents
 from granforce.paper.claims.figure4 import departure
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
     RANGES,
     SAMPLERS,
     SMALL,
+    Ends,
+    drawn,
     each,
     items,
     sampled,
     within,
 )
-from granforce.paper.claims.verdicts import OURS, Claim, peak, slope
+from granforce.paper.claims.verdicts import (
+    ANY,
+    CORRELATION,
+    FEW,
+    FRACTION,
+    OURS,
+    POSITIVE,
+    Claim,
+    peak,
+    slope,
+    too_wide,
+)
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats, Rows
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
-WORDS = {part: part.replace("gauss_seidel", "paper's sweeps") for part in SAMPLERS}
+WORDS = {
+    "gauss_seidel": "the paper's walk",
+    "gauss_seidel_1e-4": "the paper's walk to 10⁻⁴",
+    "gauss_seidel_1e-6": "the paper's walk to 10⁻⁶",
+    "nearest": "the nearest-network walk",
+    "uniform": "uniform networks",
+    "exact": "exact",
+}
+WALKS = ("nearest", "gauss_seidel")
 
 
 def measured(table: StudyTable) -> list[Claim]:
@@ -36,24 +59,38 @@ def measured(table: StudyTable) -> list[Claim]:
 
 
 def sampled_part(table: StudyTable) -> Iterator[Claim]:
-    """The fraction of the exact extent that 1000 states see."""
-    for source, word in (("walk", "the walk's"), ("uniform", "uniform")):
-        yield from _by_range(
-            _ratios(table, "eta3", source, "exact"), f"η3 of {word} states over exact η3"
-        )
+    """The fraction of the exact extent that sampled states see."""
+    for sampler in (*WALKS, "uniform"):
+        ratios = _ratios(drawn(table, sampler), table.part("exact"), "eta3")
+        yield from _by_range(ratios, f"η3 of {WORDS[sampler]} over exact η3")
 
 
 def measure(table: StudyTable) -> Iterator[Claim]:
-    """The difference between the walk's measure and the uniform one."""
+    """The difference between the walks' measures and the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
-        yield from _by_range(
-            _ratios(table, name, "walk", "uniform"), f"{label} of the walk over {label} of S"
-        )
+        for sampler in WALKS:
+            ratios = _ratios(drawn(table, sampler), table.part("uniform"), name)
+            statement = f"{label} of {WORDS[sampler]} over {label} of {WORDS['uniform']}"
+            yield from _by_range(ratios, statement)
     rows = [row for row in table.part("uniform") if "walk_ratio" in row]
-    for name, label in (("original_ratio", "the original network"), ("walk_ratio", "walk states")):
-        yield from _by_range(
-            _values(rows, name), f"distance of {label} from the centre over that of uniform states"
-        )
+    for name, label in (
+        ("original_ratio", "the original network"),
+        ("walk_ratio", WORDS["nearest"]),
+    ):
+        statement = f"distance of {label} from the centre over that of {WORDS['uniform']}"
+        yield from _by_range(_values(rows, name), statement)
+
+
+def correlations(table: StudyTable) -> Iterator[Claim]:
+    """Whether strong contacts have long intervals: in absolute terms, and relative to f_n."""
+    lengths = items(drawn(table, "exact"), "correlation")
+    _, ranks = relative_extents(table, "exact")
+    for groups, statement in (
+        (lengths, "correlation of f_n with the exact ΔF_n"),
+        (ranks, "rank correlation of f_n with the exact ΔF_n/f_n"),
+    ):
+        values = {mu: [v for _, v in group] for mu, group in groups.items()}
+        yield from _by_range(values, statement, CORRELATION)
 
 
 def exact_shape(table: StudyTable) -> Iterator[Claim]:
@@ -61,7 +98,7 @@ def exact_shape(table: StudyTable) -> Iterator[Claim]:
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
-            yield _trend(f"μ where {label} is largest", peak, groups)
+            yield _trend(f"μ where {label} is largest", peak, groups, POSITIVE)
         yield from _growth(groups, label)
 
 
@@ -76,14 +113,13 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
                 )
                 yield _measured(statement, *departure([v for _, v in values], statistics.LEVEL))
         for word, span in RANGES:
-            chosen = [[v for _, v in g] for g in within(groups, span).values()]
-            if chosen:
-                yield _finding(
-                    f"width of P(ΔF_n) in ⟨f_n⟩, {WORDS[sampler]}, {word} μ",
-                    lambda *g: np.mean([np.concatenate(values).std() for values in g]),
-                    chosen,
-                    resamples=99,
-                )
+            moments = {
+                mu: [(v.mean(), np.mean(v**2)) for _, v in group]
+                for mu, group in within(groups, span).items()
+            }
+            if moments:
+                statement = f"width of P(ΔF_n) in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
+                yield _trend(statement, _mean_width, moments, POSITIVE)
 
 
 def opened(table: StudyTable) -> Iterator[Claim]:
@@ -112,6 +148,7 @@ def size(table: StudyTable) -> Iterator[Claim]:
 
 def strength(table: StudyTable) -> Iterator[Claim]:
     """The critical force relative to the limit load, and its dependence on the protocol."""
+    usual = table.part("response")
     rows = [
         row | {"part_of_load": row["critical_force"] / row["limit_load"]}
         for row in table.responses()
@@ -126,7 +163,8 @@ def strength(table: StudyTable) -> Iterator[Claim]:
         ),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
-            yield from _by_range(_ratios(table, name, part, "response"), f"{label} {word}")
+            ratios = _ratios(table.part(part), usual, name)
+            yield from _by_range(ratios, f"{label} {word}")
     # Loads inside and outside the pressure differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
     factors = [
         {
@@ -146,7 +184,7 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = _values(rows, "friction")
     if len(groups) > 2:
-        yield _trend("μ where the largest shear stress is largest", peak, groups)
+        yield _trend("μ where the largest shear stress is largest", peak, groups, POSITIVE)
     statement = "shear stress over pressure"
     yield from _by_range(groups, f"largest {statement}")
     yield from _by_range(_values(rows, "own_shear"), f"{statement} of the original network")
@@ -156,7 +194,8 @@ def shear(table: StudyTable) -> Iterator[Claim]:
         (uniform, "largest_shear", "of uniform states, largest"),
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction")
-        yield from _by_range(parts, f"{statement} {word}, over the largest of the packing")
+        statement_of = f"{statement} {word}, over the largest of the packing"
+        yield from _by_range(parts, statement_of, FRACTION)
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
@@ -170,8 +209,8 @@ def volume(table: StudyTable) -> Iterator[Claim]:
         if len(groups) > 2:
             # Logarithms may have either sign: the largest value on the grid.
             top = peak if name == "extent" else _largest
-            yield _trend(f"μ where {statement} is largest", top, groups)
-        yield from _by_range(groups, statement)
+            yield _trend(f"μ where {statement} is largest", top, groups, POSITIVE)
+        yield from _by_range(groups, statement, POSITIVE if name == "extent" else ANY)
     walked = statistics.paired(rows, table.part("walk"))
     wide = [(row, walk) for row, walk in walked if row.get("extent")]
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
@@ -190,15 +229,15 @@ def volume(table: StudyTable) -> Iterator[Claim]:
     for mu in sorted({row["mu"] for row in table.part("volume_size")}):
         sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
         largest = max(row["n"] for row in sized)
-        groups = [
-            [r["log_volume_per_grain"] for r in sized if (r["n"] == largest) == last]
+        large, small = (
+            np.array([r["log_volume_per_grain"] for r in sized if (r["n"] == largest) == last])
             for last in (True, False)
-        ]
-        if all(groups):
+        )
+        if min(len(large), len(small)) > 1:
             statement = (
                 f"ln V per grain of {largest} disks minus that of smaller packings, μ = {mu:g}"
             )
-            yield _finding(statement, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
+            yield _measured(statement, *statistics.difference_interval(large, small))
 
 
 def forces(table: StudyTable) -> Iterator[Claim]:
@@ -227,8 +266,8 @@ def _part(packings: Any, name: str) -> float:
 
 
 FAMILIES = (
-    *(sampled_part, measure, exact_shape, distribution, opened, size, strength, shear, volume),
-    forces,
+    *(sampled_part, measure, correlations, exact_shape, distribution, opened, size, strength),
+    *(shear, volume, forces),
 )
 
 
@@ -236,10 +275,10 @@ def _values(rows: Rows, name: str) -> Values:
     return {mu: [v for _, v in group] for mu, group in items(rows, name).items()}
 
 
-def _ratios(table: StudyTable, name: str, above: str, below: str) -> Values:
-    """{μ: ratios of one number in the same packings}, for packings in both parts."""
-    rows = [r for r in table.part(above) if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
-    return _quotients(statistics.paired(rows, table.part(below)), name, name)
+def _ratios(rows: Rows, others: Rows, name: str) -> Values:
+    """{μ: ratios of one number in the same packings}, for packings with rows of both."""
+    rows = [r for r in rows if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
+    return _quotients(statistics.paired(rows, others), name, name)
 
 
 def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Values:
@@ -256,29 +295,45 @@ def _largest(frictions: Floats, means: Floats) -> float:
     return float(frictions[int(np.argmax(means))])
 
 
-def _by_range(groups: Values, statement: str) -> Iterator[Claim]:
+def _mean_width(_: Floats, moments: Floats) -> float:
+    """Mean of the standard deviations, from mean and mean square at each μ, moments (k, 2)."""
+    return float(np.mean(np.sqrt(moments[:, 1] - moments[:, 0] ** 2)))
+
+
+def _by_range(groups: Values, statement: str, possible: Ends = POSITIVE) -> Iterator[Claim]:
+    """The mean over all packings of a range of μ, one sample, with Student's interval."""
     for word, (low, high) in RANGES:
         values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
         if values:
-            yield _finding(f"{statement}, {word} μ", np.mean, [values])
+            interval = statistics.mean_interval(values)
+            yield _measured(f"{statement}, {word} μ", *interval, possible)
 
 
-def _trend(statement: str, statistic: Callable[..., float], groups: Values) -> Claim:
-    """A number of all means over packings: statistic(keys, means)."""
-    keys = np.array(list(groups), dtype=float)
-    value = statistic(keys, np.array([np.mean(group) for group in groups.values()]))
-    drawn = [statistic(keys, means) for means in statistics.resampled_means(list(groups.values()))]
-    return _measured(statement, float(value), *statistics.percentile_ends(np.array(drawn))[0])
-
-
-def _finding(
-    statement: str, statistic: Callable[..., float], groups: Sequence[Any], **options: Any
+def _trend(
+    statement: str, statistic: Callable[..., float], groups: Values, possible: Ends = ANY
 ) -> Claim:
-    groups = list(groups.values()) if isinstance(groups, dict) else list(groups)
-    return _measured(statement, *statistics.bootstrap(statistic, groups, **options))
+    """A number of all means over packings: statistic(keys, means).
+
+    Its interval comes from drawn means; it has none if there is a single packing at some μ.
+    """
+    keys, values = np.array(list(groups), dtype=float), list(map(np.array, groups.values()))
+    value = float(statistic(keys, np.array([group.mean(axis=0) for group in values])))
+    if min(map(len, values)) < 2:
+        return _measured(statement, value, np.nan, np.nan)
+    with np.errstate(invalid="ignore"):
+        numbers = np.array([statistic(keys, means) for means in statistics.drawn_means(values)])
+    ends, _ = statistics.percentile_ends(numbers[np.isfinite(numbers)])
+    return _measured(statement, value, *ends, possible)
 
 
-def _measured(statement: str, value: float, low: float, high: float) -> Claim:
+def _finding(statement: str, statistic: Callable[..., float], groups: Sequence[Any]) -> Claim:
+    """A number of single packings, which are resampled for its interval (bootstrap)."""
+    return _measured(statement, *statistics.bootstrap(statistic, list(groups)))
+
+
+def _measured(statement: str, value: float, low: float, high: float, possible: Ends = ANY) -> Claim:
+    """The finding, with too few data if its interval spans orders of magnitude."""
+    low, high = np.clip([low, high], *possible).tolist()
     return Claim(
         statement=statement,
         sampler="",
@@ -288,5 +343,5 @@ def _measured(statement: str, value: float, low: float, high: float) -> Claim:
         low=low,
         high=high,
         criterion="",
-        verdict="measured",
+        verdict=FEW if too_wide(low, high, possible) else "measured",
     )

@@ -18,6 +18,23 @@ def short(value: float) -> str:
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
+def between(value: float, low: float, high: float, ends: str = "({} to {})") -> str:
+    """A number with its interval, to as many digits as tell its ends apart, up to four."""
+    if not np.isfinite([low, high]).all():
+        return f"{value:.2g}"
+    for digits in (2, 3, 4):
+        texts = [f"{number:.{digits}g}" for number in (value, low, high)]
+        if len(set(texts)) == 3 or low == high:
+            break
+    return f"{texts[0]} {ends.format(*texts[1:])}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words joined by commas, and the last one by "and"."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def with_error(values: Floats) -> str:
     """Mean ± standard error, to two digits of the error."""
     mean = float(values.mean())

@@ -1,22 +1,28 @@
-"""Ten findings, one sentence each, with numbers from the study.
+"""Findings, one sentence each, with numbers from the study.
 
-A finding is omitted if the study lacks one of its numbers.
+A finding is omitted if the study lacks one of its numbers; what the numbers do not support is said
+to be undecided, or left out.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from granforce.measures import statistics
-from granforce.paper.claims.groups import SAMPLERS
-from granforce.paper.formatting import with_error
+from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
+from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED
+from granforce.paper.findings import WORDS
+from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable
 from granforce.types import Rows
 
-WALK_OVER_EXACT = "η3 of the walk's states over exact η3, intermediate μ"
+PEAK = "μ where exact η3 is largest"
+STRONG = "correlation of f_n with the exact ΔF_n, intermediate μ"
+WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 # Friction at which packings are compared with those of the largest friction.
 USUAL = 0.1
+STATES = ("nearest", "gauss_seidel", "uniform")
 
 
 class Highlight(NamedTuple):
@@ -34,22 +40,36 @@ class _Numbers:
         self.table = table
         self._judged = {(row["statement"], row["sampler"]): row for row in (*claims, *findings)}
 
+    def row(self, statement: str, sampler: str = "") -> dict[str, Any]:
+        """A claim or finding with a number and an interval that is not too wide to be quoted."""
+        row = self._judged[statement, sampler]
+        if not np.isfinite([row["value"], row["low"], row["high"]]).all() or row["verdict"] == FEW:
+            raise KeyError(statement)
+        return row
+
+    def known(self, statements: dict[str, str]) -> dict[str, dict[str, Any]]:
+        """{word: finding} of {word: statement}, without those that cannot be quoted."""
+        rows = {}
+        for word, statement in statements.items():
+            try:
+                rows[word] = self.row(statement)
+            except KeyError:
+                continue
+        return rows
+
     def judged(self, statement: str, sampler: str = "") -> str:
         """The value of a claim or finding with its interval."""
-        row = self._judged[statement, sampler]
-        if not np.isfinite(row["value"]):
-            raise KeyError(statement)
-        ends = f" ({row['low']:.2g} to {row['high']:.2g})" if np.isfinite(row["low"]) else ""
-        return f"{row['value']:.2g}{ends}"
+        return _quoted(self.row(statement, sampler))
+
+    def verdicts(self, statement: str, samplers: Sequence[str]) -> dict[str, str]:
+        """{sampler: verdict} of a claim, for samplers of the study."""
+        keys = [(statement, sampler) for sampler in samplers]
+        return {key[1]: self._judged[key]["verdict"] for key in keys if key in self._judged}
 
     def mean(self, sampler: str, name: str, mu: float, factor: float = 1.0) -> str:
         """Mean ± standard error over packings at one μ."""
         values = factor * statistics.grouped(self.table.part(SAMPLERS[sampler]), name)[mu]
         return with_error(values)
-
-    def whole(self, sampler: str, name: str, mu: float) -> str:
-        """Mean over packings at one μ, as a whole number."""
-        return f"{statistics.grouped(self.table.part(SAMPLERS[sampler]), name)[mu].mean():.0f}"
 
     @property
     def frictions(self) -> list[float]:
@@ -63,117 +83,256 @@ class _Numbers:
         return max(extents, key=lambda mu: extents[mu].mean())
 
 
-def _free_forces(of: _Numbers) -> Highlight:
-    most = of.frictions[-1]
-    return Highlight(
-        f"Force balance leaves a {of.table.plan['n']}-disk packing with "
-        f"{of.whole('exact', 'dimension', USUAL)} free dimensions on average at μ = {USUAL:g}, "
-        f"and {of.whole('exact', 'dimension', most)} at μ = {most:g}.",
-        "figure1_exact",
-        "ensemble",
-    )
+def _quoted(row: dict[str, Any]) -> str:
+    return between(row["value"], row["low"], row["high"])
 
 
 def _maximum(of: _Numbers) -> Highlight:
-    least, most = 0.001, of.frictions[-1]
+    least, most, place = LEAST_DYNAMIC, of.frictions[-1], of.row(PEAK)
+    turns = of.row("η3(μ) is not monotonic", "exact")["verdict"] == REPRODUCED
+    within = MIDDLE[0] <= place["low"] and place["high"] <= MIDDLE[1]
+    first = (
+        f"The exact intervals are longest {'at intermediate friction, ' if within else ''}at "
+        f"μ = {_quoted(place)}"
+        if turns
+        else "Whether the exact intervals are longest at intermediate friction is undecided"
+    )
     return Highlight(
-        "Indeterminacy is largest at intermediate friction: the exact 0.15 η3 is "
-        f"{of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, compared with "
-        f"{of.mean('exact', 'eta3', least, 0.15)} at μ = {least:g} and "
-        f"{of.mean('exact', 'eta3', most, 0.15)} at μ = {most:g}.",
+        f"{first}: 0.15 η3 is {of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, "
+        f"compared with {of.mean('exact', 'eta3', least, 0.15)} at μ = {least:g} and "
+        f"{of.mean('exact', 'eta3', most, 0.15)} at μ = {most:g}. {_others_turn(of)}",
         "figure1_exact",
         "exact-intervals",
     )
 
 
-def _coverage(of: _Numbers) -> Highlight:
+def _others_turn(of: _Numbers) -> str:
+    """Whether η2 of sampled states has a maximum, too."""
+    verdicts = of.verdicts("η2(μ) is not monotonic", STATES)
+    names = {
+        word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
+        for word, chosen in (
+            ("does", lambda verdict: verdict == REPRODUCED),
+            ("does not", lambda verdict: verdict in (DIFFERS, FAILED)),
+            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, FAILED)),
+        )
+        if any(map(chosen, verdicts.values()))
+    }
+    sentences = {
+        "does": "η2 also rises and falls again for {}.",
+        "does not": "η2 does not for {}.",
+        "undecided": "Whether η2 has such a maximum for {} is undecided.",
+    }
+    return " ".join(sentences[word].format(known) for word, known in names.items())
+
+
+def _free_forces(of: _Numbers) -> Highlight:
+    most = of.frictions[-1]
     return Highlight(
-        "A random walk of 1000 states covers only part of S: at intermediate μ its intervals are "
-        f"{of.judged(WALK_OVER_EXACT)} times as long as the exact ones, and those of a uniform "
-        "sample are "
-        f"{of.judged('η3 of uniform states over exact η3, intermediate μ')} times as long.",
+        f"Force balance leaves a {of.table.plan['n']}-disk packing with "
+        f"{of.mean('exact', 'dimension', USUAL)} free dimensions at μ = {USUAL:g}, and "
+        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.{_prepared(of, most)}",
+        "figure1_exact",
+        "ensemble",
+    )
+
+
+def _prepared(of: _Numbers, mu: float) -> str:
+    """The range of h over ways to prepare packings, in a sentence; empty if there is only one."""
+    parts = [p for p in of.table.parts() if p.startswith("prepared_") and p.endswith("_exact")]
+    groups = [statistics.grouped(of.table.part(part), "dimension") for part in parts]
+    means = [group[mu].mean() for group in groups if mu in group]
+    if not means:
+        return ""
+    return (
+        f" The latter depends on how packings are made: with other options, the mean is between "
+        f"{min(means):.2g} and {max(means):.2g}."
+    )
+
+
+def _coverage(of: _Numbers) -> Highlight:
+    ratios = of.known(
+        {WORDS[name]: f"η3 of {WORDS[name]} over exact η3, intermediate μ" for name in STATES}
+    )
+    covered = {word: row for word, row in ratios.items() if row["high"] < 1}
+    if not covered:
+        raise KeyError("coverage")
+    quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
+    return Highlight(
+        f"{of.table.plan['states']} networks cover only part of S: at intermediate μ, their η3 "
+        f"relative to the exact one is {quoted}.",
         "samplers",
         "exact-intervals",
     )
 
 
 def _strong(of: _Numbers) -> Highlight:
-    statement = "corr(f_n, ΔF_n) is significant at intermediate μ"
+    absolute, relative = of.row(STRONG), of.row(WEAK)
+    first = (
+        "Strong contacts have longer intervals than weak ones"
+        if absolute["low"] > 0
+        else "Whether strong contacts have longer intervals is undecided"
+    )
+    second = (
+        "relative to their force, their intervals are shorter"
+        if relative["high"] < 0
+        else "whether they are shorter relative to the force is undecided"
+    )
     return Highlight(
-        "Strong contacts are the least determined: at intermediate μ the correlation between f_n "
-        f"and the length of its exact interval is {of.judged(statement, 'exact')}.",
+        f"{first}: at intermediate μ, the correlation of f_n with the exact ΔF_n is "
+        f"{_quoted(absolute)}. {second[0].upper()}{second[1:]}: the rank correlation of f_n with "
+        f"ΔF_n/f_n is {_quoted(relative)}.",
         "figure6_exact",
         "measures",
     )
 
 
 def _wider(of: _Numbers) -> Highlight:
+    base = f"distance of {WORDS['nearest']} from the centre over that of {WORDS['uniform']}"
+    middle, small = of.row(f"{base}, intermediate μ"), of.row(f"{base}, small μ")
+    if min(middle["low"], small["low"]) <= 1:
+        raise KeyError(base)
+    swept = of.known({"": f"η1 of {WORDS['gauss_seidel']} over η1 of {WORDS['uniform']}, {MID}"})
+    papers = "".join(
+        f" η1 of {WORDS['gauss_seidel']} is {_quoted(row)} times that of {WORDS['uniform']} at "
+        "intermediate μ."
+        for row in swept.values()
+    )
     return Highlight(
-        "The paper's walk is not uniform in S: its states spread "
-        f"{of.judged('η1 of the walk over η1 of S, intermediate μ')} times as far as uniform "
-        "states at intermediate μ, and "
-        f"{of.judged('η1 of the walk over η1 of S, small μ')} times as far at small μ.",
+        f"{_sentence(WORDS['nearest'])} is not uniform in S: its networks are {_quoted(middle)} "
+        f"times as far from the centre as uniform ones at intermediate μ, and {_quoted(small)} "
+        f"times as far at small μ.{papers}",
         "distances",
         "uniform-sampling",
     )
 
 
+MID = "intermediate μ"
+
+
+def _sentence(words: str) -> str:
+    return words[0].upper() + words[1:]
+
+
 def _alike(of: _Numbers) -> Highlight:
-    statement = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3"
+    claim = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
+    walks, verdicts, texts = ("nearest", "gauss_seidel"), set(), []
+    for ratio in ("η1/η3", "η2/η3"):
+        verdicts |= set(of.verdicts(f"{claim}: {ratio} is constant", walks).values())
+        values = listed(
+            [f"{of.judged(f'{claim}: value of {ratio}', name)} for {WORDS[name]}" for name in walks]
+        )
+        factors = [of.row(f"{claim}: {ratio} is constant", name)["value"] for name in walks]
+        varies = listed([f"{factor:.2g}" for factor in factors])
+        texts.append(f"{ratio} averages {values}, and varies by factors of {varies} with μ")
+    if verdicts == {REPRODUCED}:
+        first = "The three measures are proportional to each other"
+    elif verdicts & {DIFFERS, FAILED}:
+        first = "The three measures are not all proportional to each other"
+    else:
+        first = "Whether the three measures are proportional to each other is undecided"
     return Highlight(
-        "The three measures agree up to constant factors: η1/η3 is "
-        f"{of.judged(statement, 'nearest')} in walks that project onto S, and "
-        f"{of.judged(statement, 'gauss_seidel')} in walks that use the paper's sweeps.",
+        f"{first}: for μ ≥ {LEAST_DYNAMIC:g}, {'; '.join(texts)}. η2 ≈ √2 η1 follows from the "
+        "definitions alone.",
         "figure1",
         "measures",
     )
 
 
 def _critical(of: _Numbers) -> Highlight:
+    claim = "⟨F_crit⟩ over ⟨limit load⟩, {} μ"
+    small, middle, large = (of.row(claim.format(w)) for w in ("small", "intermediate", "large"))
+    if middle["high"] >= 1:
+        raise KeyError(claim)
+    pushed = {row["contacts"] for row in of.table.responses()}
+    longer = of.known(
+        {
+            "": "⟨F_crit⟩ with load steps of 0.4 of the remaining distance over that with 0.1 "
+            "(other contacts), intermediate μ"
+        }
+    )
+    steps = "".join(
+        f" With load steps four times as long, F_crit is {_quoted(row)} times as large at "
+        "intermediate μ."
+        for row in longer.values()
+    )
     return Highlight(
-        "Where friction matters, a contact gives way below its limit load: the ratio of F_crit to "
-        f"the limit load is {of.judged('⟨F_crit⟩ over ⟨limit load⟩, small μ')} at small, "
-        f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, intermediate μ')} at intermediate and "
-        f"{of.judged('⟨F_crit⟩ over ⟨limit load⟩, large μ')} at large μ.",
+        "Where friction matters, a contact gives way below its limit load: F_crit over the limit "
+        f"load, means over {max(pushed):g} contacts of each packing, is {_quoted(small)} at small, "
+        f"{_quoted(middle)} at intermediate and {_quoted(large)} at large μ.{steps}",
         "figure2_limit",
         "local-perturbation",
     )
 
 
 def _stability(of: _Numbers) -> Highlight:
+    claim = "F_crit rises with η"
+    words = {"exact": "exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
+    verdicts = of.verdicts(claim, list(words))
+    texts = listed([f"{of.judged(claim, name)} with {words[name]}" for name in verdicts])
+    if set(verdicts.values()) == {REPRODUCED}:
+        first = "The critical force rises with indeterminacy"
+    elif set(verdicts.values()) <= {DIFFERS, FAILED}:
+        first = "The critical force does not follow indeterminacy closely"
+    else:
+        first = (
+            "How closely the critical force follows indeterminacy is not decided for all measures"
+        )
     return Highlight(
-        "The critical force is only loosely related to indeterminacy: over all μ, its rank "
-        f"correlation is {of.judged('F_crit rises with η', 'exact')} with the exact η3 and "
-        f"{of.judged('F_crit rises with η', 'nearest')} with η2 of nearest walks.",
-        "figure2",
-        "local-perturbation",
+        f"{first}: over all μ, its rank correlation is {texts}.", "figure2", "local-perturbation"
     )
 
 
 def _shear(of: _Numbers) -> Highlight:
+    base = "shear stress over pressure"
+    part = of.row(f"{base} of the original network, over the largest of the packing, {MID}")
+    if part["high"] >= 1:
+        raise KeyError(base)
     return Highlight(
-        "A packing compressed isotropically can carry shear: the largest possible ratio of "
-        "shear stress to pressure is "
-        f"{of.judged('largest shear stress over pressure, intermediate μ')} at intermediate μ.",
+        "A packing compressed in a square box can carry more shear than the compression left in "
+        f"it: at intermediate μ, the ratio of shear stress to pressure is "
+        f"{of.judged(f'{base} of the original network, {MID}')} as made, and can reach "
+        f"{of.judged(f'largest {base}, {MID}')}.",
         "stresses",
         "stresses",
     )
 
 
 def _volume(of: _Numbers) -> Highlight:
+    name = "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩, {} μ"
+    small, middle, large = (of.row(name.format(w)) for w in ("small", "intermediate", "large"))
+    if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
+        raise KeyError(name)
     return Highlight(
-        "The volume of S shrinks as friction decreases: ln V per grain is "
-        f"{of.judged('ln V per grain, forces in ⟨f_n⟩, large μ')} at large, "
-        f"{of.judged('ln V per grain, forces in ⟨f_n⟩, intermediate μ')} at intermediate and "
-        f"{of.judged('ln V per grain, forces in ⟨f_n⟩, small μ')} at small μ.",
+        "S is narrower at smaller friction, although it has more dimensions: its width per free "
+        f"dimension, from its volume, is {_quoted(large)} ⟨f_n⟩ at large, {_quoted(middle)} ⟨f_n⟩ "
+        f"at intermediate and {_quoted(small)} ⟨f_n⟩ at small μ.",
         "volumes",
         "volume",
     )
 
 
+def _size(of: _Numbers) -> Highlight:
+    sizes = sorted({row["n"] for row in of.table.part("size_exact", "exact")})
+    slope = of.row(f"slope of log exact η3 against log N, μ = {USUAL:g}")
+    growth = (sizes[-1] / sizes[0]) ** slope["value"]
+    words = "rises" if slope["low"] > 0 else "falls" if slope["high"] < 0 else ""
+    first = (
+        f"Exact η3 {words} with the number of disks N"
+        if words
+        else "Whether exact η3 depends on the number of disks N is undecided"
+    )
+    return Highlight(
+        f"{first}: at μ = {USUAL:g}, the slope of log η3 against log N is {_quoted(slope)}, a "
+        f"factor of {growth:.2g} from {sizes[0]} to {sizes[-1]} disks.",
+        "sizes",
+        "exact-intervals",
+    )
+
+
 SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
     *(_maximum, _free_forces, _coverage, _strong, _wider, _alike, _critical, _stability, _shear),
-    _volume,
+    *(_volume, _size),
 )
 
 

@@ -18,6 +18,13 @@ def test_mean_intervals_cover_as_often_as_they_say(rng):
     assert np.isnan(statistics.mean_interval([])).all()
 
 
+def test_a_fraction_of_equal_values_has_an_interval():
+    value, low, high = statistics.proportion_interval([1.0, 1.0, 1.0])
+    assert (value, high) == (1, 1) and low == pytest.approx(0.025 ** (1 / 3))
+    value, low, high = statistics.proportion_interval([0.0, 1.0, 1.0, 0.0])
+    assert value == 0.5 and low + high == pytest.approx(1)
+
+
 def test_bootstrap_resamples_each_group(rng):
     groups = [rng.normal(5, 1, 30), rng.normal(2, 1, 30)]
 
@@ -65,18 +72,29 @@ def test_a_jackknife_of_the_mean_is_its_interval(rng):
     assert np.isnan(statistics.jackknife(np.mean, [1.0])[1:]).all()
 
 
-def test_means_are_drawn_anew_packing_by_packing(rng):
-    groups = [rng.normal(0, 1, 50), rng.normal(5, 2, (20,))]
-    drawn = statistics.resampled_means(groups, resamples=4000)
-    np.testing.assert_allclose(drawn.mean(axis=0), [g.mean() for g in groups], atol=0.03)
-    expected = [g.std() / np.sqrt(len(g)) for g in groups]
-    np.testing.assert_allclose(drawn.std(axis=0), expected, rtol=0.05)
+def test_drawn_means_have_the_percentiles_of_students_interval(rng):
+    """For few packings, too; a bootstrap of three would end at less than half of that."""
+    groups = [rng.normal(5, 2, 3), rng.normal(0, 1, 50)]
+    drawn = statistics.drawn_means(groups, draws=20_000)
+    for means, group in zip(drawn.T, groups, strict=True):
+        (low, high), (lowest, highest) = statistics.percentile_ends(means)
+        value, *ends = statistics.mean_interval(group)
+        np.testing.assert_allclose([low, high], ends, atol=0.05 * (ends[1] - ends[0]))
+        assert lowest < low < high < highest
+        assert means.mean() == pytest.approx(value, abs=0.1 * (ends[1] - ends[0]))
+    # Components of one item are drawn jointly; a single packing does not vary.
+    values = rng.normal(size=(10, 1)) * [1.0, -2.0]
+    both = statistics.drawn_means([values, values[:1]], draws=50)
+    np.testing.assert_allclose(both[:, 0, 1], -2 * both[:, 0, 0], atol=1e-12)
+    assert (both[:, 1] == values[0]).all()
+
+
+def test_other_draws_leave_the_ends_within_the_farthest(rng):
+    groups = [rng.normal(0, 1, 50)]
+    drawn = statistics.drawn_means(groups, draws=4000)
     (low, high), (lowest, highest) = statistics.percentile_ends(drawn[:, 0])
-    assert lowest < low < high < highest
-    # Other draws leave the ends within the farthest.
     for seed in range(1, 9):
-        other = statistics.resampled_means(groups, seed, 4000)[:, 0]
-        ends, _ = statistics.percentile_ends(other)
+        ends, _ = statistics.percentile_ends(statistics.drawn_means(groups, seed, 4000)[:, 0])
         assert lowest < ends[0] + 0.2 * (low - lowest)
         assert ends[1] - 0.2 * (highest - high) < highest
 

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from heeding import heeding, interrupted, until_it_left
+from scipy import stats
 
 from granforce import measures
 from granforce.cli.parser import main
@@ -372,6 +373,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "others", "sweeps", "preparation", "counts", "claims", "findings")
+    names += ("verdicts", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = filled.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
@@ -400,16 +402,15 @@ def test_a_column_of_fewer_packings_says_of_how_many(table):
     walk = np.array([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
     assert line["packings"] == "2"
     error = walk.std(ddof=1) / np.sqrt(2)
-    mean, _, told = line["nearest η2"].partition(" ± ")
+    mean, _, told = line["nearest-network walk η2"].partition(" ± ")
     assert (float(mean), float(told)) == pytest.approx((walk.mean(), error), rel=0.06)
     phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
     assert line["φ"] == f"{phi:.4f}"
-    # The paper's sweeps are of the first one: that one over nearest networks in the same packing.
-    assert line["sweeps η2"].endswith(" (1)") and line["sweeps/nearest η2"].endswith(" (1)")
+    # The paper's walk is of the first one: its ratio is to the other walk in the same packing.
+    ratio = line["paper's walk/nearest-network walk η2"]
+    assert line["paper's walk η2"].endswith(" (1)") and ratio.endswith(" (1)")
     (swept,) = (row for row in table.part("sweeps_1e-3") if row["mu"] == 0.3)
-    assert float(line["sweeps/nearest η2"].split()[0]) == pytest.approx(
-        swept["eta2"] / walk[0], abs=2e-3
-    )
+    assert float(ratio.split()[0]) == pytest.approx(swept["eta2"] / walk[0], abs=2e-3)
 
 
 def test_what_lies_outside_of_s_is_no_value_of_eta(table):
@@ -420,7 +421,7 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
         assert row["excess"] >= 0
     assert max(row["excess"] for row in table.part("walk") if row["mu"] > 0) < 1e-8
     line = cells_of(documents.measures(table), 0)
-    assert line["sweeps η2"] == line["sweeps 0.15 η3"] == "outside S"
+    assert line["paper's walk η2"] == line["paper's walk 0.15 η3"] == "outside S"
     assert {row["mu"] for row in groups.drawn(table, "gauss_seidel")} <= {0.1, 0.3}
     told = {(c.statement, c.sampler): c for c in claims.judged(table)}
     vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
@@ -437,7 +438,7 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
         row, exact = row | {"part": "sweeps_1e-4"}, exact | {"mean_length": 2.0}
         for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "outside S"), (1e-9, "< 0.001")):
             rows = [row | {"excess": excess, "mu": 0.1, "seed": 1}, exact | {"mu": 0.1, "seed": 1}]
-            (line,) = documents.sweeps(table._replace(rows=rows)).splitlines()[2:]
+            *_, line = documents.sweeps(table._replace(rows=rows)).splitlines()
             assert told in line
         rows[0] |= {"part": "sweeps_1e-3", "excess": 0.5, "skipped_part": 0.0}
         assert ", excess 0.25 |" in documents.measures(table._replace(rows=rows))
@@ -460,8 +461,48 @@ def test_what_packings_depend_on_is_told_in_standard_errors(table):
     assert told[0] == "2"
     assert told[1].startswith(f"{some.mean():.1f}"[:3])
     if np.ptp(apart):
-        assert told[1].endswith(f"({apart.mean() / (apart.std(ddof=1) / 2**0.5):+.1f})")
+        t, p = stats.ttest_1samp(apart, 0)
+        assert told[1].endswith(f"({t:+.1f})" if p >= 0.05 else f"(**{t:+.1f}**)")
     assert "differences" in text.splitlines()[-1]
+
+
+def test_differences_of_few_packings_are_judged_by_students_t():
+    """3.7 standard errors of three pairs are chance; equal differences have no scatter."""
+    rows = [
+        {"part": part, "n": 20, "mu": 1.0, "seed": seed, "dimension": dimension}
+        for part, dimensions in (
+            ("exact", (10, 10, 10)),
+            ("prepared_few_exact", (13, 15, 18)),
+            ("prepared_same_exact", (16, 16, 16)),
+            ("prepared_far_exact", (20, 20.01, 20.02)),
+        )
+        for seed, dimension in enumerate(dimensions)
+    ]
+    rows += [row | {"part": row["part"].removesuffix("_exact")} for row in rows[3:]]
+    text = documents.preparation(tables.StudyTable({"n": 20}, rows, {}, [], {}, {}))
+    cells = {line.split("|")[2].strip(): line.split("|")[4] for line in text.splitlines()[2:6]}
+    assert cells["few"].endswith("(+3.7) ") and cells["same"].endswith("(no scatter) ")
+    assert "(**+" in cells["far"]
+    summary = text.splitlines()[-1]
+    assert "1 of 2 differences are significant" in summary and "1 left out" in summary
+    assert "from 10 to 20" in summary and "at μ = 1 only" in summary
+
+
+def test_verdicts_are_counted_for_each_sampler_and_claim():
+    def claim(statement, sampler, verdict):
+        return {"statement": statement, "sampler": sampler, "verdict": verdict, "value": 1.0}
+
+    told = [
+        claim("a", "nearest", verdicts.REPRODUCED),
+        claim("a", "exact", verdicts.REPRODUCED),
+        claim("b", "nearest", verdicts.REPRODUCED),
+        claim("b", "exact", verdicts.UNDECIDED),
+    ]
+    lines = [line.split(" | ") for line in documents.verdict_counts(told).splitlines()]
+    assert lines[0][1:3] == ["nearest-network walk", "exact"]  # no column without numbers
+    counted = {words[0].strip("| "): [int(n.strip("| ")) for n in words[1:]] for words in lines[2:]}
+    assert counted["reproduced"] == [2, 1, 1] and counted["undecided"] == [0, 1, 0]
+    assert counted["all"] == [2, 2, 2]
 
 
 def test_versions_are_not_mixed(done, table, tmp_path, capsys):

@@ -4,7 +4,7 @@ Every claim has a number, its 95 % confidence interval over packings, and two ra
 interpretation of the claim's words, and a wider one. A claim is "reproduced" if the whole interval
 is in the first range, "differs" if it is entirely outside the first, "not reproduced" if it is also
 entirely outside the wider one, and "undecided" if it crosses an end of the first range, or if
-another draw of the bootstrap or the omission of one μ would change the verdict (`verdicts`). Claims
+another draw of means or the omission of one μ would change the verdict (`verdicts`). Claims
 about a range of μ are judged at each μ in it, so that no mean hides a change of sign. Claims about
 the shape of P(ΔF_n) use no bins.
 
@@ -40,6 +40,7 @@ from granforce.paper.claims.groups import SAMPLERS, outside
 from granforce.paper.claims.verdicts import FEW, MISSING, Claim
 from granforce.paper.tables import StudyTable
 
+OUTSIDE = "outside S, and not judged, at "  # begins the list of μ where a walk is not judged
 BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
 BY_WALKS = (*BY_SWEEPS, "nearest")
 BY_STATES = (*BY_WALKS, "uniform")  # these have η1 and η2
@@ -101,5 +102,5 @@ def without(claim: Claim, beyond: Sequence[float]) -> Claim:
     """The claim, with the μ at which it is not judged because states are outside S."""
     if not beyond:
         return claim
-    where = f"outside S, and not judged, at {', '.join(f'{mu:g}' for mu in beyond)}"
+    where = f"{OUTSIDE}{', '.join(f'{mu:g}' for mu in beyond)}"
     return claim._replace(why=f"{claim.why}; {where}" if claim.why else where)

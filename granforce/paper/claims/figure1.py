@@ -20,7 +20,9 @@ from granforce.paper.claims.groups import (
     positive_friction,
 )
 from granforce.paper.claims.verdicts import (
+    CORRELATION,
     NEAR_PEAK,
+    POSITIVE,
     PRL,
     UNMEASURED,
     Claim,
@@ -58,6 +60,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
             good=(1, 1.5),
             fair=(1, 2),
             least=3,
+            possible=(1, np.inf),
         )
         yield over_all(
             f"{statement}: value of {word}",
@@ -66,6 +69,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
             groups,
             good=good,
             fair=fair,
+            possible=POSITIVE,
         )
 
 
@@ -73,7 +77,7 @@ def peaked(
     claim: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2), fair: Ends = (0.02, 0.5)
 ) -> Claim:
     """A claim of the paper that a quantity grouped by μ is largest near 0.1."""
-    return over_all(claim, what, peak, groups, good=good, fair=fair, least=3)
+    return over_all(claim, what, peak, groups, good=good, fair=fair, least=3, possible=POSITIVE)
 
 
 def maximum(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -123,6 +127,7 @@ def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
         items(measured, lambda row: abs(row[name])),
         good=(-np.inf, 1e-7),
         source=PRL,
+        possible=POSITIVE,
     )
     if 0 in outside(table, SAMPLERS[sampler]):
         why = "S is one point there, and sweeps end beside it"
@@ -151,6 +156,7 @@ def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
         items(rows, "part_seen"),
         good=(0.9, 1.1),
         fair=(0.75, 1.25),
+        possible=POSITIVE,
     )
 
 
@@ -178,6 +184,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
         items(scatter, "part"),
         good=(-np.inf, 0.05),
         fair=(-np.inf, 0.1),
+        possible=POSITIVE,
     )
     longer = statistics.paired([r for r in table.part(f"{part}_long") if enough(r)], first)
     for name, label in (("eta2", "η2"), ("eta3", "η3")):
@@ -188,6 +195,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
             items(ratios, "ratio"),
             good=(0.95, 1.05),
             fair=(0.9, 1.1),
+            possible=POSITIVE,
         )
 
 
@@ -225,6 +233,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
             fair=fair,
             source=PRL,
             least=3,
+            possible=CORRELATION,
         )
 
 
@@ -245,6 +254,7 @@ def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
         good=(-1, -0.95),
         fair=(-1, -0.8),
         least=3,
+        possible=CORRELATION,
     )
 
 

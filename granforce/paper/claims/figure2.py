@@ -8,7 +8,7 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
-from granforce.paper.claims.verdicts import Claim, at_each, over_all
+from granforce.paper.claims.verdicts import CORRELATION, POSITIVE, Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
@@ -38,6 +38,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
             good=(0.7, 1),
             fair=(0.3, 1),
             least=3,
+            possible=CORRELATION,
         )
         yield over_all(
             f"{label} is similar at equal η on both sides of the maximum",
@@ -48,6 +49,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
             good=(0.8, 1.25),
             fair=(1 / 1.5, 1.5),
             least=3,
+            possible=POSITIVE,
         )
 
 
@@ -65,6 +67,7 @@ def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
         {mu: groups[mu] for mu in sorted(groups)},
         good=(-np.inf, 1),
         interval=_misfits,
+        possible=POSITIVE,
     )
 
 

@@ -9,6 +9,7 @@ from granforce.paper.claims.groups import (
     DETERMINED,
     LEAST_DYNAMIC,
     SAMPLERS,
+    Groups,
     drawn,
     dynamic,
     items,
@@ -16,7 +17,7 @@ from granforce.paper.claims.groups import (
     positive_friction,
     within,
 )
-from granforce.paper.claims.verdicts import PRL, Claim, at_each, turns
+from granforce.paper.claims.verdicts import CORRELATION, POSITIVE, PRL, Claim, at_each, turns
 from granforce.paper.tables import StudyTable
 
 
@@ -28,14 +29,29 @@ def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
         items(dynamic(drawn(table, sampler)), "pair_spread"),
         good=(-np.inf, 0.2),
         fair=(-np.inf, 0.35),
+        possible=POSITIVE,
     )
 
 
 def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Weak contacts can change most relative to their force, and most at intermediate μ."""
+    ratios, ranks = relative_extents(table, sampler)
+    yield turns("ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ", ratios)
+    yield at_each(
+        "weak contacts have the largest relative extents ΔF_n/F_orig",
+        f"rank correlation of ΔF_n/F_orig with F_orig over contacts, μ ≥ {LEAST_DYNAMIC:g}",
+        within(ranks, (LEAST_DYNAMIC, np.inf)),
+        good=(-np.inf, -0.3),
+        fair=(-np.inf, 0),
+        possible=CORRELATION,
+    )
+
+
+def relative_extents(table: StudyTable, sampler: str) -> tuple[Groups, Groups]:
+    """Median ΔF_n/F_orig over contacts, and its rank correlation with F_orig, by μ > 0."""
     judged = may_be_judged(table, sampler)
-    ratios: dict[float, list[tuple[int, float]]] = {}
-    ranks: dict[float, list[tuple[int, float]]] = {}
+    ratios: Groups = {}
+    ranks: Groups = {}
     for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
         carries = normal > DETERMINED
         if judged(row) and row["mu"] > 0 and carries.sum() > 2 and extent.mean() > DETERMINED:
@@ -43,17 +59,7 @@ def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
             ratios.setdefault(row["mu"], []).append((row["n"], float(np.median(ratio))))
             rank = statistics.rank_correlation(normal[carries], ratio)
             ranks.setdefault(row["mu"], []).append((row["n"], rank))
-    yield turns(
-        "ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ",
-        {mu: ratios[mu] for mu in sorted(ratios)},
-    )
-    yield at_each(
-        "weak contacts have the largest relative extents ΔF_n/F_orig",
-        f"rank correlation of ΔF_n/F_orig with F_orig over contacts, μ ≥ {LEAST_DYNAMIC:g}",
-        within({mu: ranks[mu] for mu in sorted(ranks)}, (LEAST_DYNAMIC, np.inf)),
-        good=(-np.inf, -0.3),
-        fair=(-np.inf, 0),
-    )
+    return dict(sorted(ratios.items())), dict(sorted(ranks.items()))
 
 
 def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -70,4 +76,5 @@ def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
         positive_friction(items(rows, name)),
         good=(-np.inf, 1),
         source=PRL,
+        possible=POSITIVE,
     )

@@ -18,7 +18,7 @@ from granforce.paper.claims.groups import (
     span_text,
     within,
 )
-from granforce.paper.claims.verdicts import Claim, at_each, over_all
+from granforce.paper.claims.verdicts import FRACTION, POSITIVE, Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
@@ -46,6 +46,7 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
                 fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
                 interval=departure,
+                possible=FRACTION,
             )
 
 
@@ -78,6 +79,7 @@ def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 good=good,
                 fair=fair,
                 interval=_exponents(quantile),
+                possible=POSITIVE,
             )
 
 
@@ -113,6 +115,7 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
             lambda keys, means, span=span: _over_middle(keys, means, span),
             dict(sorted(groups.items())),
             good=(1, np.inf),
+            possible=POSITIVE,
         )
 
 

@@ -15,9 +15,11 @@ from granforce.paper.claims.groups import (
     span_text,
     within,
 )
-from granforce.paper.claims.verdicts import PRL, Claim, at_each
+from granforce.paper.claims.verdicts import FRACTION, POSITIVE, PRL, Claim, at_each
 from granforce.paper.tables import StudyTable
 from granforce.types import Mask
+
+FROZEN_SMALL = 0.05  # μ up to which contacts with frozen surroundings are judged as at small μ
 
 
 def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Groups:
@@ -43,6 +45,7 @@ def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
         within(groups, (0.1, 0.1)),
         good=(0.8, 1.25),
         fair=(0.5, 2),
+        possible=POSITIVE,
     )
 
 
@@ -55,6 +58,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
         f"μ in {span_text(MIDDLE)}",
         within(groups, MIDDLE),
         good=(1, np.inf),
+        possible=POSITIVE,
     )
 
 
@@ -67,6 +71,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
         within(groups, (10, 10)),
         good=(0.8, 1.25),
         fair=(0.5, 2),
+        possible=POSITIVE,
     )
 
 
@@ -84,6 +89,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
         items(rows, "undetermined_part"),
         good=(0.9, np.inf),
         fair=(0.5, np.inf),
+        possible=FRACTION,
     )
     yield at_each(
         "with only the pressure prescribed, undetermined contacts form one cluster",
@@ -91,6 +97,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
         items([row for row in rows if row["undetermined"]], "clusters"),
         good=(-np.inf, 1.1),
         fair=(-np.inf, 2),
+        possible=POSITIVE,
     )
 
 
@@ -101,15 +108,15 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         word = f"N = {rows[0]['n']}" if rows else "N = 400" if part == "frozen" else "N = 1600"
         for claim, measured, what, span, good, fair in (
             (
-                "at small μ contacts are undetermined everywhere",
+                f"at μ ≤ {FROZEN_SMALL:g} contacts are undetermined everywhere",
                 "undetermined fraction of the contacts inside",
                 "undetermined_part",
-                (0, 0.05),
+                (0, FROZEN_SMALL),
                 (0.75, np.inf),
                 (0.5, np.inf),
             ),
             (
-                "at large μ most contacts are determined",
+                f"at μ ≥ {BARELY_RIGID:g} most contacts are determined",
                 "determined fraction of the contacts inside",
                 lambda row: 1 - row["undetermined_part"],
                 (BARELY_RIGID, np.inf),
@@ -117,7 +124,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 (0.25, np.inf),
             ),
             (
-                "at large μ the undetermined ones form small clusters",
+                f"at μ ≥ {BARELY_RIGID:g} the undetermined ones form small clusters",
                 "fraction of the contacts inside that are in the largest cluster",
                 lambda row: row["largest_cluster"] / row["contacts"],
                 (BARELY_RIGID, np.inf),
@@ -132,4 +139,5 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 good=good,
                 fair=fair,
                 source=PRL,
+                possible=FRACTION,
             )

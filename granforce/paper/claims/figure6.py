@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from granforce import measures
+from granforce.measures import statistics
 from granforce.paper.claims.groups import (
     DETERMINED,
     LARGE,
@@ -18,7 +19,7 @@ from granforce.paper.claims.groups import (
     span_text,
     within,
 )
-from granforce.paper.claims.verdicts import Claim, at_each, over_all
+from granforce.paper.claims.verdicts import CORRELATION, FRACTION, Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
@@ -45,6 +46,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
             within(everywhere, span),
             good=good,
             fair=fair,
+            possible=CORRELATION,
         )
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ, against chance",
@@ -73,7 +75,8 @@ def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
             if np.isfinite(apart):
                 groups.setdefault(row["mu"], []).append((row["n"], apart))
     yield at_each(
-        "corr(f_n, ΔF_n) at intermediate μ is of statistical origin",
+        "corr(f_n, ΔF_n) at intermediate μ is of statistical origin: the same if contacts exchange "
+        "the positions of f_n in their intervals",
         "its remainder when contacts exchange the positions of f_n in their intervals: the "
         "correlation minus that of permuted positions",
         within({mu: groups[mu] for mu in sorted(groups)}, MIDDLE),
@@ -121,4 +124,6 @@ def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
             within(items(rows, lambda r, test=test: float(test(r))), span),
             good=(0.9, np.inf),
             fair=(0.5, np.inf),
+            interval=statistics.proportion_interval,
+            possible=FRACTION,
         )

@@ -1,15 +1,18 @@
 """How a claim is judged: a number with its interval, two ranges, and tests of the verdict.
 
 There are two kinds of claims. `over_all` judges one number for all μ, such as a slope or the
-position of a maximum: its interval comes from resampled packings at each μ (percentile bootstrap).
-The verdict must be the same for the whole interval, wherever other draws could put its ends, and
-the number must stay in the same range if any one μ is left out; a number outside the first range,
-but not always outside the wider one, differs. `at_each` judges a number at every μ by Student's
-interval over its packings, without resampling; together the intervals hold with 95 % confidence
-(Bonferroni).
+position of a maximum: its interval contains 95 % of its values for means at each μ that are drawn
+from their Student distributions (`statistics.drawn_means`). The verdict must be the same for the
+whole interval, wherever other draws could put its ends, and the number must stay in the same range
+if any one μ is left out; a number outside the first range, but not always outside the wider one,
+differs. `at_each` judges a number at every μ by Student's interval over its packings; together the
+intervals hold with 95 % confidence (Bonferroni).
+
+Intervals end where the possible values of a number end. A number has too few data if its interval
+decides nothing and spans more than a factor WIDE, or nearly all possible values.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +28,10 @@ UNMEASURED = "not measured"
 LEAST_DISKS = 1000  # in all packings of one μ
 NEAR_PEAK = 2.0  # in μ: means within this factor of the largest determine the maximum
 MOST_NAMED = 3  # μ that are listed singly if omitting any of them changes a verdict
+# Intervals of positive numbers that span more than this factor, and of bounded ones that span more
+# than this part of the possible values, are too few data.
+WIDE, MOST = 10.0, 0.9
+ANY, POSITIVE, FRACTION, CORRELATION = (-np.inf, np.inf), (0.0, np.inf), (0.0, 1.0), (-1.0, 1.0)
 
 
 class Claim(NamedTuple):
@@ -40,6 +47,8 @@ class Claim(NamedTuple):
     criterion: str  # range for "reproduced", with the wider one in brackets
     verdict: str
     why: str = ""  # reason for a negative or open verdict
+    mu: float | None = None  # where the number is from, if it is judged at each μ
+    packings: int = 0  # at that μ, or the fewest at any
 
 
 PRE, PRL, OURS = "PRE", "PRL", "ours"
@@ -90,11 +99,12 @@ def over_all(
     source: str = PRE,
     least: int = 2,
     seed: int = 0,
+    possible: Ends = ANY,
 ) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
 
     groups: {μ: [(disks, value)]}, with values of any shape; least: minimum number of groups. seed:
-    of the bootstrap.
+    of the drawn means. possible: values that the number can have.
     """
     ranges = Ranges(good, good if fair is None else fair)
     claim = _missing(statement, source, measured, ranges)
@@ -106,10 +116,10 @@ def over_all(
     value = float(statistic(keys, means))
     if not np.isfinite(value):
         return claim
-    claim = claim._replace(value=value)
-    drawn = statistics.resampled_means(values, seed)
-    values_drawn = np.array([statistic(keys, draw) for draw in drawn])
-    single = max(map(len, values)) < 2
+    fewest = min(map(len, values))
+    claim = claim._replace(value=value, packings=fewest)
+    values_drawn = _drawn(statistic, keys, values, seed)
+    single = fewest < 2
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
     if single or few or np.isfinite(values_drawn).mean() < 0.9:
         claim = claim._replace(verdict=FEW)
@@ -118,9 +128,9 @@ def over_all(
         low, high = statistics.percentile_ends(values_drawn)[0]
         return claim._replace(low=low, high=high)
     (low, high), farthest = statistics.percentile_ends(values_drawn[np.isfinite(values_drawn)])
-    verdict = ranges.verdict(low, high)
+    verdict = _judge(ranges, low, high, possible)
     claim = claim._replace(low=low, high=high, verdict=verdict)
-    if verdict == UNDECIDED:
+    if verdict in (UNDECIDED, FEW):
         return claim
     turned = {None: ranges.verdict(*farthest)}  # by the omitted μ; None: another draw
     for k, key in enumerate(keys) if len(keys) > least else ():
@@ -133,6 +143,29 @@ def over_all(
         outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
         verdict = DIFFERS if outside else UNDECIDED
     return claim._replace(verdict=verdict, why=why)
+
+
+def _drawn(
+    statistic: Callable[..., float], keys: Floats, values: Sequence[Floats], seed: int
+) -> Floats:
+    """The number for drawn means; NaN where these are impossible, such as η < 0."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.array(
+            [statistic(keys, draw) for draw in statistics.drawn_means(values, seed=seed)]
+        )
+
+
+def _judge(ranges: Ranges, low: float, high: float, possible: Ends) -> str:
+    """The verdict of an interval, FEW if it decides nothing and is too wide."""
+    verdict = ranges.verdict(low, high)
+    return FEW if verdict == UNDECIDED and too_wide(low, high, possible) else verdict
+
+
+def too_wide(low: float, high: float, possible: Ends) -> bool:
+    """Whether an interval spans orders of magnitude, or nearly all possible values."""
+    if np.isfinite(possible).all():
+        return high - low > MOST * (possible[1] - possible[0])
+    return possible[0] >= 0 and high > WIDE * low
 
 
 def _missing(statement: str, source: str, measured: str, ranges: Ranges) -> Claim:
@@ -155,7 +188,7 @@ def _turns(turned: Any, verdict: str) -> str:
     why = []
     for other in sorted(set(turned.values()) - {verdict}):
         if turned[None] == other:
-            why.append(f"{other} with another draw of packings")
+            why.append(f"{other} with another draw of means")
         left_out = [
             f"{mu:g}" for mu, direction in turned.items() if mu is not None and direction == other
         ]
@@ -175,11 +208,13 @@ def at_each(
     fair: Ends | None = None,
     source: str = PRE,
     interval: Callable[[Any, float], tuple[float, float, float]] | None = None,
+    possible: Ends = ANY,
 ) -> Claim:
-    """The Claim about a number at each μ, reporting the one farthest from the good range.
+    """The Claim about a number at each μ, reporting one that decides the verdict.
 
-    groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default the
-    mean and Student's interval.
+    Of the μ whose numbers have the verdict of the claim, it is the one farthest from the good
+    range. groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default
+    the mean and Student's interval. possible: values that the number can have.
     """
     ranges = Ranges(good, good if fair is None else fair)
     interval = interval or statistics.mean_interval
@@ -189,15 +224,26 @@ def at_each(
     level = 1 - (1 - statistics.LEVEL) / len(groups)
     estimates, verdicts = {}, {}
     for mu, group in groups.items():
-        value, low, high = interval([value for _, value in group], level)
+        value, *ends = interval([value for _, value in group], level)
+        low, high = np.clip(ends, *possible)
         estimates[mu] = float(value), float(low), float(high)
         few = sum(n for n, _ in group) < LEAST_DISKS or not np.isfinite(estimates[mu][1])
-        verdicts[mu] = FEW if few else ranges.verdict(*estimates[mu][1:])
-    place = max(estimates, key=lambda mu: _beyond(estimates[mu][0], ranges.good))
-    where = f"{measured}, at the worst μ ({place:g})" if len(estimates) > 1 else measured
-    value, low, high = estimates[place]
+        verdicts[mu] = FEW if few else _judge(ranges, low, high, possible)
     verdict, why = _together(verdicts)
-    return claim._replace(measured=where, value=value, low=low, high=high, verdict=verdict, why=why)
+    deciding = [mu for mu in verdicts if verdicts[mu] == verdict] or list(verdicts)
+    place = max(deciding, key=lambda mu: _beyond(estimates[mu][0], ranges.good))
+    where = f"{measured}, at the deciding μ ({place:g})" if len(estimates) > 1 else measured
+    value, low, high = estimates[place]
+    return claim._replace(
+        measured=where,
+        value=value,
+        low=low,
+        high=high,
+        verdict=verdict,
+        why=why,
+        mu=float(place),
+        packings=len(groups[place]),
+    )
 
 
 def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
@@ -224,10 +270,12 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
         ends = [statistics.difference_interval(middle, end, level) for end in (first, last)]
         rises.append(np.min(ends, axis=0) / middle.mean())
     value, low, high = max(rises, key=lambda one: one[0])
+    high = min(high, 1.0)  # the number is positive at the ends, too
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
     # With only two ends nothing turns, and an exact zero is undecided.
     verdict = FEW if few else UNDECIDED if low <= 0 <= high else ranges.verdict(low, high)
-    return claim._replace(value=value, low=low, high=high, verdict=verdict)
+    fewest = min(map(len, values))
+    return claim._replace(value=value, low=low, high=high, verdict=verdict, packings=fewest)
 
 
 def _beyond(value: float, ends: Ends) -> float:
@@ -242,11 +290,11 @@ def _together(verdicts: Any) -> tuple[str, str]:
         return kinds.pop(), ""
     where = {kind: [f"{mu:g}" for mu in verdicts if verdicts[mu] == kind] for kind in kinds}
     why = "; ".join(f"{kind} at {', '.join(where[kind])}" for kind in sorted(kinds))
-    if FEW in kinds:
-        return FEW, why
     if FAILED in kinds and REPRODUCED not in kinds:
         return FAILED, why
-    return DIFFERS if kinds & {DIFFERS, FAILED} else UNDECIDED, why
+    if kinds & {DIFFERS, FAILED}:
+        return DIFFERS, why
+    return FEW if FEW in kinds else UNDECIDED, why
 
 
 # Statistics of keys (k,) and means over packings (k, …)

@@ -70,7 +70,7 @@ def _cell(claim: dict[str, Any]) -> str:
     words = VERDICTS.get(claim["verdict"], claim["verdict"])
     if np.isfinite(claim["value"]):
         words += f" {_number(claim['value'])}"
-    if np.isfinite([claim["low"], claim["high"]]).all():
+    if np.isfinite([claim["low"], claim["high"]]).all() and claim["verdict"] != "too few data":
         words += f" <small>({_number(claim['low'])} … {_number(claim['high'])})</small>"
     title = html.escape(plain(hover), quote=True)
     return f'<span title="{title}" aria-label="{title}">{words}</span>'
