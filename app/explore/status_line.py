@@ -1,4 +1,4 @@
-"""One line on what is on screen: certified and mixed, or being computed, or failed."""
+"""One line on what is on screen: tested and mixed, or being computed, or failed."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +13,7 @@ from ..results.library import Cell
 from ..state.app_state import AppState
 from . import result_values
 
-CERTIFICATE = "distance_to_rest"  # in the record of a packing certified to be at rest
+TESTED = "distance_to_rest"  # in the record of a packing tested to be at rest
 
 
 class StatusLine(Scripted):
@@ -30,7 +30,7 @@ class StatusLine(Scripted):
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
         self._state, work = state, state.work
-        self._rest: tuple[Cell, bool] | None = None  # whether it is certified
+        self._rest: tuple[Cell, bool] | None = None  # whether it was tested
         self._looking = work.task(reading, reported=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
         state.param.watch(self._look, "cell")
@@ -40,12 +40,12 @@ class StatusLine(Scripted):
         self._report()
 
     def _look(self, *events: Any) -> None:
-        """Read the certificate of rest in the packing's record."""
+        """Read whether rest was tested in the packing's record."""
         library, cell = self._state.library, self._state.cell
         if cell is not None:
 
             def read(job: Job) -> tuple[Cell, bool]:
-                return cell, CERTIFICATE in library.packing(cell.params["packing"]).info
+                return cell, TESTED in library.packing(cell.params["packing"]).info
 
             self._looking.start(read, self._take)
 
@@ -56,7 +56,7 @@ class StatusLine(Scripted):
     def _tell(self, *events: Any) -> None:
         lines = list(facts(self._state))
         if self._rest is not None and self._rest[0] == self._state.cell:
-            lines.append("at rest: certified" if self._rest[1] else "at rest: not certified")
+            lines.append("at rest: tested" if self._rest[1] else "at rest: not tested")
         self.facts = lines
 
     def _report(self, *events: Any) -> None:

@@ -34,7 +34,7 @@ MOST_STEPS = 500
 
 @notebook.brief
 class Rest(NamedTuple):
-    """The certificate of rest of a packing; see `rest`."""
+    """The outcome of the test of rest of a packing; see `rest`."""
 
     at_rest: bool  # from the packing's own forces and, with noise, in every draw
     distance: float  # ⟨f_n⟩, from its own forces to the network reached; NaN without rest

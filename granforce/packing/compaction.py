@@ -2,7 +2,7 @@
 
 Each time step of contact dynamics is solved by Gauss–Seidel sweeps, over- or under-relaxed, to a
 given accuracy; steps grow as grains slow down. Once grains are nearly in balance the last phase
-(`settling`) brings them to rest and certifies it; if grains keep moving, the dynamics resumes. At μ
+(`settling`) brings them to rest and tests it; if grains keep moving, the dynamics resumes. At μ
 = 0 contact dynamics alone does not reach isostaticity, and below 1e-4 it takes very long to come to
 rest; there, linear programs finish the packing (`closing`).
 """
@@ -395,7 +395,7 @@ def _finish(
     work: dict[str, Any],
     look: Callable[[dynamics.Motion, float], object] | None,
 ) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
-    """The finished packing in natural units with its certificate, or None if it still moves."""
+    """The finished packing in natural units with its test of rest, or None if it still moves."""
     if mu > NEARLY_FRICTIONLESS:
         if unbalance > NEARLY_BALANCED * min(1.0, (SEVERAL / len(motion.r)) ** 2):
             return motion, None, None

@@ -1,4 +1,4 @@
-"""The last phase of a compaction: from slow grains to a packing at rest, with a certificate.
+"""The last phase of a compaction: from slow grains to a packing at rest, with a test.
 
 1. Overdamped motion of stiff disks (`motion.overdamped`), starting with the forces of the dynamics,
    until every grain and the box are in balance to rounding. Disks then overlap by about the
@@ -8,7 +8,7 @@
    about the displacements, and the motion resumes with stiffer disks; overlaps are closed again,
    and so on. The error converges quadratically, so that three rounds reach rounding: pressing pairs
    are contacts, all others have a gap.
-3. The certificate of rest (`motion.rest`): from the forces of the last round, and with noise on all
+3. The test of rest (`motion.rest`): from the forces of the last round, and with noise on all
    of them, the exact step of contact dynamics comes to rest without moving. If grains move, the
    motion resumes at 1.
 """
@@ -84,7 +84,7 @@ class _Place(NamedTuple):
 def come_to_rest(
     motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None
 ) -> tuple[Motion, Packing | None, Rest | None]:
-    """The motion at rest, its packing in natural units and the certificate; None if it moves.
+    """The motion at rest, its packing in natural units and the test of rest; None if it moves.
 
     work: counters to increase. look(motion, unbalance) is called repeatedly.
     """

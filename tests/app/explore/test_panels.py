@@ -458,7 +458,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     view = friction_tab(state)
     points = statistics.means(study_data.rows("walk"), "eta2")
     mu, value, _ = max(points, key=lambda point: point[1])
-    assert f"μ = {mu:g}: η₂ = {value:.3f}" in view.first.object
+    assert f"nearest-network walks, η₂ is largest at μ = {mu:g}: {value:.3f}" in view.first.object
     told = view.details.object
     assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
