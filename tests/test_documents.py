@@ -218,6 +218,12 @@ def changed(told, statement, sampler="", **numbers):
         (highlights.WEAK, "", {"high": 0.1}, "Whether they are shorter relative"),
         ("⟨F_crit⟩ over ⟨limit load⟩, intermediate μ", "", {"high": 1.1}, None),
         (highlights.PEAK, "", {"verdict": "too few data"}, None),
+        (
+            "F_crit rises with η",
+            "exact",
+            {"verdict": "too few data"},
+            "correlation is [^x]*with η2",
+        ),
     ],
 )
 def test_findings_say_no_more_than_their_numbers(study, statement, sampler, numbers, told_then):

@@ -13,6 +13,7 @@ from granforce.figures.style import Points
 from granforce.measures import statistics
 from granforce.types import Rows
 
+_DISTANCES = (("original_ratio", "original"), ("walk_ratio", "nearest-network walk"))
 _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
 
 
@@ -51,7 +52,7 @@ def sizes(rows: Rows, *, exact: Rows = (), backend: str = "bokeh") -> hv.Layout:
         of_exact = [row for row in exact if row["mu"] == mu]
         if of_exact:
             points = statistics.means(of_exact, "eta3", "n", 0.15)
-            series.append((points, "0.15 η3 exact", style.COLOURS[2], "dashed", 2))
+            series.append((points, "0.15 η3, exact", style.COLOURS[2], "dashed", 2))
         words: dict[str, Any] = {"title": f"μ = {mu:g}", "x": "N", "y": "η"}
         legend = "right" if mu == frictions[-1] else None
         frames.append(style.graph(series, backend, **words, logx=True, legend=legend))
@@ -91,7 +92,7 @@ def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
     style.ready(backend)
     series = [
         (statistics.means(rows, name), label, style.COLOURS[k], "solid", k)
-        for k, (name, label) in enumerate((("original_ratio", "original"), ("walk_ratio", "walk")))
+        for k, (name, label) in enumerate(_DISTANCES)
     ]
     drawn = list(style.curves(series, backend, logx=True))
     if series[0][0]:

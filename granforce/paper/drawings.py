@@ -80,8 +80,8 @@ CAPTIONS = {
     "pressure and where the whole stress is prescribed, semi-logarithmic; grey, exponential and "
     "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "
     "the last bin with ten forces or more: {tails}.",
-    "distances": "Distance of the original network and of the walk's states from the centre of S, "
-    "in units of that of uniform states; bars are standard errors over packings.",
+    "distances": "Distance of the original network and of the nearest-network walk from the centre "
+    "of S, in units of that of uniform states; bars are standard errors over packings.",
 }
 _SWEPT = {
     "sweeps_1e-3": "paper's walk to 1e-3",

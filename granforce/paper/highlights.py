@@ -49,13 +49,18 @@ class _Numbers:
 
     def known(self, statements: dict[str, str]) -> dict[str, dict[str, Any]]:
         """{word: finding} of {word: statement}, without those that cannot be quoted."""
-        rows = {}
-        for word, statement in statements.items():
-            try:
-                rows[word] = self.row(statement)
-            except KeyError:
-                continue
-        return rows
+        return {word: row for word, text in statements.items() for row in self._quotable(text, "")}
+
+    def claims(self, statement: str, samplers: Sequence[str]) -> dict[str, dict[str, Any]]:
+        """{sampler: claim} of one statement, without those that cannot be quoted."""
+        return {name: row for name in samplers for row in self._quotable(statement, name)}
+
+    def _quotable(self, statement: str, sampler: str) -> list[dict[str, Any]]:
+        """The claim or finding in a list, which is empty if it cannot be quoted."""
+        try:
+            return [self.row(statement, sampler)]
+        except KeyError:
+            return []
 
     def judged(self, statement: str, sampler: str = "") -> str:
         """The value of a claim or finding with its interval."""
@@ -101,7 +106,7 @@ def _maximum(of: _Numbers) -> Highlight:
         f"{first}: 0.15 η3 is {of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, "
         f"compared with {of.mean('exact', 'eta3', least, 0.15)} at μ = {least:g} and "
         f"{of.mean('exact', 'eta3', most, 0.15)} at μ = {most:g}. {_others_turn(of)}",
-        "figure1_exact",
+        "samplers",
         "exact-intervals",
     )
 
@@ -144,9 +149,10 @@ def _prepared(of: _Numbers, mu: float) -> str:
     means = [group[mu].mean() for group in groups if mu in group]
     if not means:
         return ""
+    few = min(len(group[mu]) for group in groups if mu in group)
     return (
-        f" The latter depends on how packings are made: with other options, the mean is between "
-        f"{min(means):.2g} and {max(means):.2g}."
+        f" With other options of the compaction, means over {few} packings at μ = {mu:g} are "
+        f"between {min(means):.2g} and {max(means):.2g}."
     )
 
 
@@ -216,14 +222,19 @@ def _sentence(words: str) -> str:
 
 def _alike(of: _Numbers) -> Highlight:
     claim = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
-    walks, verdicts, texts = ("nearest", "gauss_seidel"), set(), []
+    verdicts, texts = set(), []
     for ratio in ("η1/η3", "η2/η3"):
-        verdicts |= set(of.verdicts(f"{claim}: {ratio} is constant", walks).values())
+        constant = of.claims(f"{claim}: {ratio} is constant", ("nearest", "gauss_seidel"))
+        if not constant:
+            raise KeyError(ratio)
+        verdicts |= {row["verdict"] for row in constant.values()}
         values = listed(
-            [f"{of.judged(f'{claim}: value of {ratio}', name)} for {WORDS[name]}" for name in walks]
+            [
+                f"{of.judged(f'{claim}: value of {ratio}', name)} for {WORDS[name]}"
+                for name in constant
+            ]
         )
-        factors = [of.row(f"{claim}: {ratio} is constant", name)["value"] for name in walks]
-        varies = listed([f"{factor:.2g}" for factor in factors])
+        varies = listed([f"{row['value']:.2g}" for row in constant.values()])
         texts.append(f"{ratio} averages {values}, and varies by factors of {varies} with μ")
     if verdicts == {REPRODUCED}:
         first = "The three measures are proportional to each other"
@@ -268,11 +279,14 @@ def _critical(of: _Numbers) -> Highlight:
 def _stability(of: _Numbers) -> Highlight:
     claim = "F_crit rises with η"
     words = {"exact": "exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
-    verdicts = of.verdicts(claim, list(words))
-    texts = listed([f"{of.judged(claim, name)} with {words[name]}" for name in verdicts])
-    if set(verdicts.values()) == {REPRODUCED}:
+    rows = of.claims(claim, list(words))
+    if not rows:
+        raise KeyError(claim)
+    texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in rows.items()])
+    verdicts = {row["verdict"] for row in rows.values()}
+    if verdicts == {REPRODUCED}:
         first = "The critical force rises with indeterminacy"
-    elif set(verdicts.values()) <= {DIFFERS, FAILED}:
+    elif verdicts <= {DIFFERS, FAILED}:
         first = "The critical force does not follow indeterminacy closely"
     else:
         first = (
