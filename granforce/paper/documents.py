@@ -235,7 +235,8 @@ def _swept(table: StudyTable) -> str:
     words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
     if not words:
         return "No walk by sweeps is part of this study.\n"
-    text = f"Here the sweeps end at {listed(words)} ⟨f_n⟩. "
+    alone = "only " if len(words) < len(plans.SWEEPS) else ""
+    text = f"Here the sweeps end {alone}at {listed(words)} ⟨f_n⟩. "
     rows = table.part(*plans.SWEEPS)
     least = min(row["reached_part"] for row in rows)
     if least >= 1:
@@ -473,8 +474,8 @@ def certificates(table: StudyTable) -> str:
     if not bounded:
         return ""
     text = (
-        f"The exact intervals of {len(bounded)} packings were computed; their largest duality gap "
-        f"is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
+        f"The largest duality gap of all exact intervals, in {len(bounded)} computations for all "
+        f"contacts of a packing, is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
     )
     uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
     if uniform:

@@ -253,7 +253,9 @@ def test_places_mark_the_largest_at_their_points_of_contact():
 
 def test_variations_show_what_the_rows_hold():
     rows = [{"mu": mu, "n": n, "eta2": n * mu, "eta3": 1} for mu in (0.1, 1) for n in (100, 400)]
-    small, large = frames(figures.sizes(rows))
+    small, large = frames(figures.sizes(rows, exact=[{"mu": 0.1, "n": 100, "eta3": 2.0}]))
+    np.testing.assert_allclose(curves(small)["0.15 η3, exact"], ([100], [0.3]))
+    assert "0.15 η3, exact" not in curves(large)
     np.testing.assert_allclose(curves(small)["η2"], ([100, 400], [10, 40]))
     np.testing.assert_allclose(curves(large)["0.15 η3"], ([100, 400], [0.15, 0.15]))
     eta2, _ = frames(figures.opened(rows, rows[:1]))
@@ -285,7 +287,7 @@ def test_variations_show_what_the_rows_hold():
     far = figures.distances([{"mu": 0.1, "original_ratio": 0.5, "walk_ratio": 1.5}])
     assert {label: y.tolist() for label, (_, y) in curves(far).items()} == {
         "original": [0.5],
-        "walk": [1.5],
+        "nearest-network walk": [1.5],
         "uniform": [1.0],
     }
 
