@@ -56,7 +56,7 @@ def add_pack(commands: Commands) -> None:
         metavar="NAME",
         help="make a small scene instead of a compressed packing: groove, box, pyramid, press, "
         "leaning, six, solid, column, thirteen or many; of blocks: slope, ladder, books, stones, "
-        "arch or wall. Of the options below, only --mu applies",
+        "arch or wall. Of the options for packings, only --mu applies",
     )
     command.add_argument(
         "--scene-options",
@@ -365,7 +365,7 @@ def add_study(commands: Commands) -> None:
     command = subcommand(
         commands,
         "study",
-        "compute the paper's study, draw its figures and judge its claims; interrupted runs resume",
+        "repeat the paper's study, draw its figures and judge its claims; interrupted runs resume",
         "granforce study --out study\n  granforce study --quick --out quick",
     )
     command.add_argument("--quick", action="store_true", help="run a small version, in minutes")
@@ -468,7 +468,8 @@ def add_limit_loads(commands: Commands) -> None:
     command = subcommand(
         commands,
         "limit-loads",
-        "compute the largest force pair that can push the grains of each contact apart",
+        "for each contact, compute the largest force pair pushing its grains apart that the "
+        "packing can carry",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
         lines=report_lines.LIMIT_LOADS,
     )
@@ -489,7 +490,7 @@ def add_load_factor(commands: Commands) -> None:
         "--load",
         choices=["horizontal"],
         required=True,
-        help="horizontal: the weight of every body, turned to +x",
+        help="horizontal: a force equal to the weight of every body, along +x",
     )
     command.add_argument(
         "--critical",
@@ -534,8 +535,8 @@ def add_perturb(commands: Commands) -> None:
     command = subcommand(
         commands,
         "perturb",
-        "push the grains of single contacts apart until the packing moves, for the critical force "
-        "and the first motion",
+        "push apart the grains of single contacts until the packing moves, and report the critical "
+        "force and the first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
         lines=report_lines.PERTURB,
     )
@@ -839,7 +840,7 @@ def make_parser() -> Parser:
     """The parser of the whole command line."""
     parser = Parser(
         prog="granforce",
-        description="Explore how undetermined the contact forces in a packing of rigid disks are.",
+        description="Quantify how undetermined the contact forces in packings of rigid disks are.",
         epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
         formatter_class=EXAMPLE,
     )

@@ -78,17 +78,17 @@ def decay_sentence(pushed: Pushed) -> str:
         return ""
     r, u = _fitted(pushed)
     (inner, outer), (least, most) = pushed.fit, pushed.spread
+    falls = "falls like r⁻ᵅ" if least > 0 else "shows no clear decay: it is fitted by r⁻ᵅ"
     text = (
-        f"Mean |u| falls like r⁻ᵅ with α = {pushed.exponent:.2f} from r = {inner:.1f} to "
+        f"Mean |u| {falls} with α = {pushed.exponent:.2f} from r = {inner:.1f} to "
         f"{outer:.1f} (shaded); over other ranges α is {between(least, most)}."
     )
     power, exponential = statistics.decay_misfits(r, u)
     if not np.isfinite([power, exponential]).all():
         return text
-    better = "a power law" if power < exponential else "an exponential"
     return (
-        f"{text} Here {better} fits better: ln |u| is off by {power:.3f} (rms) from the best power "
-        f"law and by {exponential:.3f} from the best exponential."
+        f"{text} ln |u| differs by {power:.3f} (rms) from the best power law and by "
+        f"{exponential:.3f} from the best exponential."
     )
 
 
