@@ -109,7 +109,7 @@ def _chosen(there: Sequence[Number], text: str) -> list[Number]:
     """The numbers of the requested frames."""
     if text == "all":
         return list(there)
-    numbers = set(different("--frames", text, float) or [])
+    numbers = set(different("--frames", text, float, "all, or ") or [])
     for number in sorted(numbers - set(there)):
         raise InputError(f"no frame {number:g}; the frames are {min(there):g} … {max(there):g}")
     return [number for number in there if number in numbers]

@@ -35,19 +35,28 @@ def radii(text: str, n: int) -> str | list[float]:
     return radii
 
 
-def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
-    """The numbers of an option, separated by commas; None if it was not given."""
+def numbers(
+    option: str, text: str | None, cast: Callable[[str], Any], words: str = ""
+) -> list[Any] | None:
+    """The numbers of an option, separated by commas; None if it was not given.
+
+    words: other values, for the error message.
+    """
     if text is None:
         return None
     try:
         return [cast(part) for part in text.split(",")]
     except ValueError:
-        raise InputError(f"{option} {text[:40]!r}: give numbers separated by commas") from None
+        raise InputError(
+            f"{option} {text[:40]!r}: give {words}numbers separated by commas"
+        ) from None
 
 
-def different(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
+def different(
+    option: str, text: str | None, cast: Callable[[str], Any], words: str = ""
+) -> list[Any] | None:
     """The same for a list of cases; InputError for one that is given twice."""
-    found = numbers(option, text, cast)
+    found = numbers(option, text, cast, words)
     if repeated := [one for k, one in enumerate(found or []) if one in (found or [])[:k]]:
         raise InputError(f"{option} {repeated[0]} is given twice; give it once")
     return found
