@@ -131,7 +131,7 @@ def many_snapshots(kind):
     pairs = contacts(1, 1.0, twice, index=True) + contacts(2, 2.0, twice, index=True)
     in_box = BODIES, "id1 id2 fnx fny fnz fsx fsy fsz\n" + "\n".join(OUTER + INNER)
     texts, read = {
-        "dumps": ((scaled, pairs), partial(read_lammps, mu=0.3, reverse=True)),
+        "dumps": ((scaled, pairs), partial(read_lammps, mu=0.3)),
         "dumps, chosen": ((scaled, pairs), partial(read_lammps, mu=0.3, frame=1)),
         "dumps, gzip": ((scaled, pairs), partial(read_lammps, mu=0.3)),
         "mercury, many": (MERCURY, partial(read_mercury, mu=0.3, box=(3, 3))),
