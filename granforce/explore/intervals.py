@@ -28,7 +28,7 @@ from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
 from granforce.records import InputError, float_array, takes
 from granforce.system import cancelling
-from granforce.tolerances import CARRYING, INTERVAL_GAP
+from granforce.tolerances import CARRYING, FLAT, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 Key = tuple[int, int, int]  # contact, component and side of a bound
@@ -214,7 +214,7 @@ def _intervals(
     value *= ensemble.force_scale
     max_gap, converged = _judged(gap)
     backbone = value[:, 0, 1] > CARRYING * ensemble.force_scale
-    low, high = ordered(value[..., 0], value[..., 1])
+    low, high = ordered(value[..., 0], value[..., 1], FLAT)
     return Intervals(ensemble.index[places], low, high, gap, backbone, max_gap, converged, counts)
 
 

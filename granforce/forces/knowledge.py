@@ -93,16 +93,16 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     return bounds
 
 
-def ordered(low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """The same bounds, both at their midpoint where they differ by rounding.
+def ordered(low: Floats, high: Floats, apart: float = 0.0) -> tuple[Floats, Floats]:
+    """The same bounds, both at their midpoint where low exceeds high by up to REVERSED.
 
-    That is up to FLAT of the largest finite bound, and up to REVERSED where low exceeds high.
+    Also where they are up to `apart` from each other; both relative to the largest finite bound.
     """
     both = np.concatenate([low.ravel(), high.ravel()])
     largest = np.abs(both[np.isfinite(both)]).max(initial=0.0)
     with np.errstate(invalid="ignore"):
         over = low - high
-    rounded = (-FLAT * largest <= over) & (over <= REVERSED * largest)
+    rounded = (-apart * largest <= over) & (over <= REVERSED * largest)
     middle = 0.5 * (low[rounded] + high[rounded])
     low, high = low.copy(), high.copy()
     low[rounded] = high[rounded] = middle
