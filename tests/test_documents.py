@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from packings import packed
 
+from granforce.bench import PARTS, solvers, states
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
 from granforce.paper import benchmarks, claims, documents, filled, highlights, tables
@@ -254,6 +255,26 @@ def test_the_page_on_accuracy_is_what_the_shipped_benchmark_gives(tmp_path):
     line = ["bench", "--table", str(ROOT / "data/bench.json"), "--documents", str(copied)]
     assert main(line) == 0
     assert copied.read_text() == page and page.count("\n| ---") >= 8
+
+
+def test_the_shipped_benchmark_is_of_the_present_solvers():
+    """No row of a former run is left: solvers have the names of now, and no part is empty."""
+    results = json.loads(text("data/bench.json"))
+    for part, names in {"relaxation": solvers.solvers(), "walks": states.WALKS}.items():
+        assert {row["solver"] for row in results.get(part, [])} <= set(names)
+    assert {"environment", "quick", "seconds", *results["seconds"]} == set(results)
+    assert set(results["seconds"]) <= set(PARTS)
+    assert "Not measured" not in text("granforce/docs/pages/accuracy.md")
+
+
+def test_tables_of_the_benchmark_say_where_granforce_is_slower(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text("<!-- bench: pushes -->\n<!-- end -->\n")
+    ways = {"one at a time": 1.0, "8 lanes": 0.5, "4 lanes": 2.0}
+    rows = [{"n": 60, "mu": 1, "way": way, "ratio": ratio} for way, ratio in ways.items()]
+    benchmarks.renew([path], {"pushes": rows})
+    said = "Slower than the baseline (ratio below 1): 8 lanes n = 60, μ = 1 (0.5)."
+    assert said in path.read_text() and "| n | mu | method | ratio |" in path.read_text()
 
 
 @pytest.mark.parametrize("document", RESULTS)

@@ -33,6 +33,7 @@ __all__ = [
     "compaction_frictions",
     "compaction_growth",
     "contact_updates",
+    "draw",
     "environment",
     "frames",
     "growth",
@@ -104,17 +105,20 @@ def run(
             with written(folder / "bench.json") as file:
                 file.write(json_text(results, ascii_only=False).encode())
     if folder is not None:
-        _draw(folder, results)
+        draw(folder, results)
     return results
 
 
-def _draw(folder: Path, results: dict[str, Any]) -> None:
+def draw(folder: str | Path, results: Mapping[str, Any]) -> bool:
+    """Write the figures (bench.html, bench.png) of results; whether they have a part to draw."""
     from granforce import figures
 
     for name, backend in (("bench.html", "bokeh"), ("bench.png", "matplotlib")):
         figure = figures.benchmark(results, backend=backend)
-        if figure is not None:
-            figures.save(figure, folder / name)
+        if figure is None:
+            return False
+        figures.save(figure, Path(folder) / name)
+    return True
 
 
 def main(

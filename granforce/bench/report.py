@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from granforce import __version__
 from granforce.types import Rows
 
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
@@ -41,6 +42,8 @@ def _cpu() -> str:
 
 
 def _version(name: str) -> str | None:
+    if name == "granforce":  # installed metadata of a clone can be of an older version
+        return __version__
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

@@ -24,6 +24,8 @@ GOAL = 1e-9
 # Sweeps after which Gauss–Seidel alone is stopped: 3 to 5 s at N = 400.
 LONGEST = 300_000
 FRICTIONS = (0.01, 0.1, 0.3, 1.0, 10.0)
+# Runs are repeated until they take so many seconds together, but at most so often.
+STEADY, REPEATS = 0.2, 20
 
 
 def solvers(sweeps: int = LONGEST) -> dict[str, tuple[Callable[..., Relaxation], dict[str, Any]]]:
@@ -85,7 +87,17 @@ def runs_of(
 ) -> list[Relaxation]:
     """The result of a solver from each start (N_c, 2), without the overhead of its first call."""
     solver(S, starts[0], **{**options, "max_iterations": 2})  # compile and prepare
-    return [solver(S, start, **options) for start in starts]
+    return [_undisturbed(solver, S, start, options) for start in starts]
+
+
+def _undisturbed(
+    solver: Callable[..., Relaxation], S: Ensemble, start: Floats, options: dict[str, Any]
+) -> Relaxation:
+    """The fastest of repeated runs from a start: other programs can stall short ones."""
+    runs = [solver(S, start, **options)]
+    while len(runs) < REPEATS and sum(run.seconds for run in runs) < STEADY:
+        runs.append(solver(S, start, **options))
+    return min(runs, key=lambda run: run.seconds)
 
 
 def summary(run: list[Relaxation]) -> dict[str, Any]:

@@ -83,6 +83,8 @@ def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, dict[s
     """Measures by solver on one packing; an empty dict for a walk that failed."""
     done, seconds = {}, {}
     for name, options in ways.items():
+        with contextlib.suppress(NotJammedError):
+            walk(S, 1, seed, max_attempts=ATTEMPTS, **options)  # compiles
         begin = time.perf_counter()
         with contextlib.suppress(NotJammedError):
             done[name] = walk(S, states, seed, max_attempts=ATTEMPTS * states, **options)
@@ -135,6 +137,7 @@ def batches(
     for mu in frictions:
         note(f"batches: N = {n}, μ = {mu:g}")
         S = ensemble(pack(n, mu, 1))
+        walk(ensemble(S.packing), 1, 0)  # compiles
         setup, _ = timed(walk, S, 1, 0)
         seconds: dict[Any, list[Any]] = {1: [], 2: []}
         for _ in range(3):
@@ -179,6 +182,7 @@ def intervals(
     for mu in frictions:
         S = ensemble(pack(n, mu, 1))
         note(f"intervals: N = {n}, μ = {mu:g}, exact")
+        exact_intervals(S, S.index[:1])  # compiles
         seconds, exact = timed(exact_intervals, S, workers=2)
         row = {"n": n, "mu": mu}
         eta3, extent = _extents(S, exact.low, exact.high)
@@ -202,6 +206,7 @@ def _extents(S: Ensemble, lower: Floats, upper: Floats) -> tuple[float, float]:
 def _growing(
     S: Ensemble, name: str, counts: Sequence[int], eta3: float, extent: float
 ) -> Iterator[dict[str, Any]]:
+    walk(S, 1, 1, **WALKS[name])  # compiles
     times, begin = [], time.perf_counter()
     done = walk(
         S,

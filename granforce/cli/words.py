@@ -774,7 +774,10 @@ def add_bench(commands: Commands) -> None:
     )
     command.add_argument("--quick", action="store_true", help="small sizes, under 3 minutes")
     command.add_argument(
-        "--out", type=Workplace, metavar="FOLDER", help="write the rows as JSON to this folder"
+        "--out",
+        type=Workplace,
+        metavar="FOLDER",
+        help="write the rows (bench.json) and figures (bench.png, bench.html) to this folder",
     )
     command.add_argument(
         "--documents",
@@ -787,12 +790,13 @@ def add_bench(commands: Commands) -> None:
         "--table",
         type=Input,
         metavar="FILE.json",
-        help="measure nothing: use these rows, such as data/bench.json",
+        help="measure nothing: draw the figures and update the documents from these rows, such as "
+        "data/bench.json",
     )
-    command.leaves_out("without --documents", lambda given: given.documents is None, {"table"})
     command.leaves_out(
-        "with --table", lambda given: given.table is not None, {"quick", "out", "json"}
+        "without --documents or --out", lambda given: not (given.documents or given.out), {"table"}
     )
+    command.leaves_out("with --table", lambda given: given.table is not None, {"quick", "json"})
 
 
 def add_cache(commands: Commands) -> None:

@@ -103,6 +103,26 @@ def test_compaction_rows():
     assert "phi" not in rows[1]
 
 
+def test_short_runs_are_repeated_and_the_fastest_counts(monkeypatch):
+    S, taken = ensemble(packed(30, 0.3)), iter([9.0, 0.03, 0.01, 0.02, 9.0])
+    monkeypatch.setattr(solvers, "STEADY", 0.05)
+
+    def solver(S, start, **options):
+        return solvers.nearest(S, start, **options)._replace(seconds=next(taken))
+
+    (run,) = solvers.runs_of(S, [S.original], solver, {})
+    assert run.seconds == 0.01 and next(taken) == 9.0
+
+
+def test_kernels_are_compiled_before_packings_are_timed(monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        bench.packings, "pack", lambda n, *rest, **_: made.append(n) or packed(30, 0.3)
+    )
+    bench.compaction_growth(True, mu=0.3, sizes=(400, 800), seeds=1)
+    assert made == [bench.packings.WARM_UP, 400, bench.packings.WARM_UP, 800]
+
+
 def test_compaction_at_each_friction_and_size():
     rows = bench.compaction_frictions(True, n=30, frictions=(0.3, 1.0), seeds=2)
     assert [row["mu"] for row in rows] == [0.3, 1.0]
@@ -174,6 +194,14 @@ def test_run_writes_what_it_returns(tmp_path, capsys):
     assert "The first" in told.out and "The second" in told.out
     assert "two: " in told.err and "two: " not in told.out
     assert {"environment", "quick", "seconds", *TWO} == set(found)
+
+
+def test_figures_are_drawn_from_rows_alone(tmp_path):
+    row = {"mu": 0.1, "solver": "nearest", "seconds": 1.0}
+    rows = {"relaxation": [row, row | {"mu": 1.0}]}
+    assert bench.draw(tmp_path, rows)
+    assert {path.name for path in tmp_path.iterdir()} == {"bench.png", "bench.html"}
+    assert not bench.draw(tmp_path / "none", {"environment": {}})
 
 
 def test_main_prints_json_only_when_asked(capsys):

@@ -2,6 +2,7 @@
 
 import argparse
 import ast
+import json
 import os
 import re
 import shlex
@@ -85,7 +86,11 @@ LINES = {
     "import blocks": ["bodies.csv --mu 0.5"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "export": ["p.npz g.vtp c.vtp"],
-    "bench": ["--quick", "--documents bench.md --table bench.json"],
+    "bench": [
+        "--quick",
+        "--documents bench.md --table bench.json",
+        "--table bench.json --out done",
+    ],
     "cache": ["list", "size", "verify", "clear", "path"],
 }
 
@@ -134,7 +139,9 @@ def place(tmp_path_factory):
     frames.write(folder, grains, rows)
     open_store(folder / "done" / "cells.zarr").make()
     (folder / "bench.md").write_text("<!-- bench: walks -->\n<!-- end -->\n")
-    (folder / "bench.json").write_text('{"environment": {"libraries": {}}}')
+    row = {"solver": "nearest", "n": 1, "seconds": 1.0}
+    results = {"environment": {"libraries": {}}, "scaling": [row]}
+    (folder / "bench.json").write_text(json.dumps(results))
     return folder
 
 

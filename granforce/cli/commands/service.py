@@ -137,8 +137,8 @@ def completion(arguments: argparse.Namespace) -> None:
 
 
 def bench(arguments: argparse.Namespace) -> None:
-    """Print the benchmark's report, and update documents by it, or by that in a file."""
-    from granforce.bench import main
+    """Measure and print a report, or read one; write its figures, and its tables into documents."""
+    from granforce.bench import draw, main
     from granforce.paper import benchmarks, filled
 
     documents = filled.named(arguments.documents, benchmarks.KIND)
@@ -146,6 +146,8 @@ def bench(arguments: argparse.Namespace) -> None:
         results = main(arguments.out, arguments.quick, arguments.json)
     else:
         results = benchmarks.load(arguments.table)
+        if arguments.out is not None and not draw(make_folder(arguments.out), results):
+            raise InputError(f"{arguments.table}: none of its parts has a figure; omit --out")
     if documents:
         benchmarks.renew(documents, results)
 
