@@ -13,8 +13,10 @@ from pathlib import Path
 import frames
 import numpy as np
 import pytest
+import simulators
 from packings import packed
 
+import granforce
 from granforce.bench import PARTS, solvers, states
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
@@ -25,6 +27,7 @@ PAGES = sorted(
     str(path.relative_to(ROOT)) for path in (ROOT / "granforce/docs/pages").rglob("*.md")
 )
 DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md", *PAGES]
+GUIDES = [".github/CONTRIBUTING.md", "tests/README.md", "CHANGELOG.md"]  # commands in parts
 RESULTS = ["README.md", "granforce/docs/pages/results.md"]
 LAMMPS = ROOT / "tests" / "lammps" / "lammps_n400_mu0.3"
 
@@ -89,6 +92,10 @@ def folder(away):
     np.savetxt("grains.csv", size * rows, delimiter=",", header="x,y,r", comments="")
     pairs = np.column_stack([packing.contacts.i, packing.contacts.j])
     np.savetxt("contacts.csv", pairs, fmt="%d", delimiter=",", header="i,j", comments="")
+    yade, mercury = (made(scale=size) for made in (simulators.yade, simulators.mercury))
+    names = "bodies.txt", "interactions.txt", "run.data", "run.fstat"
+    for name, content in zip(names, (*yade, *mercury), strict=True):
+        Path(name).write_bytes(content)
     corners = "g,-1,-1,1\ng,2,-1,1\ng,2,0,1\ng,-1,0,1\nb,0,0,0\nb,1,0,0\nb,1,1,0\nb,0,1,0\n"
     Path("bodies.csv").write_text(f"body,x,y,fixed\n{corners}")
     Path("pile.csv").write_text("x,y,r\n1,1,1\n3,1,1\n2,2.7320508,1\n")
@@ -96,6 +103,15 @@ def folder(away):
     frames.write(away, grains, rows)
     (away / "data").mkdir()
     return away
+
+
+def test_all_documents_name_one_version():
+    """The newest heading of the changelog is the version, with a date unless it is unreleased."""
+    (heading, *_) = re.findall(r"^## (.+)$", text("CHANGELOG.md"), re.M)
+    version, _, date = heading.partition(" — ")
+    assert version == granforce.__version__.removesuffix(".dev0")
+    assert (date == "unreleased") == granforce.__version__.endswith(".dev0")
+    assert f"\nversion: {granforce.__version__}\n" in text("CITATION.cff")
 
 
 def test_the_readme_is_short_and_gives_the_commands_that_install():
@@ -150,14 +166,14 @@ def test_every_snippet_runs(document, folder):
             assert language in ("", "sh", "text")
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
+@pytest.mark.parametrize("document", [*DOCUMENTS, *GUIDES])
 def test_every_link_leads_somewhere(document):
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text(document)):
         if "://" not in target and not target.startswith("reference/"):  # made with the site
             assert (ROOT / document).parent.joinpath(target).exists(), target
 
 
-@pytest.mark.parametrize("document", DOCUMENTS)
+@pytest.mark.parametrize("document", [*DOCUMENTS, GUIDES[0]])
 def test_every_file_named_is_there(document):
     for name in re.findall(r"`((?:app|granforce|tests)/[\w/.]+)`", text(document)):
         assert (ROOT / name).exists(), name

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from experiment.test_solved import mat
 from frames import file, frame, solved
-from packing.test_dem import MU, N, mercury, yade
 from packing.test_importers import SMALL, cluster, tables
 from packing.test_mutants import small_dumps
 from packings import packed
+from simulators import MU, N, mercury, yade
 
 import granforce as gf
 

@@ -61,7 +61,7 @@ def visitor(document: Document) -> Visitor | None:
     context: Any = document.session_context
     if context is None:
         return None
-    # Behind a proxy it is the proxy's address, unless panel serve runs with --use-xheaders.
+    # Behind a proxy it is the proxy's address, unless the server runs with --use-xheaders.
     return Visitor(getattr(context.request, "remote_ip", None) or "", context.id)
 
 

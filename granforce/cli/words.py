@@ -580,7 +580,7 @@ def add_app(commands: Commands) -> None:
         "--address",
         type=str,
         default="localhost",
-        help="address to listen at (default localhost: this machine only)",
+        help="address to listen on (default localhost: this machine only)",
     )
     command.add_argument(
         "--allow-websocket-origin",
@@ -588,7 +588,12 @@ def add_app(commands: Commands) -> None:
         metavar="HOST[:PORT]",
         action="append",
         default=[],
-        help="host name under which other machines open the app; can be repeated",
+        help="host name by which other machines reach the app; can be repeated",
+    )
+    command.add_argument(
+        "--use-xheaders",
+        action="store_true",
+        help="behind a proxy: read the addresses of visitors from its headers",
     )
     command.add_argument("--no-show", action="store_true", help="do not open a browser")
     command.add_argument(

@@ -457,3 +457,12 @@ def test_a_call_that_is_left_behind_does_not_abort_the_process():
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
     assert (running.returncode, err) == (130, "granforce: interrupted\n")
+
+
+@pytest.mark.parametrize("words", [[], ["--use-xheaders"]])
+def test_the_app_reads_addresses_of_a_proxy_only_if_asked(words, monkeypatch):
+    served = []
+    monkeypatch.setattr("runpy.run_module", lambda *args, **_: served.append(sys.argv))
+    monkeypatch.setattr(sys, "argv", ["granforce"])
+    assert main(["app", "--no-show", "--port", "0", *words]) == 0
+    assert ("--use-xheaders" in served[0]) == bool(words)

@@ -10,7 +10,6 @@ import pytest
 from experiment.test_solved import mat, mat73
 from frames import file, frame, solved
 from mutants import refusals
-from packing.test_dem import MU, N, mercury, yade
 from packing.test_importers import SMALL, cluster, tables
 from packing.test_simulations import (
     BODIES,
@@ -22,6 +21,7 @@ from packing.test_simulations import (
     particles,
 )
 from packings import packed
+from simulators import MU, N, mercury, yade
 
 from granforce.experiment.measurements import read_measurement
 from granforce.experiment.pegs import read_pegs

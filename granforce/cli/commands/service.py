@@ -51,6 +51,7 @@ def app(arguments: argparse.Namespace) -> None:
         words += ["--allow-websocket-origin", origin]
     words += [] if arguments.no_show else ["--show"]
     words += ["--warm"] if arguments.warm else []
+    words += ["--use-xheaders"] if arguments.use_xheaders else []
     words += ["--plugins", "granforce.system.health"]
     sys.argv = words
     runpy.run_module("panel", run_name="__main__", alter_sys=True)
