@@ -143,8 +143,9 @@ def add_wall_contacts(command: Parser) -> None:
     command.add_argument(
         "--walls",
         choices=("held", "pressing"),
-        help="treat walls as grains: held (able to exert any force) or pressing (with their force "
-        "from the simulation); default: forces from walls are loads on grains",
+        help="treat walls as grains: held (able to exert any force) or pressing (exerting the "
+        "force "
+        "recorded in the simulation); default: forces from walls are loads on grains",
     )
 
 
@@ -189,9 +190,9 @@ def add_packing(command: Parser, several: bool = False, expert: bool = False) ->
 def _add_compaction(command: Parser, shown: bool) -> None:
     """Add the settings of the compaction, which only commands that are about packings explain."""
     settings: tuple[tuple[str, type, Any, str], ...] = (
-        ("--dt", float, None, "longest time step (default 0.1; 0.03 for μ ≥ 0.2)"),
+        ("--dt", float, None, "maximum time step (default 0.1; 0.03 for μ ≥ 0.2)"),
         ("--box-mass", float, 100.0, "inertia of the box (default 100)"),
-        ("--sweeps", int, None, "most sweeps per step (default 600; 150 for μ ≥ 0.2)"),
+        ("--sweeps", int, None, "maximum number of sweeps per step (default 600; 150 for μ ≥ 0.2)"),
         (
             *("--step-accuracy", float, 0.01),
             "largest violation of the contact laws at the end of a step, relative to the speed of "
@@ -228,22 +229,22 @@ def add_made_packing(command: Parser, given: Callable[[argparse.Namespace], bool
     command.leaves_out("with the file of a packing", given, made)
 
 
-def add_conditions(command: Parser, known: bool = True) -> None:
+def add_conditions(command: Parser, known: bool = True, also: str = "") -> None:
+    """Add the conditions on S; also: words on --prescribe in this command."""
     group = command.add_argument_group(
-        "conditions on the forces, in addition to balance and friction"
+        "conditions on the forces, in addition to equilibrium and friction"
     )
     group.add_argument(
         "--prescribe",
         choices=["pressure", "stress", "none"],
         default="pressure",
-        help="prescribe the pressure (default), the whole stress, or nothing (always so with "
-        "--slice)",
+        help=f"prescribe the pressure (default), the whole stress, or nothing{also}",
     )
     group.add_argument(
         "--stress",
         type=str,
         metavar="XX,YY,XY",
-        help="stress for --prescribe stress (default: that of the packing's own forces)",
+        help="stress for --prescribe stress (default: that of the packing's original forces)",
     )
     if known:
         add_known(group)
@@ -254,7 +255,7 @@ def add_known(group: argparse._ArgumentGroup) -> None:
         "--known",
         type=Input,
         metavar="FILE.csv",
-        help="known forces, in the packing's unit: columns contact, and f_n, f_t (exact) or "
+        help="known forces, in the packing's units: columns contact, and f_n, f_t (exact) or "
         "f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
     )
 
@@ -268,7 +269,7 @@ def add_walk_options(command: Parser) -> None:
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument(
         "--relax",
@@ -295,8 +296,8 @@ def add_unit(command: argparse._ActionsContainer) -> None:
         "--unit",
         choices=["packing", "mean"],
         default="packing",
-        help="unit of forces in reports and tables: the packing's (default), or the mean normal "
-        "force ⟨f_n⟩; column names include the unit",
+        help="units of forces in reports and tables: those of the packing (default), or the mean "
+        "normal force ⟨f_n⟩; column names include the unit",
     )
 
 
@@ -356,7 +357,7 @@ def add_exact(command: Parser, also: str = "") -> None:
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument(
         "--contacts", type=str, help="only the contacts with these numbers, separated by commas"
@@ -365,12 +366,13 @@ def add_exact(command: Parser, also: str = "") -> None:
         "--slice",
         type=str,
         metavar="X0,X1,Y0,Y1",
-        help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
+        help="freeze the forces on contacts outside this part of the box, given as fractions of "
+        "its sides, such as 0.2,0.8,0,1",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact", also)
     add_unit(group)
-    add_conditions(command)
+    add_conditions(command, also=" (always so with --slice)")
     add_store(command)
     command.leaves_out(
         "with --slice, where the frozen contacts determine the stress",
@@ -404,7 +406,8 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         "--flag",
         choices=["ignore"],
         help="ignore the flags of the grains and treat grains at the boundary of the frame as "
-        "grains at walls (default: flagged grains, unless nearly all are flagged)",
+        "grains at walls (default: the flagged grains are treated as grains at walls, unless "
+        "nearly all are flagged)",
     )
     group.add_argument(
         "--repair",

@@ -69,7 +69,10 @@ def add_pack(commands: Commands) -> None:
     add_packing(command, expert=True)
     add_store(command)
     command.add_argument(
-        "--max-steps", type=int, default=100_000, help="most time steps (default 100000)"
+        "--max-steps",
+        type=int,
+        default=100_000,
+        help="maximum number of time steps (default 100000)",
     )
     command.add_argument(
         "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
@@ -101,16 +104,18 @@ def add_uniform(commands: Commands) -> None:
     )
     add_any_packing(command)
     group = command.add_argument_group("the sample")
-    group.add_argument("--states", type=int, default=1000, help="at least this many (default 1000)")
+    group.add_argument(
+        "--states", type=int, default=1000, help="minimum number of states (default 1000)"
+    )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument(
-        "--effective", type=float, help="continue until the effective sample size is at least this"
+        "--effective", type=float, help="target effective sample size: continue until it is reached"
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
@@ -132,13 +137,13 @@ def add_volume(commands: Commands) -> None:
         "--accuracy",
         type=float,
         default=0.05,
-        help="standard error of ln V (default 0.05)",
+        help="target standard error of ln V (default 0.05)",
     )
     group.add_argument("--volume-seed", type=int, default=0, help="seed of the draws (default 0)")
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
@@ -167,15 +172,15 @@ def add_infer(commands: Commands) -> None:
         "--measured",
         type=Input,
         metavar="FILE.csv",
-        help="columns contact, f_n, f_t, sigma_n, sigma_t, in the packing's unit; empty or nan "
+        help="columns contact, f_n, f_t, sigma_n, sigma_t, in the packing's units; empty or nan "
         "where not measured",
     )
     group.add_argument(
         "--unmeasured",
         type=float,
-        help="treat unmeasured forces as 0 with this standard error, in ⟨f_n⟩ (default 1000, "
-        "which allows any force; 2 with --again; 1 with --frames; use about 1 for a frame without "
-        "a pressure)",
+        help="treat unmeasured forces as measured to be 0 with this standard error, in units of "
+        "⟨f_n⟩. Default: 1000, which allows any force; 2 with --again; 1 with --frames. If no "
+        "pressure is prescribed for the frame, use about 1",
     )
     group.add_argument(
         "--again",
@@ -184,7 +189,10 @@ def add_infer(commands: Commands) -> None:
         "(default: assume that all networks are equally likely before the measurement)",
     )
     group.add_argument(
-        "--states", type=int, help="draws for error bars (default 1000, with --frames 200; 0: none)"
+        "--states",
+        type=int,
+        help="number of samples for error bars (default 1000, or 200 with --frames; 0: no error "
+        "bars)",
     )
     group.add_argument(
         "--certain",
@@ -196,7 +204,7 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
@@ -254,16 +262,23 @@ def add_informative(commands: Commands) -> None:
     )
     add_any_packing(command)
     group = command.add_argument_group("the ranking")
-    group.add_argument("--best", type=int, default=10, help="contacts to list (default 10)")
     group.add_argument(
-        "--check", type=int, default=10, help="contacts to check with exact bounds (default 10)"
+        "--best", type=int, default=10, help="number of contacts to list (default 10)"
     )
-    group.add_argument("--states", type=int, default=400, help="uniform states (default 400)")
+    group.add_argument(
+        "--check",
+        type=int,
+        default=10,
+        help="number of contacts to check with exact bounds (default 10)",
+    )
+    group.add_argument(
+        "--states", type=int, default=400, help="number of uniform samples (default 400)"
+    )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
@@ -275,7 +290,7 @@ def add_measure(commands: Commands) -> None:
     command = subcommand(
         commands,
         "measure",
-        "measure the indeterminacy of a walk, optionally for each contact",
+        "compute the indeterminacy η1, η2, η3 from a random walk, optionally for each contact",
         "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --out contacts.csv",
         lines=report_lines.MEASURE,
     )
@@ -288,7 +303,8 @@ def add_scan(commands: Commands) -> None:
     command = subcommand(
         commands,
         "scan",
-        "make packings and walks for many μ and seeds in parallel; interrupted runs resume",
+        "generate packings and run random walks for many μ and seeds in parallel; interrupted runs "
+        "resume",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
         lines=report_lines.SCAN,
     )
@@ -345,7 +361,7 @@ def add_plot(commands: Commands) -> None:
         type=Input,
         metavar="FILE.{csv,npz,zarr}",
         help="draw the mean of these networks, written by walk or uniform with --out (default: the "
-        "packing's own network)",
+        "packing's original network)",
     )
     command.add_argument(
         "--state", type=int, metavar="K", help="draw only network number K, counted from 0"
@@ -374,7 +390,7 @@ def add_study(commands: Commands) -> None:
         type=Workplace,
         metavar="FOLDER",
         default="study",
-        help="folder of the results (default study)",
+        help="folder for the results (default study)",
     )
     command.add_argument(
         "--paper",
@@ -420,21 +436,38 @@ def add_study(commands: Commands) -> None:
     group.add_argument("--packings", type=int, help="packings at each μ (default 30)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
     group.add_argument(
-        "--gauss-seidel-packings", type=int, help="packings with the paper's walk (10)"
+        "--gauss-seidel-packings", type=int, help="packings with the paper's walk (default 10)"
     )
     group.add_argument(
-        "--response-packings", type=int, help="packings pushed at contacts (default 10)"
+        "--response-packings",
+        type=int,
+        help="number of packings in which contacts are pushed (default 10)",
     )
-    group.add_argument("--response-contacts", type=int, help="contacts pushed in each (default 20)")
-    group.add_argument("--perturb-packings", type=int, help="packings pushed in larger steps (3)")
-    group.add_argument("--perturb-contacts", type=int, help="contacts pushed in each (default 30)")
+    group.add_argument(
+        "--response-contacts",
+        type=int,
+        help="number of contacts pushed per packing (default 20)",
+    )
+    group.add_argument(
+        "--perturb-packings",
+        type=int,
+        help="number of packings tested with larger load steps (default 3)",
+    )
+    group.add_argument(
+        "--perturb-contacts",
+        type=int,
+        help="number of contacts pushed in each of these (default 30)",
+    )
     group.add_argument(
         "--sizes", type=str, help="other numbers of disks (default 100,200,800,1600)"
     )
     sized = command.options.keys() - others
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     command.add_argument(
-        "--formats", type=str, default="html,png,svg", help="formats of the figures; empty: none"
+        "--formats",
+        type=str,
+        default="html,png,svg",
+        help="figure formats, separated by commas; an empty value draws none",
     )
     add_scheduler(command)
     computing = {"minutes", "workers", "scheduler"}
@@ -459,8 +492,8 @@ def add_intervals(commands: Commands) -> None:
     )
     add_exact(
         command,
-        "; cluster numbers the groups of undetermined contacts that are connected through shared "
-        "grains, the largest first, and is −1 where forces are determined",
+        "; the column cluster gives the number of the group of connected undetermined contacts, "
+        "starting with the largest; −1 where forces are determined",
     )
 
 
@@ -495,7 +528,7 @@ def add_load_factor(commands: Commands) -> None:
     command.add_argument(
         "--critical",
         action="store_true",
-        help="also raise the load, starting from the packing's own forces, until bodies move",
+        help="also raise the load, starting from the packing's original forces, until bodies move",
     )
     command.add_argument(
         "--precision",
@@ -520,7 +553,7 @@ def add_stress(commands: Commands) -> None:
     group.add_argument(
         "--ensemble-mu",
         type=float,
-        help="friction of the cones, if it differs from that of the packing",
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
     )
     group.add_argument(
         "--angles", type=int, default=64, help="number of directions in the table (default 64)"
@@ -543,17 +576,27 @@ def add_perturb(commands: Commands) -> None:
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")
     which = group.add_mutually_exclusive_group()
-    which.add_argument("--random", type=int, default=50, help="number of contacts (default 50)")
+    which.add_argument(
+        "--random", type=int, default=50, help="number of randomly chosen contacts (default 50)"
+    )
     which.add_argument("--contacts", type=str, help="numbers of contacts, separated by commas")
     which.add_argument("--all", action="store_true", help="all contacts that carry force")
-    group.add_argument("--draw-seed", type=int, default=0, help="seed of --random (default 0)")
+    group.add_argument(
+        "--draw-seed",
+        type=int,
+        default=0,
+        help="seed for the random choice of contacts (default 0)",
+    )
     group.add_argument(
         "--ensemble-mu",
         type=float,
         help="friction of the contacts, if it differs from that of the packing",
     )
     group.add_argument(
-        "--precision", type=float, default=0.01, help="precision of F_crit, in ⟨f_n⟩ (default 0.01)"
+        "--precision",
+        type=float,
+        default=0.01,
+        help="precision of F_crit, in units of ⟨f_n⟩ (default 0.01)",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
