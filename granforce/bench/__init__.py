@@ -4,6 +4,7 @@
 (dicts of plain numbers and strings).
 """
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -104,6 +105,8 @@ def run(
         if folder is not None:
             with written(folder / "bench.json") as file:
                 file.write(json_text(results, ascii_only=False).encode())
+    # As stored, so that tables and figures drawn later from the file are the same: NaN is null.
+    results = json.loads(json_text(results, ascii_only=False))
     if folder is not None:
         draw(folder, results)
     return results

@@ -144,7 +144,9 @@ def _refuse_foreign(path: Path) -> None:
     except OSError as error:
         raise InputError(f"the folder {path} cannot be read: {error.strerror}") from None
     entry_names = {name for name in visible if keys.ENTRY.fullmatch(name)}
-    others = set(visible) - entry_names - ({"zarr.json"} if entry_names else set())
+    # Another process may have created the root since its schema was read.
+    root = {"zarr.json"} if entry_names or is_store(path) else set()
+    others = set(visible) - entry_names - root
     if others:
         raise InputError(
             f"{path} is not a store: it contains {min(others)!r}; give an empty or a new folder"
