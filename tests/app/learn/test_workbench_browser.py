@@ -198,7 +198,7 @@ def test_a_ladder_is_leant_by_keys_and_its_link_and_file_carry_it(look, tmp_path
     page.mouse.move(*px(1.3, 1.4), steps=8)
     page.mouse.up()
     free(page, 1)
-    searched(page, "%2C-60%7C")
+    searched(page, "built=1.3", "%2C-60%7C")  # a moment after the count
     page.reload()
     page.get_by_text("at the left wall").first.wait_for()
     with page.expect_download() as file:
