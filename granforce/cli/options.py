@@ -144,8 +144,7 @@ def add_wall_contacts(command: Parser) -> None:
         "--walls",
         choices=("held", "pressing"),
         help="treat walls as grains: held (able to exert any force) or pressing (exerting the "
-        "force "
-        "recorded in the simulation); default: forces from walls are loads on grains",
+        "force recorded in the simulation); default: forces from walls are loads on grains",
     )
 
 
@@ -260,17 +259,21 @@ def add_known(group: argparse._ArgumentGroup) -> None:
     )
 
 
+def add_ensemble_mu(group: argparse._ActionsContainer) -> None:
+    group.add_argument(
+        "--ensemble-mu",
+        type=float,
+        help="friction coefficient of the Coulomb cones, if different from the packing's",
+    )
+
+
 def add_walk_options(command: Parser) -> None:
     group = command.add_argument_group("the random walk")
     group.add_argument(
         "--states", type=int, default=1000, help="number of accepted states (default 1000)"
     )
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument(
         "--relax",
         choices=list(RELAXATIONS),
@@ -354,11 +357,7 @@ def add_exact(command: Parser, also: str = "") -> None:
     """Add the options of exact results; also: words on other columns of the table."""
     add_any_packing(command)
     group = command.add_argument_group("the ensemble")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument(
         "--contacts", type=str, help="only the contacts with these numbers, separated by commas"
     )

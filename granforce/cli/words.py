@@ -13,6 +13,7 @@ from granforce.cli.options import (
     add_cell,
     add_columns,
     add_conditions,
+    add_ensemble_mu,
     add_exact,
     add_flaws_and_walls,
     add_frame,
@@ -108,11 +109,7 @@ def add_uniform(commands: Commands) -> None:
         "--states", type=int, default=1000, help="minimum number of states (default 1000)"
     )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument(
         "--effective", type=float, help="target effective sample size: continue until it is reached"
@@ -140,11 +137,7 @@ def add_volume(commands: Commands) -> None:
         help="target standard error of ln V (default 0.05)",
     )
     group.add_argument("--volume-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_conditions(command)
     add_store(command)
@@ -201,11 +194,7 @@ def add_infer(commands: Commands) -> None:
         "exact bounds",
     )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact", "; with --frames all frames, as one dataset (.zarr)")
@@ -275,11 +264,7 @@ def add_informative(commands: Commands) -> None:
         "--states", type=int, default=400, help="number of uniform samples (default 400)"
     )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
     add_conditions(command)
@@ -550,11 +535,7 @@ def add_stress(commands: Commands) -> None:
     )
     add_any_packing(command)
     group = command.add_argument_group("the outline")
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction coefficient of the Coulomb cones, if different from the packing's",
-    )
+    add_ensemble_mu(group)
     group.add_argument(
         "--angles", type=int, default=64, help="number of directions in the table (default 64)"
     )
@@ -587,11 +568,7 @@ def add_perturb(commands: Commands) -> None:
         default=0,
         help="seed for the random choice of contacts (default 0)",
     )
-    group.add_argument(
-        "--ensemble-mu",
-        type=float,
-        help="friction of the contacts, if it differs from that of the packing",
-    )
+    add_ensemble_mu(group)
     group.add_argument(
         "--precision",
         type=float,

@@ -20,9 +20,8 @@ BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builde
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
 DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
 ONE = {"ladder": "ladder", "stones": "stone"}  # a body of these scenes
-SNAP = (
-    1e-6  # gaps left by hand are closed up to here, relative to the largest radius if all are disks
-)
+# Gaps left by hand are closed up to here, relative to the largest radius if all are disks.
+SNAP = 1e-6
 
 
 def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]:

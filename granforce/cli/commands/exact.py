@@ -94,6 +94,7 @@ def intervals(arguments: argparse.Namespace) -> None:
     _, parameters, dataset, ends = _exact(arguments, kinds.INTERVALS)
     forces = unit(arguments, dataset)
     low, high = (dataset[side].values for side in ("low", "high"))
+    # Entries of earlier versions also have positions of determined forces.
     position = measures.position_in_interval(dataset["original"].values[:, 0], low, high)
     cluster = dataset["cluster"].values
     undetermined = np.isfinite(position)

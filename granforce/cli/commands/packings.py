@@ -22,6 +22,7 @@ from granforce.experiment.measurements import COLUMNS as MEASURED_COLUMNS
 from granforce.experiment.pegs import read_pegs
 from granforce.experiment.walls import read_wall_force
 from granforce.packing import exporters, importers, scenes
+from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
 from granforce.system.terminal import print_report
@@ -140,8 +141,7 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         columns=named_columns(arguments),
         **flaws_and_walls(arguments),
     )
-    if arguments.reverse and not np.nan_to_num(found.measured[:, 1]).any():
-        raise InputError("--reverse has no effect, as every tangential force is 0: leave it out")
+    refuse_idle_reverse(found.measured, arguments.reverse)
     _report(found.report, found.packing, arguments, found.report.get("notes", []))
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T

@@ -139,7 +139,8 @@ def read_yade(
         *(grains, plane, links, i, j, normal + shear, friction(mu), cell),
         *(on_walls, walls, reverse, most_grains, "yade"),
     )
-    return refuse_idle_reverse(packing, reverse)
+    refuse_idle_reverse(packing.forces, reverse)
+    return packing
 
 
 def _yade_forces(links: Table, plane: str) -> tuple[Floats, Floats]:
@@ -175,7 +176,9 @@ def read_mercury(
         reverse=reverse,
         most_grains=most_grains,
     )
-    return refuse_idle_reverse(found.snapshot(frame).packing, reverse)
+    packing = found.snapshot(frame).packing
+    refuse_idle_reverse(packing.forces, reverse)
+    return packing
 
 
 def open_mercury(

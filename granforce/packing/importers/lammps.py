@@ -120,7 +120,9 @@ def read_lammps(
     found = open_lammps(
         particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
     )
-    return refuse_idle_reverse(found.snapshot(frame).packing, reverse)
+    packing = found.snapshot(frame).packing
+    refuse_idle_reverse(packing.forces, reverse)
+    return packing
 
 
 def open_lammps(

@@ -60,13 +60,12 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
-def refuse_idle_reverse(packing: Packing, reverse: bool) -> Packing:
-    """The packing; InputError if reversing the sign of f_t was requested and every f_t is 0."""
-    if reverse and not packing.forces[:, 1].any():
+def refuse_idle_reverse(forces: Floats, reverse: bool) -> None:
+    """InputError if reversing the sign of f_t is requested and no f_t of forces (k, 2) has one."""
+    if reverse and not np.nan_to_num(forces[:, 1]).any():
         raise InputError(
             "--reverse (reverse=True) has no effect, as every tangential force is 0: leave it out"
         )
-    return packing
 
 
 def worth_reversing(gain: float, reverse: bool) -> str:

@@ -114,7 +114,7 @@ def read_table(
             "--walls and --gravity (walls=, gravity=) apply to tables without forces: leave out "
             "f_n and f_t"
         )
-    refuse_idle_reverse(packing, reverse)
+    refuse_idle_reverse(packing.forces, reverse)
     found = adopt(packing, reverse=reverse, forces="given")
     return found if closed or load.any() else _with_edge(found)
 
