@@ -28,7 +28,11 @@ PAGES = sorted(
 )
 DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md", *PAGES]
 GUIDES = [".github/CONTRIBUTING.md", "tests/README.md", "CHANGELOG.md"]  # commands in parts
-RESULTS = ["README.md", "granforce/docs/pages/results.md"]
+RESULTS = [
+    "README.md",
+    "granforce/docs/pages/results.md",
+    "granforce/docs/pages/results-in-detail.md",
+]
 LAMMPS = ROOT / "tests" / "lammps" / "lammps_n400_mu0.3"
 
 # The same at a size that takes no time: texts of commands and snippets, and what replaces them.

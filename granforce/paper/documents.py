@@ -2,10 +2,11 @@
 
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
 against μ), "others" (other measures at each μ), "highlights" (findings, one sentence each),
-"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (all
-claims), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's walk, and its
-excess over S), "preparation" (how results depend on the packing), "counts" (number of packings in
-each part), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
+"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (the
+verdict on each claim), "details" (the numbers behind them), "findings" (numbers beyond the claims),
+"sweeps" (the residual of the paper's walk, and its excess over S), "preparation" (how results
+depend on the packing), "counts" (number of packings in each part), "certificates" (largest gap of
+the exact bounds, convergence of uniform samples).
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,15 @@ from granforce.paper.claims.groups import (
     excesses,
     outside,
 )
-from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED, UNDECIDED, UNMEASURED
+from granforce.paper.claims.verdicts import (
+    DIFFERS,
+    FAILED,
+    FEW,
+    MISSING,
+    REPRODUCED,
+    UNDECIDED,
+    UNMEASURED,
+)
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
@@ -52,7 +61,9 @@ _HEADS = {
     "exact": "exact",
     "": "packings alone",
 }
-_VERDICTS = (REPRODUCED, UNDECIDED, FEW, DIFFERS, FAILED, UNMEASURED)
+MIXED = "depends on the sampler"
+# Of the verdicts on a claim by sampler, the first of these is the verdict on the claim.
+_VERDICTS = (REPRODUCED, DIFFERS, FAILED, UNDECIDED, FEW, UNMEASURED, MISSING)
 
 
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
@@ -66,7 +77,8 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "verdicts": lambda: verdict_counts(claims),
-        "claims": lambda: claim_table(claims),
+        "claims": lambda: verdict_table(claims),
+        "details": lambda: detail_table(claims),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "findings": lambda: finding_table(findings),
@@ -489,28 +501,48 @@ def certificates(table: StudyTable) -> str:
 
 
 def verdict_counts(claims: Rows) -> str:
-    """How many claims have which verdict, by sampler, as a table.
-
-    The last column counts claims with the same verdict in every column that judges them.
-    """
+    """How many claims have which verdict: all samplers together, and each, as a table."""
     heads = _used(claims)
-    by_claim: dict[str, set[str]] = {}
+    together = [_together(by_sampler) for by_sampler in _by_claim(claims).values()]
+    counted = [
+        together,
+        *([c["verdict"] for c in claims if c["sampler"] == name] for name in heads),
+    ]
+    lines = [
+        [word, *(str(verdicts.count(word)) for verdicts in counted)]
+        for word in (*_VERDICTS[:3], MIXED, *_VERDICTS[3:])
+        if any(word in verdicts for verdicts in counted)
+    ]
+    lines.append(["all", *(str(len(verdicts)) for verdicts in counted)])
+    return markdown_table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
+
+
+def verdict_table(claims: Rows) -> str:
+    """The verdict on each claim, all samplers together, and by each: one row per claim."""
+    heads = [name for name in _used(claims) if name]
+    rows = []
+    for (statement, source, _), by_sampler in _by_claim(claims).items():
+        cells = [by_sampler[name]["verdict"] if name in by_sampler else "" for name in heads]
+        rows.append([statement, source, f"**{_together(by_sampler)}**", *cells])
+    return markdown_table(["claim", "source", "verdict", *(_HEADS[name] for name in heads)], rows)
+
+
+def _together(by_sampler: dict[str, dict[str, Any]]) -> str:
+    """One verdict on a claim: that of the samplers that decide it, MIXED if they disagree."""
+    verdicts = {claim["verdict"] for claim in by_sampler.values()}
+    decided = verdicts & {REPRODUCED, DIFFERS, FAILED}
+    if REPRODUCED in decided and len(decided) > 1:
+        return MIXED
+    return next(word for word in _VERDICTS if word in verdicts)
+
+
+def _by_claim(claims: Rows) -> dict[tuple[str, str, str], dict[str, dict[str, Any]]]:
+    """The claims of each (statement, source, criterion), by sampler."""
+    grouped: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
     for claim in claims:
-        verdicts = by_claim.setdefault(claim["statement"], set())
-        if claim["sampler"] in heads and claim["verdict"] in _VERDICTS:
-            verdicts.add(claim["verdict"])
-    lines = []
-    for word in _VERDICTS:
-        cells = [
-            sum(claim["sampler"] == name and claim["verdict"] == word for claim in claims)
-            for name in heads
-        ]
-        same = sum(verdicts - {UNMEASURED} == {word} for verdicts in by_claim.values())
-        lines.append([word, *map(str, cells), str(same)])
-    sums = [sum(int(line[k]) for line in lines) for k in range(1, len(heads) + 1)]
-    lines.append(["all", *map(str, sums), str(len(by_claim))])
-    columns = [*(_HEADS[name] for name in heads), "same in every column"]
-    return markdown_table(["verdict", *columns], lines)
+        key = claim["statement"], claim["source"], claim["criterion"]
+        grouped.setdefault(key, {})[claim["sampler"]] = claim
+    return grouped
 
 
 def _used(claims: Rows) -> list[str]:
@@ -519,18 +551,14 @@ def _used(claims: Rows) -> list[str]:
     return [name for name in _HEADS if name in known]
 
 
-def claim_table(claims: Rows) -> str:
+def detail_table(claims: Rows) -> str:
     """Claims with number, interval and verdict: one row per claim, one column per sampler.
 
     Below the table: where walks are not judged, as they leave S.
     """
     heads = _used(claims)
-    lines: dict[Any, Any] = {}
-    for claim in claims:
-        key = claim["statement"], claim["source"], claim["criterion"]
-        lines.setdefault(key, {})[claim["sampler"]] = claim
     rows = []
-    for (statement, source, criterion), by_sampler in lines.items():
+    for (statement, source, criterion), by_sampler in _by_claim(claims).items():
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
         rows.append([statement, source, criterion, *cells])

@@ -488,21 +488,34 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     assert "from 10 to 20" in summary and "at μ = 1 only" in summary
 
 
-def test_verdicts_are_counted_for_each_sampler_and_claim():
-    def claim(statement, sampler, verdict):
-        return {"statement": statement, "sampler": sampler, "verdict": verdict, "value": 1.0}
+def test_a_claim_has_one_verdict_and_one_for_each_sampler():
+    def claim(statement, sampler, verdict, value=1.0):
+        words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
+        return words | {"sampler": sampler, "verdict": verdict, "value": value}
 
-    told = [
+    judged = [
         claim("a", "nearest", verdicts.REPRODUCED),
-        claim("a", "exact", verdicts.REPRODUCED),
+        claim("a", "exact", verdicts.UNDECIDED),
         claim("b", "nearest", verdicts.REPRODUCED),
-        claim("b", "exact", verdicts.UNDECIDED),
+        claim("b", "exact", verdicts.DIFFERS),
+        claim("c", "nearest", verdicts.FEW),
+        claim("c", "exact", verdicts.FAILED),
+        claim("c", "uniform", verdicts.MISSING, float("nan")),
     ]
-    lines = [line.split(" | ") for line in documents.verdict_counts(told).splitlines()]
-    assert lines[0][1:3] == ["nearest-network walk", "exact"]  # no column without numbers
-    counted = {words[0].strip("| "): [int(n.strip("| ")) for n in words[1:]] for words in lines[2:]}
-    assert counted["reproduced"] == [2, 1, 1] and counted["undecided"] == [0, 1, 0]
-    assert counted["all"] == [2, 2, 2]
+    rows = [line.strip("| ").split(" | ") for line in documents.verdict_table(judged).splitlines()]
+    heads = ["claim", "source", "verdict", "nearest-network walk", "exact"]
+    assert rows[0] == heads  # no column without numbers
+    assert [row[2] for row in rows[2:]] == [
+        f"**{word}**" for word in (verdicts.REPRODUCED, documents.MIXED, verdicts.FAILED)
+    ]
+    assert rows[4][3:] == [verdicts.FEW, verdicts.FAILED]
+    lines = [
+        line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
+    ]
+    counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
+    assert counted["reproduced"] == [1, 2, 0] and counted[documents.MIXED] == [1, 0, 0]
+    assert counted["undecided"] == [0, 0, 1] and counted["not reproduced"] == [1, 0, 1]
+    assert counted["all"] == [3, 3, 3] and "not measured" not in counted
 
 
 def test_versions_are_not_mixed(done, table, tmp_path, capsys):
