@@ -14,6 +14,7 @@ from granforce.bench.conditions import knowledge
 from granforce.bench.frames import frames
 from granforce.bench.inference import inference
 from granforce.bench.kernel import growth, kernel, pushes, starts
+from granforce.bench.masonry import masonry
 from granforce.bench.packings import (
     compaction,
     compaction_frictions,
@@ -44,6 +45,7 @@ __all__ = [
     "kernel",
     "knowledge",
     "main",
+    "masonry",
     "pushes",
     "relaxation",
     "run",
@@ -78,6 +80,7 @@ PARTS: Parts = {
     "inference": (inference, "The likeliest network of a measurement"),
     "frames": (frames, "Photoelastic frames of known forces: distance from the truth in ⟨f_n⟩"),
     "knowledge": (knowledge, "What is prescribed and known, beside HiGHS and PIQP"),
+    "masonry": (masonry, "Dry-stone walls beside HiGHS"),
     "walks": (walks, "Random walks by solver"),
 }
 

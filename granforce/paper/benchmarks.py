@@ -27,6 +27,7 @@ RATIOS = {
     "starts": (SLOWER, "ratio_to_piqp"),
     "pushes": (SLOWER, "ratio"),
     "knowledge": (SLOWER, "ratio"),
+    "masonry": (SLOWER, "ratio"),
     "skips": ("Slower with the shortcut", "ratio"),
     "uniform": (FASTER, "ratio"),
     "inference": (FASTER, "ratio"),
@@ -80,7 +81,7 @@ def _remark(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _place(row: Mapping[str, Any]) -> str:
-    words = {"n": "n = ", "mu": "μ = ", "packing": "", "task": ""}
+    words = {"n": "n = ", "mu": "μ = ", "packing": "", "task": "", "what": ""}
     return ", ".join(f"{word}{row[name]}" for name, word in words.items() if name in row)
 
 

@@ -92,6 +92,13 @@ def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
     assert fit["note"] == "N = 100 … 1600"
 
 
+def test_walls_of_blocks_agree_with_highs():
+    rows = bench.masonry(True)
+    assert {row["bodies"] for row in rows} == {56} and rows[-1]["r_hat"] > 0
+    compared = [row for row in rows if "difference" in row]
+    assert len(compared) == 4 and all(row["difference"] < 1e-8 for row in compared)
+
+
 def test_compaction_rows():
     rows = bench.compaction(True, n=30, mu=0.3, steps=(0.05, 1e9), accuracies=(0.01,), seeds=1)
     assert [row["failed"] for row in rows] == [0, 1]
