@@ -305,6 +305,26 @@ def _search(step, flows, lanes):
             undecided -= 1
         if undecided == 0:
             return
+    _keep_solved(step, flows, settled, lanes)
+
+
+@within
+def _keep_solved(step, flows, settled, lanes):
+    """Return lanes whose Newton step did not help to its base: SOLVED if the base was.
+
+    Where forces lie on their cones to rounding, every step from a solution changes the state of
+    some contact, and only rounding is left to reduce.
+    """
+    for lane in range(len(lanes)):
+        if not settled[lane]:
+            flows.length[0, lane] = 0.0
+    length = load(flows.length, 0, lanes)
+    step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
+    step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
+    answer(step, flows, lanes)
+    for lane in range(len(lanes)):
+        if not settled[lane] and _is_solved(step, flows, lane):
+            flows.found[lane] = SOLVED
 
 
 @within

@@ -16,6 +16,7 @@ from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
 from granforce.forces.balance import stress_of
 from granforce.measures import statistics
+from granforce.packing.compaction import NEARLY_FRICTIONLESS
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, Packing, friction
@@ -328,13 +329,15 @@ def _version_words(row: Mapping[str, Any]) -> str:
 
 
 def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
-    """InputError if rows of one part, or their packings, differ in version.
+    """InputError if rows of one part differ in version, or packings made by one algorithm.
 
     Rows of an older table without a version count as one version.
     """
     first: dict[Any, Any] = {}
     for row in rows:
-        for group, version in zip((row["part"], "packings"), _versions(row), strict=True):
+        finished = 0 < row.get("packing_mu", row["mu"]) <= NEARLY_FRICTIONLESS
+        packings = "packings of small friction" if finished else "packings"
+        for group, version in zip((row["part"], packings), _versions(row), strict=True):
             other = first.setdefault(group, (row, version))
             if other[1] != version:
                 raise InputError(

@@ -9,15 +9,25 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from granforce.packing.compaction import NEARLY_FRICTIONLESS
 from granforce.records import InputError
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 from granforce.types import Cancel, Progress
 
-# Version of the algorithm that makes packings certified to be at rest. It is among their
-# parameters, so that it enters the key of everything that depends on a packing.
-PACKING_VERSION = 7
+# Versions of the algorithms that make packings certified to be at rest: of dynamics alone, and of
+# small friction, where linear programs finish them.
+PACKING_VERSION, FINISHED_VERSION = 7, 8
+
+
+def packing_version(mu: float) -> int:
+    """The version of `pack` at this friction.
+
+    It is among the parameters of a packing, so that it enters the key of everything that depends on
+    the packing.
+    """
+    return FINISHED_VERSION if 0 < mu <= NEARLY_FRICTIONLESS else PACKING_VERSION
 
 
 def _unchanged(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
@@ -109,11 +119,11 @@ def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
 def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry has the current version of its kind and of its packing's algorithm."""
     packing = entry.params.get("packing")
-    # Imported packings are identified by their contents.
-    older = (
-        isinstance(packing, dict) and "n" in packing and packing.get("version") != PACKING_VERSION
-    )
-    return entry.version == kind.version and not older
+    if entry.version != kind.version:
+        return False
+    if not isinstance(packing, dict) or "n" not in packing:  # imported: named by its contents
+        return True
+    return bool(packing.get("version") == packing_version(packing["mu"]))
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")

@@ -105,7 +105,7 @@ def test_a_new_version_of_packings_renames_what_rests_on_them_alone(name, tmp_pa
 
     imported = {"imported": "0" * 64, "mu": 0.1}
     before = called(MADE), name != "packing" and called(imported)
-    monkeypatch.setattr("granforce.study.kinds.packings.PACKING_VERSION", 99)
+    monkeypatch.setattr("granforce.study.cells.PACKING_VERSION", 99)
     after = called(PACKING.parameters(20, 0.1, 1)), name != "packing" and called(imported)
     assert before[0] != after[0]
     assert before[1] == after[1]

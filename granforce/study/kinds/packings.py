@@ -21,7 +21,7 @@ from granforce.packing.compaction import (
 from granforce.packing.scenes import scene
 from granforce.records import InputError, Packing, friction, moderate, positive, random_seed, whole
 from granforce.study import slices
-from granforce.study.cells import PACKING_VERSION, Kind, get, save
+from granforce.study.cells import Kind, get, packing_version, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.keys import Parameters
@@ -62,7 +62,7 @@ def _packing_parameters(
         "box_mass": moderate(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy", most=COARSEST),
-        "version": PACKING_VERSION,
+        "version": packing_version(mu),
         # Only if not square, so that keys of packings in square boxes stay valid.
         **({} if check_box(box) == "square" else {"box": box}),
     }
@@ -157,7 +157,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=3,  # later versions differ by PACKING_VERSION in the parameters
+    version=3,  # later versions are in the parameters: `packing_version`
     title="compaction",
     unit="step",
     parameters=_packing_parameters,
