@@ -73,6 +73,7 @@ def evolution(
             failed.append((number, str(error)))
             continue
         named = kinds.imported_parameters(snapshot.packing)
+        store.make()  # processes load the packing from there
         kinds.keep_packing(store, named, snapshot.packing, hold=True)
         cells = [StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
         if states:
