@@ -79,8 +79,8 @@ def walls(
     the walls, which has the largest Σ log y − ½ Σ W (f − m)², instead of the analytic centre; K
     then has W in its stiffness.
 
-    Raises NotJammedError if S is empty, InputError if the centre lies at infinity, UndecidedError
-    if no solver could decide, or S is thinner than rounding.
+    Raises NotJammedError if S is empty, UnboundedError if it is proved to be unbounded,
+    UndecidedError if no solver could decide, or S is thinner than rounding.
     """
     y = ensemble.hull.inner
     setup = _setup(ensemble, weight, measured)
@@ -95,9 +95,9 @@ def walls(
             "no centre of the measurement was found: its errors are too small, or too different "
             "from each other; use larger errors"
         )
-    if centre is None:
+    if centre is None and certificates.recession(ensemble.scaled_form[0]) is not None:
         raise UnboundedError(certificates.UNBOUNDED)
-    if not np.all(centre >= 0):
+    if centre is None or not np.all(centre >= 0):
         raise UndecidedError(
             "these conditions leave too little freedom to resolve: use a larger friction "
             "coefficient, or prescribe less"

@@ -246,8 +246,8 @@ def _told(error):
 
 
 def _balanced_or_told(S, states, reached):
-    """Within frozen surroundings S may be so thin that 10⁻⁹ is all, which is told."""
-    if len(S.frozen) and not reached:
+    """Beside frozen or known forces S may be so thin that 10⁻⁹ is all, which is told."""
+    if (len(S.frozen) or S.known is not None) and not reached:
         assert np.max(S.residual(states)) <= 1e-7
     else:
         _balanced(S, states)
