@@ -294,9 +294,8 @@ def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
     assert part == {"segments": 2, "drawn": 0, "outside": 2, "thin": 0}
 
 
-def test_a_displacement_goes_to_and_fro_by_a_mean_radius(run):
-    """The disk that moves most, at the turning point a quarter of the swing after its middle."""
-    ahead, back, rests = run(
+def test_a_displacement_goes_out_by_a_mean_radius_and_back_but_never_the_opposite_way(run):
+    ways, out, rests = run(
         "packing/drawing/scene packing/drawing/displacement",
         f"""({{ Scene, Sway }}, {{ walk, field }}) => {{
             {SCENE}
@@ -304,20 +303,20 @@ def test_a_displacement_goes_to_and_fro_by_a_mean_radius(run):
             const sway = new Sway(scene)
             const shifts = () => [0, 1, 2].map((k) => [scene.shift(k, 0), scene.shift(k, 1)])
             sway.take(field)
-            sway.swing(550)
-            const ahead = shifts()
-            sway.swing(1650)
-            const back = shifts()
+            sway.began = 300
+            const at = (time) => {{ sway.swing(300 + time); return shifts() }}
+            const ways = Array.from({{ length: 23 }}, (_, k) => at(100 * k)), out = at(1100)
             sway.take(null)
-            return [ahead, back, shifts()]
+            return [ways, out, shifts()]
         }}""",
         walk=PRESSED,
         field=[0.0, 0.0, 0.3, 0.4, 0.0, -0.25],
     )
     mean = np.mean([r for r in PRESSED["radius"] if r > 0])
     expected = mean / 0.5 * np.array([[0, 0], [0.3, 0.4], [0, -0.25]])
-    np.testing.assert_allclose(ahead, expected, atol=1e-12)
-    np.testing.assert_allclose(back, -np.array(ahead), atol=1e-12)
+    np.testing.assert_allclose(out, expected, atol=1e-12)
+    np.testing.assert_allclose([ways[0], ways[-1]], 0, atol=1e-12)
+    assert np.min(np.array(ways) * np.sign(expected)) > -1e-12
     assert rests == [[0, 0]] * 3
 
 
