@@ -276,6 +276,28 @@ def test_the_chain_under_the_pointer_is_the_nearest_and_none_at_a_centre(run):
     assert (on, beside, between, disk, outside) == (1, -1, -1, 1, -1)
 
 
+def test_the_line_of_the_selected_contact_is_outlined_and_not_covered(run):
+    line, mark, outline = run(
+        "packing/drawing/scene",
+        f"""({{ Scene }}, {{ walk }}) => {{
+            {SCENE}
+            scene.finer(600)
+            Object.assign(scene.palette, {{ selected: "red", halo: "white" }})
+            scene.selected = 1
+            scene.drawDisks()
+            scene.stale = false
+            scene.drawChains({{ width: [0.2, 0.2], bin: [0, 0], colours: ["blue"] }})
+            const at = (layer, place) =>
+                [...scene[layer].getImageData(...scene.toPixel(...place), 1, 1).data]
+            return [at("chains", [1, 0]), at("marks", [1, 0]), at("marks", [1, 0.14])]
+        }}""",
+        walk=PRESSED,
+    )
+    assert line == [0, 0, 255, 255]
+    assert mark == [0, 0, 0, 0]
+    assert outline == [255, 0, 0, 255]
+
+
 def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
     whole, part = run(
         "packing/drawing/scene",
