@@ -85,7 +85,8 @@ class Lesson {
     parts.text.textContent = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
     const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
-    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name).prediction, kept, () => this.paint())
+    const again = () => { kept({ prediction: null, done: false }); this.open(number) }
+    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { kept, again, drawn: () => this.paint() })
     this.sized.observe(parts.picture)
     this.ahead ??= this.fetch()
   }

@@ -7,21 +7,23 @@ import { QuantityPlot } from "./drawing/quantity_plot.js"
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
 const STAGES = ["Predict", "Do", "See"]
 
-
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: their elements; prediction: from an
-   * earlier visit, or null; kept({prediction, done}): called to store progress; drawn(): called to repaint.
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: their elements; progress: {prediction,
+   * done} of an earlier visit; kept({prediction, done}): called to store progress; drawn(): called to repaint;
+   * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, voice, row }, prediction, kept, drawn) {
-    Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true })
+  constructor(chapter, experiment, { plot, voice, row }, { prediction, done }, { kept, drawn, again }) {
+    Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true, told: done })
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
     this.stages = createElement("span", { className: "stages" })
-    row.prepend(this.button, this.stages)
+    this.again = button("Predict again", again)
+    row.prepend(this.button, this.stages, this.again)
     this.sized = new ResizeObserver(() => this.plot.fit())
     this.sized.observe(plot)
-    this.show()
+    if (done) this.finish()
+    else this.show()
   }
 
   /** A value of the quantity in question, in words. */
@@ -41,19 +43,36 @@ export class PredictDoSee {
 
   /** The prediction is made; dragging is enabled. */
   begin() {
-    this.predicted = true
-    this.experiment.locked = false
     this.kept({ prediction: this.prediction, done: false })
-    const ready = this.experiment.ready?.()
-    if (ready?.then) {
-      this.ready = false
-      ready.then(() => { this.ready = true; this.show() }, (error) => this.fail(error))
-    }
-    this.show()
+    this.unlock()
     this.plot.dot.focus({ preventScroll: true })
   }
 
-  fail(error) { this.voice.textContent = error.message }
+  /** Enable dragging, once the data for it are there. */
+  async unlock() {
+    this.predicted = true
+    this.experiment.locked = false
+    const ready = this.experiment.ready?.()
+    this.ready = !ready?.then
+    this.show()
+    try {
+      await ready
+    } catch (error) {
+      this.voice.textContent = error.message
+      return
+    }
+    this.ready = true
+    this.show()
+  }
+
+  /** Show a finished chapter again with its answer: the dot is dragged to the far end, and to the answer. */
+  async finish() {
+    const { chapter: { x, y }, experiment } = this
+    await this.unlock()
+    if (!this.ready || !this.row.isConnected) return
+    experiment.drag(x.high, y?.high ?? 0)
+    experiment.drag(experiment.answer, y?.high ?? 0)
+  }
 
   /** Update everything from the experiment. */
   show() {
@@ -66,6 +85,7 @@ export class PredictDoSee {
     this.plot.allow(stage ? (this.ready ? "dot" : null) : "marker")
     this.button.hidden = stage > 0
     this.button.disabled = prediction === null
+    this.again.hidden = stage < 2
     this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
