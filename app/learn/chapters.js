@@ -98,13 +98,12 @@ export const CHAPTERS = [
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
     text: ({ all }) => `${all} disks run through their random networks at μ = 0.1; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
     ask: "At which friction μ do the forces vary most?",
-    doing: "Drag the dot along the axis. Each stop shows a packing made with that friction.",
+    doing: "Drag the dot along the axis. At each stop it shows the mean over several packings made with that friction.",
     see: ({ rows }) => {
-      const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), last = rows.at(-1)
-      const first = rows[0]
+      const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At smaller μ more numbers are free, but friction leaves each less room: at μ = ${first.mu}, ${first.free} are free and forces vary by ${percent(first.spread)}. At larger μ contacts vanish, and free numbers with them: ${most.free} at μ = ${most.mu}, ${last.free} at μ = ${last.mu}.`,
-        `So more friction does not mean more freedom: at very high friction, hardly any number is free. The line is the mean over many packings.`,
+        `At small μ many numbers are free, but friction leaves each little room: at μ = ${first.mu}, ${first.free} are free and forces vary by ${percent(first.spread)}. At large μ contacts vanish, and free numbers with them: ${most.free} are left at μ = ${most.mu}, ${last.free} at μ = ${last.mu}.`,
+        `So more friction does not mean more freedom: S, all sets of forces that hold the disks, first grows wider and then loses its dimensions.`,
       ]
     },
     count: ({ rows }) => ({

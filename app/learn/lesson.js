@@ -10,7 +10,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push"]]
+const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push"], ["curve"]]
 
 class Lesson {
   constructor(model, view) {
@@ -73,15 +73,14 @@ class Lesson {
     const experiment = new chapter.experiment(parts.picture, chapter.options, () => this.mechanism?.show(), palettes())
     this.experiment = experiment
     try {
-      await experiment.load(source, [...model.frictions])
+      await experiment.load(source)
     } catch (error) {
       parts.voice.textContent = error.message
       return
     }
     if (turn !== this.asked) return experiment.stop()
     parts.pictures.classList.remove("waiting")
-    const stops = [...model.frictions]
-    const x = stops.length && chapter.x.log ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
+    const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.textContent = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
     const kept = (more) => { this.progress.set(chapter.name, more); this.show() }

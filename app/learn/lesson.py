@@ -25,7 +25,6 @@ class Lesson(Scripted):
     dark = param.Boolean()
     alone = param.Boolean(doc="whether one chapter is shown in a frame of another page")
     palettes = param.Dict(doc="colours of packings, see plot_style.palettes")
-    frictions = param.List(doc="every μ of which there is a packing, ascending")
 
     def __init__(
         self,
@@ -35,7 +34,7 @@ class Lesson(Scripted):
         **params: Any,
     ) -> None:
         """wake: as for Task."""
-        super().__init__(frictions=packings.frictions, **params)
+        super().__init__(**params)
         self._packings = packings
         self._task = partial(Task, wake=wake, visitor=visitor)
         self._tasks: dict[str, Task] = {}
@@ -68,7 +67,7 @@ class Lesson(Scripted):
             case "push":
                 self._send("push", "", packings.push, computing)
             case "curve":
-                self._send("curve", "", lesson_data.curve)
+                self._send("curve", "", packings.curve)
 
     def _send(self, what: str, name: str, compute: Callable[[], Any], pool: Any = reading) -> None:
         """Compute the data off the event loop and send them, or the reason for a failure."""

@@ -1,38 +1,48 @@
-// The same number of disks packed with increasing friction, each packing running through its
+// The same number of disks packed with increasing friction. The plot has the means of the study at
+// every stop; the picture shows the stored packing with the nearest friction, running through its
 // networks.
 
+import { createElement } from "../../browser/dom.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const SECONDS = 0.8 // from one network to the next
 
+const START = 0.1 // friction
+const nearest = (list, mu) => list.reduce((one, other) => (Math.abs(Math.log(other / mu)) < Math.abs(Math.log(one / mu)) ? other : one))
+
 export class Friction extends PackingExperiment {
-  async load(source, frictions) {
-    Object.assign(this, { source, frictions, visited: new Map(), mu: 0.1 })
+  async load(source) {
+    const { mu, spread, packed } = await source.get("curve")
+    Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], packings: new Map(), visited: new Set() })
+    this.value = nearest(this.stops, START)
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
-    await this.go(this.mu)
-    this.curve = source.get("curve").then((curve) => { this.curve = curve })
+    this.label = this.host.appendChild(createElement("div", { className: "label" }))
+    const fetched = this.packed.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
+    await fetched[this.stops.indexOf(this.value)]
+    this.go()
+    for (const one of fetched) one.then(() => this.go(), () => {}) // packings that are missing are not shown
     this.frame = requestAnimationFrame((time) => this.play(time))
-    for (const mu of frictions) source.get("packing", String(mu)).catch(() => {}) // in advance
   }
 
-  /** Show the packing at a friction. */
-  async go(mu) {
-    const packing = await this.source.get("packing", String(mu))
-    if (!this.locked) this.visited.set(mu, packing)
-    this.found ||= this.enough()
-    if (mu === this.mu) { // otherwise the slider has moved on
+  /** Show the packing of the present stop, once it is there. */
+  go() {
+    const { packings, packed, stops, spreads, value, visited } = this, packing = packings.get(packed[stops.indexOf(value)])
+    if (packing && packing !== this.packing) {
       this.packing = packing
       this.network = Float32Array.from(this.asPacked(packing))
       this.before = this.asPacked(packing)
       this.canvas.show(packing, packing.typical)
+      this.label.textContent = `picture: a packing made at μ = ${packing.mu}`
     }
+    const k = spreads.indexOf(Math.max(...spreads))
+    this.found ||= packings.has(packed[k]) && [k - 1, k, k + 1].every((at) => !(at in stops) || visited.has(stops[at]))
     this.changed()
   }
 
   play(time) {
     this.frame = requestAnimationFrame((next) => this.play(next))
     const { packing, palettes, network } = this, rows = packing.number.length, { normal, contacts } = packing
-    if (!this.canvas.scene.root.isConnected) return
+    if (!this.host.isConnected) return
     const at = (time / 1000 / SECONDS) % (rows - 2), part = this.still ? 0 : at % 1, row = 1 + Math.floor(at)
     if (this.still && row === this.row) return
     this.row = row
@@ -40,43 +50,30 @@ export class Friction extends PackingExperiment {
     this.canvas.draw(network, this.before, palettes)
   }
 
-  /** Whether the friction at which forces vary most was visited, and those on both sides of it. */
-  enough() {
-    const { frictions, visited, answer } = this, k = frictions.indexOf(answer)
-    return k > 0 && [k - 1, k, k + 1].every((at) => at >= frictions.length || visited.has(frictions[at]))
-  }
+  get finds() { return this.packings.size }
 
-  get finds() { return this.visited.size }
-
-  get value() { return this.mu }
-
-  /** The visited friction at which forces vary most. */
-  get answer() {
-    const rows = [...this.visited.values()]
-    return rows.length ? rows.reduce((one, other) => (other.spread > one.spread ? other : one)).mu : NaN
-  }
+  /** The friction at which forces vary most. */
+  get answer() { return this.stops[this.spreads.indexOf(Math.max(...this.spreads))] }
 
   get facts() {
-    const rows = [...this.visited.values()].sort((a, b) => a.mu - b.mu).map((packing) => this.counted(packing))
-    return { ...this.counted(this.packing), rows }
+    const { packings, packing, stops, spreads } = this
+    const rows = [...packings.values()].sort((a, b) => a.mu - b.mu).map((one) => ({ ...this.counted(one), spread: spreads[stops.indexOf(one.mu)] ?? one.spread }))
+    return { ...this.counted(packing), rows }
   }
 
+  /** Move to the nearest stop, past all stops on the way. */
   drag(x) {
-    const away = (mu) => Math.abs(Math.log(mu / x))
-    const mu = this.frictions.reduce((one, other) => (away(other) < away(one) ? other : one))
-    if (mu === this.mu && this.visited.has(mu)) return
-    this.visited.set(this.packing.mu, this.packing)
-    this.mu = mu
-    this.changed()
-    this.go(mu)
+    const { stops, value } = this, to = nearest(stops, x), [low, high] = [Math.min(to, value), Math.max(to, value)]
+    for (const stop of stops) if (stop >= low && stop <= high) this.visited.add(stop)
+    this.value = to
+    this.go()
   }
 
   get picture() {
-    const rows = this.facts.rows, { curve, found } = this
+    const { stops, spreads, value, visited, found } = this, curve = stops.map((mu, k) => [mu, spreads[k]])
     return {
-      now: [this.mu, this.packing.spread], words: `μ = ${this.mu}`,
-      dots: rows.map(({ mu, spread }) => [mu, spread]), seen: [], brush: 2,
-      thin: true, exact: found && curve.mu ? [curve.mu.map((mu, k) => [mu, curve.spread[k]]).filter(([mu]) => mu >= this.frictions[0])] : [],
+      now: curve[stops.indexOf(value)], words: `μ = ${value}`, seen: [], brush: 2,
+      dots: curve.filter(([mu]) => visited.has(mu)), thin: true, exact: found ? [curve] : [],
     }
   }
 

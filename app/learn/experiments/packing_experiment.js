@@ -4,7 +4,7 @@ import { PackingPicture } from "../drawing/packing_picture.js"
 
 export class PackingExperiment {
   constructor(host, options, changed, palettes) {
-    Object.assign(this, { options, changed, locked: true, found: false, seen: null, palettes })
+    Object.assign(this, { host, options, changed, locked: true, found: false, seen: null, palettes })
     this.canvas = new PackingPicture(host, palettes, (part) => this.pulled(part))
   }
 

@@ -117,6 +117,21 @@ class Packings:
             "displacement": np.nan_to_num(found["displacement"].values[row]).ravel(),
         }
 
+    def curve(self) -> dict[str, Any]:
+        """Variation of forces against friction, and the friction of the nearest packing.
+
+        The variation is the mean over the packings of the study or, without a study, that of each
+        packing.
+        """
+        own = self.frictions
+        points = [
+            (mu, spread)
+            for mu, spread in study_data.against_friction("eta1")
+            if own and own[0] <= mu <= own[-1]
+        ] or [(mu, self.shown(mu).replay.summary["eta1"]) for mu in own]
+        packed = [min(own, key=lambda one: abs(np.log(one / mu))) for mu, _ in points]
+        return {"mu": [mu for mu, _ in points], "spread": [s for _, s in points], "packed": packed}
+
     def _pushed(self) -> xr.Dataset:
         """The stored pushed contacts of the packing."""
         selection = self.cells[MU].selection
@@ -127,12 +142,6 @@ class Packings:
                 if found is not None:
                     return found
         raise InputError("this chapter needs pushed contacts that the store does not have")
-
-
-def curve() -> dict[str, Any]:
-    """Variation of forces against friction, in the finished study: means over its packings."""
-    points = [(mu, spread) for mu, spread in study_data.against_friction("eta1") if mu > 0]
-    return {"mu": [mu for mu, _ in points], "spread": [value for _, value in points]}
 
 
 def _away(replay: Any) -> Any:
