@@ -10,15 +10,18 @@ import { SceneExperiment } from "./experiments/scene_experiment.js"
 const two = (v) => v.toFixed(2)
 const percent = (v) => `${Math.round(100 * v)} %`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
-const PRESSED = "− 2, since the forces between disks cancel in the sum over all of them; + 1 for the pressure"
+// Without walls: further rows of the count.
+const PRESSED = [
+  ["two of them follow from the others: in the sum over all disks, forces between disks cancel, sideways and upwards", "− 2"],
+  ["one more: the pressure on all sides is given", "+ 1"],
+]
 
 /** The count of free numbers, line by line: {rows, head}; head is null if the last row is the sum. */
 function counted({ contacts, disks, equations, free }, pressed, disksNote = "") {
-  const whole = 3 * disks
   const rows = [
     [`${contacts} contacts × 2 forces, normal and tangential`, 2 * contacts],
-    [`${disks} ${disks > 1 ? "disks" : "disk"}${disksNote} × 3 equations: no net force sideways, none up or down, no turning`, whole],
-    ...(pressed ? [[PRESSED, equations]] : []),
+    [`${disks} ${disks > 1 ? "disks" : "disk"}${disksNote} × 3 equations: no net force sideways, none up or down, no turning`, 3 * disks],
+    ...(pressed ? [...PRESSED, [`equations: ${3 * disks} − 2 + 1`, equations]] : []),
     [`free numbers: ${2 * contacts} − ${equations}`, free],
   ]
   return { head: null, rows }
@@ -70,8 +73,8 @@ export const CHAPTERS = [
   },
   {
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
-    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${free} numbers are free. The marked line carries ${two(start)} times the mean force.`,
-    ask: "How large can you make its force while no disk moves?",
+    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${free} numbers are free: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
+    ask: "How large can you make this force while no disk moves?",
     doing: "Drag the dot to the right, or the marked line upwards. The bluer a line, the more its force has changed.",
     see: ({ opened, sliding, changed }) => [
       `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the force can grow no further.`,
