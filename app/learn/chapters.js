@@ -86,12 +86,12 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "Chance sees little", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now a random walk of ${states} steps moves from one admissible network to the next, and the marked force is read in each.`,
+    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now a random walk takes ${states} steps through S, all sets of forces that hold the disks. At each step the marked force is noted.`,
     ask: "What is the largest value that chance finds?",
     doing: "Drag the dot upwards: network after network.",
     see: ({ part, mean, free }) => [
       `Chance covers ${percent(part)} of what is possible for this force, and ${percent(mean)} on average over all. To reach either end, most of the ${free} free numbers must work together, which chance hardly ever arranges.`,
-      `And that is one force alone. A body half as wide in each of ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of the whole: a value that was never sampled may still be possible.`,
+      `And that is one force alone. A part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S: a value that chance never finds may still be possible.`,
     ],
     count: null,
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks (every 20th drawn)", dragged: true },
@@ -118,12 +118,12 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu, carried }) => `The same packing at μ = ${mu}. Two marked disks, which press on each other with ${two(carried)} times the mean force, are pushed apart. The other forces change to carry the push, as long as they can.`,
+    text: ({ mu, carried }) => `The same packing at μ = ${mu}. The two disks of the marked line, which press on each other with ${two(carried)} times the mean force, are pushed apart. The other forces change to carry the push, as long as they can.`,
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right: the arrows grow.",
     see: ({ high, limit, opened, slid }) => [
       `Then ${opened} contacts open, ${slid} slip, and disks start to move. The motion is drawn enlarged: the fastest disk moves by one mean radius.`,
-      `Forces that could carry ${two(limit)} do exist, but the packing gives way at ${two(high)}: its actual forces decide, and no picture of the disks shows them. That is why it matters how undetermined they are.`,
+      `Up to a push of ${two(limit)}, S, all sets of forces that hold the disks, is not empty. But the packing gives way at ${two(high)}: its actual forces decide, and no picture of the disks shows them. That is why it matters how undetermined they are.`,
     ],
     count: null,
     x: { low: 0, high: 6, label: "push (mean force = 1)" }, y: null,
