@@ -21,7 +21,10 @@ FROM_BROWSER = {
     "FrictionSlider": ({"typed": str},),
     "Handover": ({"key": str},),  # of the requested file
     "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; next measurement
-    "Lesson": ({"want": str, "name": str},),  # data for a chapter
+    "Lesson": (  # data for a chapter, or for a contact in a network
+        {"want": str, "name": str},
+        {"want": str, "name": str, "network": [float, ...]},
+    ),
     "LoadSlider": ({"push": True}, {"gave": True}),  # moved; reached the load at which disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
     "NumberField": ({"typed": str},),  # not a number

@@ -75,7 +75,7 @@ export const CHAPTERS = [
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
     text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${free} numbers are free: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make this force while no disk moves?",
-    doing: "Drag the dot to the right, or the marked line upwards. The bluer a line, the more its force has changed.",
+    doing: "Drag the dot to the right, or the marked line upwards. The bluer a line, the more its force has changed. Try other lines too: up is more, down is less.",
     see: ({ opened, sliding, changed }) => [
       `Here ${opened} contacts have lost all their force and friction is at its limit at ${sliding}: the force can grow no further.`,
       `To get here, ${changed} other forces changed by more than a tenth of the mean force, yet no disk moved. On a photograph of the packing you would see no difference.`,

@@ -62,6 +62,9 @@ class Lesson(Scripted):
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))
+            case "rail" if "network" in message:
+                network = message["network"]
+                self._send("rail", name, lambda: packings.rail_from(name, network), computing)
             case "rail":
                 self._send("rail", "", packings.rail, computing)
             case "push":
@@ -76,11 +79,12 @@ class Lesson(Scripted):
             task = self._tasks[what + name] = self._task(pool)
             task.param.watch(partial(self._failed, what, name), "message")
         if not task.running:
-            task.start(lambda job: compute(), lambda found: self._tell(what, name, found))
+            task.start(lambda job: compute(), lambda found: self._tell(what, name, given=found))
 
-    def _tell(self, what: str, name: str, data: dict[str, Any]) -> None:
-        self.tell({"what": what, "name": name, "given": data})
+    def _tell(self, what: str, name: str, **answer: Any) -> None:
+        self._tasks.pop(what + name, None)
+        self.tell({"what": what, "name": name, **answer})
 
     def _failed(self, what: str, name: str, event: Any) -> None:
         if event.new:
-            self.tell({"what": what, "name": name, "error": event.new})
+            self._tell(what, name, error=event.new)

@@ -9,12 +9,15 @@ export class Source {
     model.on("msg:custom", (news) => this.arrived(plain(news)))
   }
 
-  /** A promise of the requested data; rejected with the reason if they are not available. */
-  get(want, name = "") {
+  /**
+   * A promise of the requested data; rejected with the reason if they are not available. network: the forces that
+   * they depend on, all normal and then all tangential ones; such data are not kept.
+   */
+  get(want, name = "", network = null) {
     const { model, view } = this, key = `${want} ${name}`
-    if (!this.promises.has(key)) {
+    if (network || !this.promises.has(key)) {
       this.promises.set(key, new Promise((resolve, reject) => this.waiting.set(key, { resolve, reject })))
-      ask(model, view, { want, name })
+      ask(model, view, network ? { want, name, network } : { want, name })
     }
     return this.promises.get(key)
   }

@@ -2,26 +2,27 @@
 // contact is marked.
 
 import { Scene } from "../../packing/drawing/scene.js"
+import { markSelected } from "../../packing/drawing/marks.js"
 import { arrow } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
 const FULL = 0.5 // change in mean forces at full blue; orange is for contacts about to slip, as in the small scenes
-const REACH = 14 // px from the marked contact within which it can be dragged
+const REACH = 14 // px from a contact within which it can be dragged
 
 export class PackingPicture {
-  /** dragged(part): fraction of the height of the picture, upwards, from the start of the drag; null: the
-   * drag starts. */
-  constructor(host, palettes, dragged) {
+  /** hand: {takes(contact), take(contact), pulled(part), release()}, as in PackingExperiment. */
+  constructor(host, palettes, hand) {
     this.scene = new Scene(() => {})
     this.scene.frozen = true // nothing to point at or to select
     this.scene.palette = palettes.scene
     this.scene.onRepaint = () => {}
     this.scene.onMarks = (marks, scene) => this.drawPush(marks, scene)
     this.push = 0
+    this.held = null // the contact in the hand
     host.append(this.scene.root)
     this.sized = new ResizeObserver(() => this.scene.resize())
     this.sized.observe(this.scene.root)
-    this.listen(host, dragged)
+    this.listen(host, hand)
   }
 
   stop() { this.sized.disconnect() }
@@ -50,8 +51,9 @@ export class PackingPicture {
     scene.drawChains(style)
   }
 
-  /** Arrows that push the disks of the marked contact apart. */
+  /** An outline of the contact in the hand, and arrows that push the disks of the marked one apart. */
   drawPush(marks, scene) {
+    if (this.held !== null) markSelected(marks, scene, this.held)
     if (!this.push || scene.selected === null) return
     const { palette, scale, geometry } = scene
     marks.strokeStyle = palette.selected
@@ -67,25 +69,38 @@ export class PackingPicture {
     marks.stroke()
   }
 
-  listen(host, dragged) {
+  listen(host, hand) {
     const { scene } = this
     scene.root.style.pointerEvents = "none" // otherwise the wheel would zoom
     let from = null
+    /** The contact that a pointer would take: the marked one, if it is in reach, or null. */
     const near = (event) => {
-      if (!this.packing) return false
-      const k = scene.linkAt(...scene.place(event), REACH)
-      return k >= 0 && scene.geometry.contact[k] === scene.selected
+      if (!this.packing) return null
+      const at = scene.place(event), link = (chosen) => scene.linkAt(...at, REACH, chosen)
+      const marked = link((contact) => contact === scene.selected), k = marked < 0 ? link() : marked
+      return k >= 0 && hand.takes(scene.geometry.contact[k]) ? scene.geometry.contact[k] : null
     }
+    // By touch only the marked contact is dragged; otherwise the page scrolls under the finger.
+    host.addEventListener("touchstart", (event) => {
+      if (near(event.touches[0]) === scene.selected) event.preventDefault()
+    }, { passive: false })
     host.addEventListener("pointerdown", (event) => {
-      if (!near(event) || !dragged(null)) return
+      const contact = near(event)
+      if (contact === null || (event.pointerType === "touch" && contact !== scene.selected)) return
+      this.held = contact
+      hand.take(contact)
       from = event.clientY
       host.setPointerCapture(event.pointerId)
       event.preventDefault()
     })
     host.addEventListener("pointermove", (event) => {
-      if (from !== null) dragged((from - event.clientY) / host.clientHeight)
-      else host.style.cursor = near(event) ? "ns-resize" : "default"
+      if (from !== null) hand.pulled((from - event.clientY) / host.clientHeight)
+      else host.style.cursor = near(event) === null ? "default" : "ns-resize"
     })
-    for (const end of ["pointerup", "pointercancel"]) host.addEventListener(end, () => { from = null })
+    for (const end of ["pointerup", "pointercancel"]) host.addEventListener(end, () => {
+      if (from === null) return
+      from = this.held = null
+      hand.release()
+    })
   }
 }

@@ -2,7 +2,6 @@
 // every stop; the picture shows the stored packing with the nearest friction, running through its
 // networks.
 
-import { createElement } from "../../browser/dom.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const SECONDS = 0.8 // from one network to the next
@@ -16,7 +15,6 @@ export class Friction extends PackingExperiment {
     Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
-    this.label = this.host.appendChild(createElement("div", { className: "label" }))
     const fetched = this.packed.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
     await fetched[this.stops.indexOf(this.value)]
     this.go()
@@ -32,7 +30,7 @@ export class Friction extends PackingExperiment {
       this.network = Float32Array.from(this.asPacked(packing))
       this.before = this.asPacked(packing)
       this.canvas.show(packing, packing.typical)
-      this.label.textContent = `picture: a packing made at μ = ${packing.mu}`
+      this.say(`picture: a packing made at μ = ${packing.mu}`)
     }
     const k = spreads.indexOf(Math.max(...spreads))
     this.found ||= packings.has(packed[k]) && [k - 1, k, k + 1].every((at) => !(at in stops) || visited.has(stops[at]))

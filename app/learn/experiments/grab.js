@@ -1,4 +1,5 @@
-// One force of 400 disks is dragged: all others follow along networks computed by the server.
+// One force of 400 disks is dragged: all others follow along networks computed by the server. The
+// marked one is asked for, but any other can be dragged too, from the network on screen.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { PackingExperiment } from "./packing_experiment.js"
@@ -9,13 +10,17 @@ const LONG = 1.6 // a drag over the whole picture, relative to the distance betw
 
 export class Grab extends PackingExperiment {
   async load(source) {
-    this.packing = await source.get("packing", "0.1")
-    this.contact = this.packing.grabbed
-    this.value = this.start = this.packing.normal[this.contact]
-    this.network = this.before = this.asPacked(this.packing)
-    this.canvas.show(this.packing, this.contact)
-    this.rail = source.get("rail").then((rail) => { this.rail = rail; return rail })
+    const packing = await source.get("packing", "0.1"), contact = packing.grabbed
+    Object.assign(this, { source, packing, contact, held: null })
+    this.network = this.before = this.asPacked(packing)
+    this.tangential = packing.tangential.subarray(0, packing.contacts)
+    this.start = this.value
+    this.canvas.show(packing, contact)
+    this.first = source.get("rail").then((rail) => { this.rail = { ...rail, contact } })
   }
+
+  /** The force of the marked line. */
+  get value() { return this.network[this.contact] }
 
   get answer() { return this.packing.largest[this.contact] }
 
@@ -25,29 +30,58 @@ export class Grab extends PackingExperiment {
     return {
       ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact],
       changed: network.reduce((sum, v, c) => sum + (Math.abs(v - before[c]) > CHANGED && c !== contact ? 1 : 0), 0),
-      opened: rail.opened ? last(rail.opened) : 0, sliding: rail.sliding ? last(rail.sliding) : 0,
+      opened: rail ? last(rail.opened) : 0, sliding: rail ? last(rail.sliding) : 0,
     }
   }
 
-  /** Whether it can be dragged. */
-  ready() { return this.rail }
+  /** A promise: dragging has to wait for the first rail. */
+  ready() { return this.first }
 
-  drag(x) {
-    const { rail } = this
-    if (!rail.values) return
-    const [low, high] = [rail.values[0], rail.values.at(-1)]
-    this.value = Math.min(high, Math.max(low, x))
-    this.network = networkAt(rail, this.value).normal
-    this.seen = [Math.min(this.value, this.seen?.[0] ?? this.start), Math.max(this.value, this.seen?.[1] ?? this.start)]
-    if (high - this.value < FOUND * (high - low)) this.found = true
+  drag(x) { this.pull(this.contact, () => x) }
+
+  /** Give a contact the force value(its rail), as far as possible, once its rail is there. */
+  async pull(contact, value) {
+    this.wanted = [contact, value]
+    if (this.fetching) return
+    if (this.rail.contact !== contact) {
+      this.fetching = true
+      try {
+        const rail = await this.source.get("rail", String(contact), [...this.network, ...this.tangential])
+        this.rail = { ...rail, contact }
+      } catch (error) {
+        return this.say(error.message)
+      } finally {
+        this.fetching = false
+      }
+      return this.pull(...this.wanted)
+    }
+    const { rail, seen, start } = this, [low, high] = [rail.values[0], rail.values.at(-1)], now = Math.min(high, Math.max(low, value(rail)))
+    const { normal, tangential } = networkAt(rail, now)
+    Object.assign(this, { network: normal, tangential })
+    this.seen = [Math.min(this.value, seen?.[0] ?? start), Math.max(this.value, seen?.[1] ?? start)]
+    if (contact === this.contact) this.found ||= high - now < FOUND * (high - low)
+    else if (this.held === contact) this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
     this.changed()
   }
 
+  takes() { return !this.locked && Boolean(this.rail) }
+
+  take(contact) {
+    this.held = contact
+    this.taken = this.network[contact]
+    if (contact !== this.contact) this.say("Finding how far this line can be pulled …")
+    this.pulled(0)
+  }
+
   pulled(part) {
-    if (this.locked || !this.rail.values) return false
-    if (part === null) this.taken = this.value
-    else this.drag(this.taken + LONG * part * (this.rail.values.at(-1) - this.rail.values[0]))
-    return true
+    const { held, taken } = this
+    this.pull(held, ({ values }) => taken + LONG * part * (values.at(-1) - values[0]))
+  }
+
+  release() {
+    this.held = null
+    this.say("")
+    this.changed()
   }
 
   get picture() {

@@ -35,12 +35,11 @@ export class Push extends PackingExperiment {
     this.changed()
   }
 
-  pulled(part) {
-    if (this.locked) return false
-    if (part === null) this.taken = this.value
-    else this.drag(this.taken + 2 * part * this.answer)
-    return true
-  }
+  takes(contact) { return !this.locked && contact === this.path.contact }
+
+  take() { this.taken = this.value }
+
+  pulled(part) { this.drag(this.taken + 2 * part * this.answer) }
 
   get picture() {
     return { now: [this.value, 0], seen: this.most ? [[[0, 0], [this.most, 0]]] : [], exact: [] }

@@ -4,9 +4,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
-from granforce.records import InputError
+from granforce.records import InputError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
 from granforce.study.pulls import Puller
@@ -91,11 +92,22 @@ class Packings:
         return Puller(self.library.packing(cell.params["packing"]), cell.mu)
 
     def _rail(self) -> dict[str, Any]:
-        """Networks from the least to the largest force of the contact to pull."""
+        """Networks from the least to the largest force of the marked contact, as packed."""
         replay = self.shown(MU).replay
-        contact, scale = self._grabbed(MU), replay.force_scale
-        state = np.stack([replay.normal[0], replay.tangential[0]], axis=1).astype(np.float64)
-        rail = self._puller().rail(int(replay.backbone[contact]), state * scale)
+        as_packed = np.concatenate([replay.normal[0], replay.tangential[0]])
+        return self.rail_from(str(self._grabbed(MU)), as_packed)
+
+    def rail_from(self, contact: str, network: npt.ArrayLike) -> dict[str, Any]:
+        """Networks from the least to the largest force of a contact, near a given network.
+
+        network: all normal and then all tangential forces, ⟨f_n⟩.
+        """
+        replay = self.shown(MU).replay
+        count, scale = len(replay.backbone), replay.force_scale
+        if not contact.isdecimal() or int(contact) >= count:
+            raise InputError("this packing has no such contact")
+        forces = float_array(network, (2 * count,), "forces").reshape(2, -1).T
+        rail = self._puller().rail(int(replay.backbone[int(contact)]), forces * scale)
         return rail_of(rail, scale)
 
     def _push(self) -> dict[str, Any]:

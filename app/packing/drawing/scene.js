@@ -251,11 +251,12 @@ export class Scene {
     hint.addEventListener("animationend", () => hint.remove())
   }
 
-  /** The segment at a point of the layout, or −1; reach: px from a chain that still count as the chain. */
-  linkAt(px, py, reach = GRAB) {
+  /** The segment at a point of the layout, or −1; reach: px from a chain that still count as the chain; chosen(contact). */
+  linkAt(px, py, reach = GRAB, chosen = () => true) {
     const [x, y] = this.toPlace(px, py), { contact } = this.geometry
     let best = -1, least = Infinity
     for (let k = 0; k < contact.length; k++) {
+      if (!chosen(contact[k])) continue
       const [x0, y0, x1, y1] = this.ends(k), dx = x1 - x0, dy = y1 - y0
       const along = ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy)
       if (along < 0.05 || along > 0.95) continue // many chains meet at a centre

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from serving import serve
+from serving import chain, scene, serve, until
 
 WORDS = 70  # at most, before the hand acts
 # Name of each chapter: its heading; keys that carry the dot to the answer, how often; the answer.
@@ -40,7 +40,7 @@ def predict(page, steps=20):
 
 
 def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
-    page = opening("?learn", 1280, 900, at=lesson)
+    page, answers = opening("?learn", 1280, 900, at=lesson), {}
     for name, (heading, (key, times), answer) in CHAPTERS.items():
         page.get_by_role("heading", name=heading).wait_for()
         question = page.locator("article strong")
@@ -58,21 +58,31 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         told = page.locator(".voice").inner_text()
         assert answer is None or f"It is {answer}." in told, name
         assert "You predicted" in told and COUNTS.get(name, "") in told
+        answers[name] = re.search(r"It is (\d[\d.]*\d)\.|$", told)[1]
+        words = page.locator("article").inner_text()
+        assert "S, all sets of forces" in words or name in ("groove", "box", "thirteen"), name
+        assert ("− 2" in told and "+ 1" in told) == (name in ("thirteen", "four-hundred")), name
         if name != "push":
             page.get_by_role("button", name="Next").click()
     assert page.get_by_title("done").count() == 7
-    # What was done is remembered, and the numbers of 400 disks are those of the packing.
-    page.goto(f"{lesson}?learn=four-hundred")
-    page.get_by_role("heading", name="Grab one force").wait_for()
-    assert page.get_by_title("done").count() == 7
-    page.get_by_role("link", name="Build your own").click()
+    # A finished chapter is shown with its answer again, until it is begun anew.
+    for name, (_, _, answer) in CHAPTERS.items():
+        page.goto(f"{lesson}?learn={name}")
+        found.wait_for()
+        told = page.locator(".voice").inner_text()
+        assert f"It is {answer or answers[name]}." in told and "You predicted" in told, name
+        assert page.get_by_title("done").count() == 7
+    page.get_by_role("button", name="Predict again").click()
+    page.get_by_role("button", name="That is my prediction").wait_for()
+    assert page.get_by_title("done").count() == 6
+    page.get_by_role("navigation").get_by_role("link", name="Build your own").click()
     page.get_by_role("radio", name="Gravity").wait_for()
 
 
 def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_drawn(
     opening, lesson
 ):
-    page = opening("?learn=groove", 390, 844, at=lesson)
+    page = opening("?learn=groove", 390, 844, first=True, at=lesson)
     page.locator("article strong").wait_for()
     predict(page, 30)
     assert page.locator("path.exact").get_attribute("d") == ""
@@ -106,3 +116,34 @@ def test_back_goes_through_chapters_and_a_frame_shows_one_alone(opening, lesson)
     alone.locator("article strong").wait_for()
     assert not alone.get_by_role("button", name="Next").is_visible()
     assert alone.get_by_role("navigation").filter(visible=True).count() == 0
+
+
+def test_any_of_four_hundred_disks_lines_is_dragged_and_the_marked_one_goes_on_from_there(
+    opening, lesson
+):
+    page = opening("?learn=four-hundred", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    predict(page)
+    page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
+    contact, x, y = chain(page)
+    assert contact != scene(page, "scene.selected")
+    before = dot(page).get_attribute("aria-valuenow")
+    width = f"scene.style.width[{contact}]"
+    thick = scene(page, width)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 90, steps=3)
+    page.get_by_text("this line: ").wait_for()
+    until(page, f"{width} > {1.05 * thick}")
+    page.mouse.up()
+    thick = scene(page, width)
+    assert page.get_by_text("this line: ").filter(visible=True).count() == 0
+    marked = dot(page).get_attribute("aria-valuenow")
+    assert marked != before
+    dot(page).focus()
+    page.keyboard.press("ArrowRight")  # by a step of a tenth
+    page.wait_for_function(
+        "([now, marked]) => Number(now.getAttribute('aria-valuenow')) > marked + 0.05",
+        arg=[dot(page).element_handle(), float(marked)],
+    )
+    assert scene(page, width) > 0.9 * thick
