@@ -8,7 +8,7 @@ import { Push } from "./experiments/push.js"
 import { SceneExperiment } from "./experiments/scene_experiment.js"
 
 const two = (v) => v.toFixed(2)
-const percent = (v) => `${Math.round(100 * v)} %`
+const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
 // Without walls: further rows of the count.
 const PRESSED = [
@@ -47,7 +47,7 @@ export const CHAPTERS = [
   },
   {
     name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
-    text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The plot shows it over two of the forces, green and violet.`,
+    text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The axes of the plot are two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
     doing: "Drag the dot to the right as far as it goes. Its path paints S.",
     see: ({ high, weight, mu }) => [
@@ -99,14 +99,14 @@ export const CHAPTERS = [
   },
   {
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
-    text: ({ all }) => `${all} disks run through their random networks at μ = 0.1; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
+    text: ({ all, mu }) => `The forces of ${all} disks at μ = ${mu} walk at random through S, all sets of forces that hold the disks; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
     ask: "At which friction μ do the forces vary most?",
     doing: "Drag the dot along the axis. At each stop it shows the mean over several packings made with that friction.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
         `At small μ many numbers are free, but friction leaves each little room: at μ = ${first.mu}, ${first.free} are free and forces vary by ${percent(first.spread)}. At large μ contacts vanish, and free numbers with them: ${most.free} are left at μ = ${most.mu}, ${last.free} at μ = ${last.mu}.`,
-        `So more friction does not mean more freedom: S, all sets of forces that hold the disks, first grows wider and then loses its dimensions.`,
+        `So more friction does not mean more freedom: S first grows wider and then loses its dimensions.`,
       ]
     },
     count: ({ rows }) => ({
@@ -118,11 +118,11 @@ export const CHAPTERS = [
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu, carried }) => `The same packing at μ = ${mu}. The two disks of the marked line, which press on each other with ${two(carried)} times the mean force, are pushed apart. The other forces change to carry the push, as long as they can.`,
+    text: ({ mu }) => `The same packing at μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change to carry the push, as long as they can.`,
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right: the arrows grow.",
-    see: ({ high, limit, opened, slid }) => [
-      `Then ${opened} contacts open, ${slid} slip, and disks start to move. The motion is drawn enlarged: the fastest disk moves by one mean radius.`,
+    see: ({ high, limit, opened, slid, carried }) => [
+      `Before, the two disks pressed on each other with ${two(carried)}. Now ${opened} contacts open, ${slid} slip, and disks start to move. The motion is drawn enlarged, again and again: the fastest disk moves by one mean radius.`,
       `Up to a push of ${two(limit)}, S, all sets of forces that hold the disks, is not empty. But the packing gives way at ${two(high)}: its actual forces decide, and no picture of the disks shows them. That is why it matters how undetermined they are.`,
     ],
     count: null,

@@ -108,7 +108,9 @@ class Lesson {
     const { pathname } = window.location, { scene } = chapter.options
     const onwards = last ? `<a href="?scene=own">Build your own</a> <a href="${pathname}">Explore 400 disks</a>` : scene ? `<a href="?scene=${scene}">More with these disks</a>` : ""
     const after = createElement("p", { className: "after", innerHTML: onwards })
-    this.main.replaceChildren(heading, text, pictures, voice, row, after)
+    const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
+    foot.append(voice, row)
+    this.main.replaceChildren(heading, text, pictures, foot, after)
     return { text, pictures, picture, plot, voice, row }
   }
 

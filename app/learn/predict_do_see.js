@@ -77,7 +77,8 @@ export class PredictDoSee {
   /** Update everything from the experiment. */
   show() {
     const { experiment, stage, prediction } = this, { picture } = experiment
-    if (stage === 2 && !this.told) this.kept({ prediction, done: (this.told = true) })
+    const news = stage === 2 && !this.told
+    if (news) this.kept({ prediction, done: (this.told = true) })
     const words = picture.words ?? `now ${this.named(experiment.value)}`
     const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
     const answer = stage === 2 ? { value: experiment.answer, words: this.named(experiment.answer) } : null
@@ -89,6 +90,16 @@ export class PredictDoSee {
     this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
+    if (news) this.reveal()
+  }
+
+  /** Scroll to the answer, unless it is in view, once the hand lets go. */
+  reveal() {
+    const once = new AbortController(), behavior = window.matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth"
+    for (const end of ["pointerup", "keyup"]) window.addEventListener(end, () => {
+      once.abort()
+      this.voice.querySelector(".verdict")?.scrollIntoView({ block: "nearest", behavior })
+    }, { signal: once.signal })
   }
 
   /** The only line of text: the instruction, or the result. */

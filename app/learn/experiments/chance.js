@@ -38,7 +38,7 @@ export class Chance extends PackingExperiment {
     const { packing: { least, largest, low, high, states }, contact, found, count } = this
     const rows = this.drawn.filter(({ number }) => number && number <= count)
     return {
-      now: [this.now.value, count], words: `${count}`,
+      now: [this.now.value, count], words: `network ${count}`,
       exact: [rectangle(least[contact], largest[contact], states)], filled: true,
       seen: found ? [[[low[contact], states], [high[contact], states]]] : [], brush: 8,
       dots: rows.map(({ value, number }) => [value, number]),

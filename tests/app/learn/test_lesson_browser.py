@@ -30,6 +30,12 @@ def dot(page):
     return page.locator("figure").get_by_role("slider").nth(1)
 
 
+def in_view(part):
+    """Whether a part of a page of 844 px is on screen as it is scrolled."""
+    box = part.bounding_box()
+    return box["y"] >= 0 and box["y"] + box["height"] <= 844
+
+
 def predict(page, steps=20):
     """Put the marker by keys, and let the prediction stand."""
     marker = page.get_by_role("slider", name="your prediction")
@@ -84,6 +90,7 @@ def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_d
 ):
     page = opening("?learn=groove", 390, 844, first=True, at=lesson)
     page.locator("article strong").wait_for()
+    assert in_view(page.get_by_role("button", name="That is my prediction"))
     predict(page, 30)
     assert page.locator("path.exact").get_attribute("d") == ""
     circle = dot(page).locator("circle")
@@ -92,12 +99,18 @@ def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_d
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()
+    assert in_view(page.get_by_text("Drag the dot"))
     page.mouse.move(x + 30, y, steps=4)
     assert page.locator("path.visited").get_attribute("d") != ""
     assert page.locator("path.exact").get_attribute("d") == ""
     page.mouse.move(x + 300, y, steps=4)
     page.mouse.up()
-    page.get_by_text("It is 1.41.").wait_for()
+    verdict = page.get_by_text("It is 1.41.")
+    verdict.wait_for()
+    page.wait_for_function(
+        "(told) => told.getBoundingClientRect().bottom < 844", arg=verdict.element_handle()
+    )
+    assert in_view(page.get_by_role("button", name="Next"))
     assert page.locator("path.exact").get_attribute("d") != ""
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
