@@ -4,7 +4,7 @@
 import { distance, dot, solve } from "../model/polytope.js"
 import { Easel } from "./layered_canvas.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
-import { circle, line, polygon } from "../../browser/canvas_paths.js"
+import { circle, line, polygon, unflat } from "../../browser/canvas_paths.js"
 import { drawName, readBy } from "./axis_readings.js"
 import { drawShadow } from "./shadow.js"
 import { drawInterval, drawSolid } from "./solid.js"
@@ -345,10 +345,7 @@ export class Space {
     return true
   }
 
-  corners() {
-    const { points } = this.outline
-    return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]])
-  }
+  corners() { return unflat(this.outline.points) ?? [] }
 
   // Dragging
 

@@ -1,6 +1,7 @@
 // Chapters of small scenes: the disks with their forces, and the explored part of S over one or two
 // forces.
 
+import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { Body } from "../model/polytope.js"
 import { middleOf } from "../model/middle.js"
@@ -29,7 +30,7 @@ export class SceneExperiment {
     }
     this.start = this.at
     if (this.body.whole) this.end(this.body.interval(this.options.x), this.corners)
-    else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], pairs([...outline])))
+    else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], unflat([...outline])))
   }
 
   /** Whether the answer can be found: if S is not drawn whole, only the server knows it. */
@@ -57,11 +58,10 @@ export class SceneExperiment {
   /** Numbers that the text needs. */
   get facts() {
     const { scene, body } = this
-    const named = (c) => scene.names[c]
-    const F = body.forces(), weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
+    const weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
     return {
       contacts: body.count, disks: scene.r.length, equations: scene.equations, free: body.h, mu: scene.mu,
-      low: this.low, high: this.high, weight, start: this.start[0], name: named(this.options.x / 2), force: F[this.options.x],
+      low: this.low, high: this.high, weight, start: this.start[0],
     }
   }
 
@@ -124,6 +124,3 @@ export class SceneExperiment {
 
   stop() { /* nothing moves by itself */ }
 }
-
-/** Pairs of consecutive numbers. */
-const pairs = (flat) => Array.from({ length: flat.length / 2 }, (_, k) => [flat[2 * k], flat[2 * k + 1]])
