@@ -7,7 +7,7 @@ from ..results.library import Cell
 from ..results.selection import Selection
 from ..state.app_state import AppState
 from ..state.view_settings import WIDTHS
-from .view import colour_bar, colour_words
+from .view import colour_bar, colour_words, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
 NAMED = 4  # known forces in a caption
@@ -23,7 +23,8 @@ def caption(state: AppState) -> dict[str, Any]:
         "ink": contrast,
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
-            f"Width: {WIDTHS[looks.thickness]}; colour: {colour_words(looks, pulled)}.",
+            f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
+            f"colour: {colour_words(state, pulled)}.",
             origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",

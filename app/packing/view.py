@@ -260,9 +260,15 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     }[looks.colour]
 
 
-def colour_words(looks: Looks, pulled: bool) -> str:
+def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
+    """Labels {name: words}, COLOURS or WIDTHS; those of intervals say whether they are exact."""
+    exact = exact_intervals(state.possible, state.shown)
+    return labels | {"extent": f"{labels['extent']}, {'exact' if exact else 'seen'}"}
+
+
+def colour_words(state: AppState, pulled: bool) -> str:
     """The present meaning of colours."""
-    return "change by the pull" if pulled else COLOURS[looks.colour]
+    return "change by the pull" if pulled else quantities(state, COLOURS)[state.looks.colour]
 
 
 def _full(looks: Looks, most: float) -> str:
@@ -290,7 +296,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
-    meaning = colour_words(looks, pulled)
+    meaning = colour_words(state, pulled)
     if pulled and looks.tab == "perturb" and not state.hand.pulls:
         meaning = "change by the push"
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
@@ -325,7 +331,8 @@ def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, 
 
 def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     """A list of the quantities that lines can show, as HTML; the player handles the choice."""
-    value, available = getattr(state.looks, name), meaningful(state, labels, name)
+    value = getattr(state.looks, name)
+    available = meaningful(state, quantities(state, labels), name)
     options = "".join(
         f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
         for key, words in available.items()

@@ -126,6 +126,7 @@ def test_hovering_tells_grain_and_contact(page):
     tip.wait_for()
     assert str(scene(page, f"scene.geometry.backbone[{contact}]")) in tip.inner_text()
     assert "normal force fₙ, mean = 1" in tip.inner_text()
+    assert "interval of fₙ, seen" in tip.inner_text()
     grain, x, y, r = scene(
         page,
         "(k => ['grain', 'x', 'y', 'r'].map(name => scene.geometry[name][k]))"

@@ -755,6 +755,9 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     assert all(offered("sign", "difference")) and not any(offered("known"))
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
     assert all(offered("known"))
+    assert ">interval ΔFₙ, seen</option>" in player.legend
+    wait_for(state)
+    assert ">interval ΔFₙ, exact</option>" in player.legend  # the colours are of the exact ones now
     player.colour = "known"  # chosen in the legend
     assert state.looks.colour == "known"
     state.knowledge.release(3)
