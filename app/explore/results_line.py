@@ -69,7 +69,7 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
-    heading = f"seen in {state.replay.summary['states']} networks"
+    heading = f"seen in all {state.replay.summary['states']} networks"
     if sampling and sampling.verdict:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]
@@ -129,5 +129,8 @@ def left_out(summary: Summary) -> str:
             f"{summary['unconverged']} not finished."
         )
     if summary["kept"] < summary["states"]:
-        line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} networks."
+        line += (
+            f" Played: {summary['kept']} of the {summary['states']} networks, evenly spaced; ± and "
+            f"R̂ are from these {summary['kept']}, the values from all {summary['states']}."
+        )
     return line

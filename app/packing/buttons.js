@@ -57,10 +57,10 @@ const BUTTONS = `
     <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span class="running">
-      <span>of the <b class="played"></b> shown so far:</span>
-      <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
-      <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
-      <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
+      <span>of the <b class="played"></b> stored networks played so far:</span>
+      <span tabindex="0" data-term="eta1">η₁ <b class="eta1"></b></span>
+      <span tabindex="0" data-term="eta2">η₂ <b class="eta2"></b></span>
+      <span tabindex="0" data-term="eta3">0.15 η₃ <b class="eta3"></b></span>
     </span>
   </div>
   <div class="game">Made: <span class="source"></span></div>
@@ -166,8 +166,8 @@ export class Buttons {
       apart: `${Math.round(100 * replay.apart)} %`,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
-      eta3: form(walk.eta3[seen], 3),
-      played: seen,
+      eta3: form(0.15 * walk.eta3[seen], 3),
+      played: `${seen} of ${walk.number.length - 1}`,
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text

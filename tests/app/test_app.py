@@ -207,7 +207,7 @@ def test_frames_beyond_the_budget_are_left_out_and_counted(library):
     whole = replays.make_replay(packing, dataset, cell.mu)
     short = replays.make_replay(packing, dataset, cell.mu, 8 * 5 * whole.normal.shape[1])
     assert len(short.number) == 6 and short.summary["kept"] == 5
-    assert "Shown: 5 evenly spaced of 30" in left_out(short.summary)
+    assert "Played: 5 of the 30 networks" in left_out(short.summary)
     among = np.searchsorted(whole.number, short.number)
     np.testing.assert_array_equal(whole.normal[among], short.normal)
 
@@ -1334,7 +1334,7 @@ def test_left_out_work_is_counted(library):
     text = left_out(replay_at(library, 0).summary)
     assert "forces along contacts" in text and f"{STATES} <span" in text
     assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
-    assert f"Shown: {KEPT}" in text
+    assert f"Played: {KEPT}" in text
 
 
 def test_every_relaxation_has_a_name_on_screen():
