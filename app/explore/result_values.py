@@ -67,12 +67,12 @@ def measures(state: AppState) -> list[Quantity]:
 
 def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]:
     """z, φ, h and ln V of the packing on screen, exact; volume: from `compute.volume`."""
-    if state.replay is None:
+    if state.shown is None:
         return []
-    summary = state.replay.summary
+    summary = state.shown.summary
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
     h, phi = summary["dimension"], summary["packing_fraction"]
-    each = worded(state.replay, "contacts per disk")
+    each = worded(state.shown, "contacts per disk")
     values = (
         ""
         if volume is None

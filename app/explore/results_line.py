@@ -34,7 +34,8 @@ class Results(Scripted):
         self._state, self._work = state, state.work
         self._volume: xr.Dataset | None = None
         state.param.watch(self._look, "replay")
-        state.param.watch(self._tell, "exact")
+        state.param.watch(self._tell, ["exact", "shown", "missing"])
+        state.work.computation.param.watch(self._tell, "running")
         state.knowledge.param.watch(self._tell, "narrowed")
         self._work.measuring.param.watch(self._tell, "running")
         self._look()
@@ -65,7 +66,12 @@ class Results(Scripted):
 
 
 def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
-    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume."""
+    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume.
+
+    While other states are being computed, dashes, except for what is known of their packing.
+    """
+    if state.missing and state.work.computation.running:
+        return coming(state)
     known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
@@ -86,6 +92,18 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
         + _table(_titles(packing), [values])
         + doubt
         + left
+    )
+
+
+def coming(state: AppState) -> str:
+    """The tables while the requested states are being computed."""
+    measures, packing = result_values.measures(state), result_values.packing(state)
+    found = [one.exact if state.growing and one.exact else "–" for one in packing]
+    rows = [[words, *"–" * len(measures)] for words in ("seen: being computed", "exact")]
+    return (
+        _table(["How undetermined", *_titles(measures)], rows)
+        + _table(_titles(packing), [found])
+        + '<p class="left">The numbers of the new packing follow.</p>'
     )
 
 

@@ -470,9 +470,12 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
 def test_a_tap_on_a_point_opens_such_a_packing_or_computes_it(state):
     view = friction_tab(state)
     points = view.indeterminacy.etas.points[1].data_source
+    rings = []
+    state.param.watch(lambda event: rings.extend(view.indeterminacy.etas.here.data["x"]), "replay")
     points.selected.indices = [list(points.data["x"]).index(1)]
     wait_for(state, lambda: list(view.indeterminacy.etas.here.data["x"]) == [1, 1, 1])
     assert state.cell.mu == 1 and not state.missing  # the store has it
+    assert not rings  # the old ring was removed as the new packing appeared
     points.selected.indices = [list(points.data["x"]).index(0.3)]
     assert state.selection.mu == 0.3 and state.work.computation.running
     state.work.cancel()

@@ -76,6 +76,7 @@ class View(TabView):
         if same and state.plane is not None:
             return
         if self.shown is None or self.shown[0] is not replay:
+            self._clear()
             self.others.look()
         self.shown = request
         self.task.cancel()
