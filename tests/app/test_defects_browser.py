@@ -211,6 +211,16 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
     assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
+    # Neither a look at Learn nor its link back loses the packing and the view.
+    page.get_by_role("tab", name="Friction").click()
+    searched(page, "tab=statistics")
+    for back in (page.go_back, page.get_by_role("link", name="Explore", exact=True).click):
+        page.get_by_role("link", name="Learn", exact=True).first.click()
+        page.get_by_role("heading", name="How hard does the wall press?").first.wait_for()
+        back()
+        page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
+        page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
+        searched(page, "packing=")
 
 
 # 6: Keys
