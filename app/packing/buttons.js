@@ -41,7 +41,7 @@ const BUTTONS = `
       <span class="hold-tools">
         ${button("hold", "hold the selected contact at its present force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
-          <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
+          <input class="uncertainty" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
       </span>
     </div>
   </div>
@@ -96,7 +96,7 @@ export class Buttons {
     })
     const extras = this.part("extras")
     extras.addEventListener("toggle", () => open("check", extras.open))
-    this.part("error").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
+    this.part("uncertainty").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
   }
 
   remove() { this.keyboard.remove() }
@@ -105,7 +105,7 @@ export class Buttons {
 
   /** Error bar of a held force, in ⟨fₙ⟩; NaN for invalid input. */
   get error() {
-    const typed = this.part("error").valueAsNumber
+    const typed = this.part("uncertainty").valueAsNumber
     return typed >= 0 ? typed : NaN
   }
 

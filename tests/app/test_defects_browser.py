@@ -1,5 +1,7 @@
 """What visitors stumbled over, one test each: the page answers, and says what is so."""
 
+import re
+
 import numpy as np
 import pytest
 from serving import (
@@ -144,14 +146,23 @@ def test_a_mark_of_the_slider_is_chosen_by_a_click(page):
     shows(page, 1)
 
 
+def rgb(locator, name):
+    """Red, green, blue and, unless it is 1, opacity of a colour of an element."""
+    colour = locator.evaluate("(e, name) => getComputedStyle(e)[name]", name)
+    return [float(part) for part in re.findall(r"[\d.]+", colour)]
+
+
 def test_an_error_bar_below_0_holds_nothing(visit):
     page = visit()
     page.keyboard.press("n")
-    page.locator("input.error").fill("-1")
+    field = page.locator("input.uncertainty")
+    ink, paper = (rgb(field, name) for name in ("color", "backgroundColor"))
+    assert paper[3:] == [0] and min(ink) > 200  # light, on the dark ground of the tools
+    field.fill("-1")
     page.locator("button.hold").click()
     page.locator(".message").get_by_text("Enter an error bar of 0 or more").wait_for()
     assert "hold=" not in page.url
-    page.locator("input.error").fill("0.1")
+    page.locator("input.uncertainty").fill("0.1")
     page.locator("button.hold").click()
     searched(page, "hold=")
 

@@ -43,7 +43,7 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     assert cells[4] == cells[5] == cells[2] and cells[6] == "0.000"  # held: no interval is left
     assert float(cells[9]) > 0 and cells[10] == "held"
     select(page, 9)
-    page.locator("input.error").fill("0.2")
+    page.locator("input.uncertainty").fill("0.2")
     page.locator("button.hold").click()
     chips(page, 2)
     picture(page, "known/held")
