@@ -36,7 +36,7 @@ class Results(Scripted):
         state.param.watch(self._look, "replay")
         state.param.watch(self._tell, ["exact", "shown", "missing"])
         state.work.computation.param.watch(self._tell, "running")
-        state.knowledge.param.watch(self._tell, "narrowed")
+        state.knowledge.param.watch(self._tell, ["known", "narrowed"])
         self._work.measuring.param.watch(self._tell, "running")
         self._look()
 
@@ -79,7 +79,9 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     if sampling and sampling.verdict:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]
-    if any(one.exact for one in measures):
+    if known and state.knowledge.whole is None:
+        rows.append([f"exact{known}: being computed", *"–" * len(measures)])
+    elif any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
     values = [one.exact or (MEASURE if offered else "–") for one in packing]

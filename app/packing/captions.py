@@ -37,13 +37,13 @@ def origin(cell: Cell) -> str:
     return f"μ = {cell.mu:g}, {cell.series}"
 
 
-def known_words(state: AppState) -> Iterator[str]:
-    """The known forces as a line of a caption, or nothing."""
+def known_words(state: AppState, most: int = NAMED) -> Iterator[str]:
+    """The held forces as a line of a caption, or nothing; most: how many are named."""
     number = state.replay.backbone
     statements = [one.words(number[one.contact]) for one in state.knowledge.known]
     if statements:
-        more = f" and {len(statements) - NAMED} more" if len(statements) > NAMED else ""
-        yield f"Known: {'; '.join(statements[:NAMED])}{more}."
+        more = f" and {len(statements) - most} more" if len(statements) > most else ""
+        yield f"Held: {'; '.join(statements[:most])}{more}."
 
 
 def stem(selection: Selection) -> str:

@@ -582,7 +582,7 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
     wait_for(state)
     head, held = table()
     number, after = state.replay.backbone[4], state.knowledge.narrowed.after
-    assert f"Known: contact {number}: fₙ = " in head and "exact given these held forces" in head
+    assert f"Held: contact {number}: fₙ = " in head and "exact given these held forces" in head
     assert list(np.flatnonzero(held["known"])) == [4] and f"hold={number}%3A" in head
     scale = state.replay.force_scale
     for name in ("low", "high"):
@@ -591,6 +591,15 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
         unheld = held[f"f_n_{name}_without_known [mean]"]
         np.testing.assert_allclose(unheld, free[f"f_n_{name} [mean]"], atol=1e-6)
     assert np.ptp([held["f_n_low [mean]"][4], held["f_n_high [mean]"][4]]) < 1e-3
+    state.looks.frame = int(
+        np.argmax(np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4]))
+    )
+    head, played = table()  # of another network, in which this force is another one
+    force = played["f_n [mean]"]
+    assert "moved to the nearest network with the held forces" in head
+    assert abs(force[4] - state.replay.normal[state.looks.frame, 4]) > 0.01
+    assert np.all(force >= played["f_n_low [mean]"] - 1e-3)
+    assert np.all(force <= played["f_n_high [mean]"] + 1e-3)
 
 
 def test_unknown_keys_are_ignored(state):
