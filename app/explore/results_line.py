@@ -85,9 +85,8 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
     values = [one.exact or (MEASURE if offered else "–") for one in packing]
-    doubt = (
-        f'<p class="flag" role="note">⚠ {sampling.doubt}</p>' if sampling and sampling.doubt else ""
-    )
+    doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
+    doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
     return (
         _table(["How undetermined", *_titles(measures)], rows)

@@ -25,6 +25,7 @@ from app.browser.messages import TO_BROWSER, listed
 from app.explore import results_line
 from app.explore.controls import Controls
 from app.explore.result_values import between
+from app.explore.results_line import Results
 from app.explore.tabs.export import export as export_view
 from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
@@ -202,6 +203,17 @@ def test_disks_without_a_box_ask_for_it(state):
     press(view.read)
     wait_for(state, lambda: "disks.csv" in view.report.object)
     assert not view.waiting.visible and not view.box.error_state
+
+
+def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
+    """A row of disks that touches its images, in a box with room above."""
+    view, results = upload_view.View(state), Results(state)
+    assert "bears no" not in results.html
+    view._dropped([("row.csv", b"x,y,r\n0.5,0.5,0.5\n1.5,0.5,0.5\n2.5,0.5,0.5\n")])
+    view.box.value = "3, 30"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported)
+    assert "bears no vertical stress" in results.html
 
 
 @pytest.mark.parametrize("contacts", [False, True])
@@ -591,9 +603,8 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
         unheld = held[f"f_n_{name}_without_known [mean]"]
         np.testing.assert_allclose(unheld, free[f"f_n_{name} [mean]"], atol=1e-6)
     assert np.ptp([held["f_n_low [mean]"][4], held["f_n_high [mean]"][4]]) < 1e-3
-    state.looks.frame = int(
-        np.argmax(np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4]))
-    )
+    away = np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4])
+    state.looks.frame = int(np.argmax(away))
     head, played = table()  # of another network, in which this force is another one
     force = played["f_n [mean]"]
     assert "moved to the nearest network with the held forces" in head
