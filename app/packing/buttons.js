@@ -45,9 +45,8 @@ const BUTTONS = `
       </span>
     </div>
   </div>
-  <div class="read"><span class="message"></span></div>
   <div class="legend"></div>
-  <details class="extras"><summary>Compare and check</summary>
+  <div class="foot"><details class="extras"><summary>Compare and check</summary>
   <div class="game">
     ${button("pin", "pin this network, to compare others with it", "Pin")}
     ${button("between", "between the pinned network and this one", "To and fro")}
@@ -65,7 +64,7 @@ const BUTTONS = `
   </div>
   <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
-  </details>`
+  </details><div class="message" role="status"></div></div>`
 const CLOSER = 0.7 // zoom factor of a button
 
 export class Buttons {
@@ -131,7 +130,10 @@ export class Buttons {
   tellOpen(names) { this.part("extras").open = names.includes("check") }
 
   /** One line below the player; empty: no line. */
-  say(words) { this.part("message").textContent = words }
+  say(words) {
+    const message = this.part("message")
+    message.textContent = message.title = words
+  }
 
   /** A message over the old picture about a request in progress; empty: no message. */
   showRequested(words) {

@@ -94,7 +94,7 @@ export class PlayerBar {
   /** Show the present position. */
   show(replay) {
     this.scrub.value = replay.position
-    this.place.textContent = replay.place
+    this.place.textContent = this.place.title = replay.place
     if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
   }
 }

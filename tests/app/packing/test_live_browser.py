@@ -492,7 +492,15 @@ def test_the_packing_is_seen_whole_below_its_controls(visit, width):
     page.get_by_label("logarithm of μ").wait_for()
     at_rest(page.locator(".scene").first)
     assert inside(page, ".scene") and inside(page, ".friction")
-    if width > 900:  # everything is on one screen
+    if width > 900:  # everything is on one screen, and keeps its size when lines come and go
+        before = at_rest(page.locator(".scene").first)
+        for key in ("n", "Enter"):
+            page.keyboard.press(key)
+            page.locator(".message", has_text="contact").wait_for()
+        page.locator(".legend select").first.select_option("extent")
+        ask(page, "none")
+        page.get_by_role("alert").filter(has_text="none").wait_for()
+        assert at_rest(page.locator(".scene").first) == before
         for part in ("button.play", ".legend", ".results", ".line"):
             assert inside(page, part), part
 
