@@ -199,7 +199,9 @@ TERMS = {
         "selected by the covariance of forces over uniform states, then ranked by exact bounds.",
     ),
     "seen": Term(
-        "seen", "The forces in the networks shown so far: always within the possible range."
+        "seen",
+        "The interval of a contact's force over all random networks of the walk or sample, played "
+        "or not: always within the exact one.",
     ),
     "now": Term("now", "The network on screen."),
     "rattler": Term(

@@ -51,6 +51,11 @@ GRID = {
     "@media (max-width: 599.95px)": {
         "& .controls, & .side, & .space, & .panels, & .results": {"padding": "6px 12px"},
     },
+    # Instead of plots that would belong to another packing; see player.js.
+    "& .panels::before": {
+        "content": "var(--waiting, none)", "position": "absolute", "top": "64px", "left": "24px",
+        "color": "var(--quiet)",
+    },
     "& .status.urgent": {"position": "sticky", "bottom": 0, "zIndex": 5},
     "@media (min-width: 900px)": {
         "& .main-content": {

@@ -3,6 +3,7 @@
 
 import { ask } from "../browser/send.js"
 import { goneBanner } from "../browser/connection_lost.js"
+import { keepView } from "../browser/local_storage.js"
 
 export function render({ model, view }) {
   const banner = goneBanner(view, "Everything already loaded still plays.")
@@ -19,6 +20,7 @@ export function render({ model, view }) {
   function write() {
     const { query } = model
     if (!query || waits()) return
+    keepView(query) // for the link in Learn
     const put = (how, view) => window.history[how](null, "", view)
     // An address without a view gets the first one, even if the visitor has already selected another.
     if (!new URLSearchParams(window.location.search).has("mu")) put("replaceState", model.first)

@@ -17,6 +17,7 @@ from ..results.selection import SOLVERS, Selection
 from ..state.app_state import AppState
 from ..widgets.hints import term
 
+UNBORNE = 1e-6  # ratio of two normal stresses below which the smaller one counts as none
 LEAST_SIZE = 100  # effective size of a uniform sample below which its errors are large
 
 
@@ -67,12 +68,12 @@ def measures(state: AppState) -> list[Quantity]:
 
 def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]:
     """z, φ, h and ln V of the packing on screen, exact; volume: from `compute.volume`."""
-    if state.replay is None:
+    if state.shown is None:
         return []
-    summary = state.replay.summary
+    summary = state.shown.summary
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
     h, phi = summary["dimension"], summary["packing_fraction"]
-    each = worded(state.replay, "contacts per disk")
+    each = worded(state.shown, "contacts per disk")
     values = (
         ""
         if volume is None
@@ -155,6 +156,24 @@ def _mean_extent(possible: xr.Dataset | None) -> str:
         return ""
     extent = (possible["high"] - possible["low"]).values[:, 0] / possible["force_scale"].item()
     return short(float(extent.mean()))
+
+
+def unborne(replay: Replay) -> str:
+    """A warning if the packing bears no stress along a closed direction; empty if it does."""
+    links, first = replay.links, np.unique(replay.links.contact, return_index=True)[1]
+    branch = np.stack([links.x1 - links.x0, links.y1 - links.y0])[:, first]
+    normal = branch / np.hypot(*branch)
+    tangent = np.stack([-normal[1], normal[0]])
+    force = replay.normal[0] * normal + replay.tangential[0] * tangent
+    stress = (force * branch).sum(axis=1)
+    small = np.isfinite(replay.box) & (np.abs(stress) < UNBORNE * np.abs(stress).max(initial=0.0))
+    if replay.outlines or not small.any():
+        return ""
+    missing, other = ("horizontal", "vertical") if small[0] else ("vertical", "horizontal")
+    return (
+        f"This packing bears no {missing} stress, only {other}: nothing holds it together "
+        f"{'sideways' if small[0] else 'from above and below'}."
+    )
 
 
 def with_error(value: float, error: float) -> str:

@@ -34,8 +34,9 @@ class Results(Scripted):
         self._state, self._work = state, state.work
         self._volume: xr.Dataset | None = None
         state.param.watch(self._look, "replay")
-        state.param.watch(self._tell, "exact")
-        state.knowledge.param.watch(self._tell, "narrowed")
+        state.param.watch(self._tell, ["exact", "shown", "missing"])
+        state.work.computation.param.watch(self._tell, "running")
+        state.knowledge.param.watch(self._tell, ["known", "narrowed"])
         self._work.measuring.param.watch(self._tell, "running")
         self._look()
 
@@ -65,27 +66,45 @@ class Results(Scripted):
 
 
 def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
-    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume."""
+    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume.
+
+    While other states are being computed, dashes, except for what is known of their packing.
+    """
+    if state.missing and state.work.computation.running:
+        return coming(state)
     known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
-    heading = f"seen in {state.replay.summary['states']} networks"
+    heading = f"seen in all {state.replay.summary['states']} networks"
     if sampling and sampling.verdict:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]
-    if any(one.exact for one in measures):
+    if known and state.knowledge.whole is None:
+        rows.append([f"exact{known}: being computed", *"–" * len(measures)])
+    elif any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
     values = [one.exact or (MEASURE if offered else "–") for one in packing]
-    doubt = (
-        f'<p class="flag" role="note">⚠ {sampling.doubt}</p>' if sampling and sampling.doubt else ""
-    )
+    doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
+    doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
     return (
         _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [values])
         + doubt
         + left
+    )
+
+
+def coming(state: AppState) -> str:
+    """The tables while the requested states are being computed."""
+    measures, packing = result_values.measures(state), result_values.packing(state)
+    found = [one.exact if state.growing and one.exact else "–" for one in packing]
+    rows = [[words, *"–" * len(measures)] for words in ("seen: being computed", "exact")]
+    return (
+        _table(["How undetermined", *_titles(measures)], rows)
+        + _table(_titles(packing), [found])
+        + '<p class="left">The numbers of the new packing follow.</p>'
     )
 
 
@@ -129,5 +148,8 @@ def left_out(summary: Summary) -> str:
             f"{summary['unconverged']} not finished."
         )
     if summary["kept"] < summary["states"]:
-        line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} networks."
+        line += (
+            f" Played: {summary['kept']} of the {summary['states']} networks, evenly spaced; ± and "
+            f"R̂ are from these {summary['kept']}, the values from all {summary['states']}."
+        )
     return line

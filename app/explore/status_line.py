@@ -33,6 +33,7 @@ class StatusLine(Scripted):
         self._rest: tuple[Cell, bool] | None = None  # whether it was tested
         self._looking = work.task(reading, reported=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
+        work.computation.param.watch(self._tell, "running")
         state.param.watch(self._look, "cell")
         work.param.watch(self._report, ["message", "progress"])
         self._look()
@@ -79,7 +80,7 @@ def facts(state: AppState) -> Iterator[str]:
     if cell is None or replay is None:
         yield "opening the packing …"
         return
-    if state.missing:
+    if state.missing and not state.work.computation.running:
         yield f"<b>Still showing μ = {cell.mu:g}, {cell.series}: the requested results follow</b>"
     yield bounds(state)
     yield str(result_values.sampling(state))

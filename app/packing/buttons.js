@@ -41,13 +41,12 @@ const BUTTONS = `
       <span class="hold-tools">
         ${button("hold", "hold the selected contact at its present force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
-          <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
+          <input class="uncertainty" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
       </span>
     </div>
   </div>
-  <div class="read"><span class="message"></span></div>
   <div class="legend"></div>
-  <details class="extras"><summary>Compare and check</summary>
+  <div class="foot"><details class="extras"><summary>Compare and check</summary>
   <div class="game">
     ${button("pin", "pin this network, to compare others with it", "Pin")}
     ${button("between", "between the pinned network and this one", "To and fro")}
@@ -57,15 +56,15 @@ const BUTTONS = `
     <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span class="running">
-      <span>of the <b class="played"></b> shown so far:</span>
-      <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
-      <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
-      <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
+      <span>of the <b class="played"></b> stored networks played so far:</span>
+      <span tabindex="0" data-term="eta1">η₁ <b class="eta1"></b></span>
+      <span tabindex="0" data-term="eta2">η₂ <b class="eta2"></b></span>
+      <span tabindex="0" data-term="eta3">0.15 η₃ <b class="eta3"></b></span>
     </span>
   </div>
   <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
-  </details>`
+  </details><div class="message" role="status"></div></div>`
 const CLOSER = 0.7 // zoom factor of a button
 
 export class Buttons {
@@ -96,7 +95,7 @@ export class Buttons {
     })
     const extras = this.part("extras")
     extras.addEventListener("toggle", () => open("check", extras.open))
-    this.part("error").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
+    this.part("uncertainty").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
   }
 
   remove() { this.keyboard.remove() }
@@ -105,7 +104,7 @@ export class Buttons {
 
   /** Error bar of a held force, in ⟨fₙ⟩; NaN for invalid input. */
   get error() {
-    const typed = this.part("error").valueAsNumber
+    const typed = this.part("uncertainty").valueAsNumber
     return typed >= 0 ? typed : NaN
   }
 
@@ -131,7 +130,10 @@ export class Buttons {
   tellOpen(names) { this.part("extras").open = names.includes("check") }
 
   /** One line below the player; empty: no line. */
-  say(words) { this.part("message").textContent = words }
+  say(words) {
+    const message = this.part("message")
+    message.textContent = message.title = words
+  }
 
   /** A message over the old picture about a request in progress; empty: no message. */
   showRequested(words) {
@@ -166,8 +168,8 @@ export class Buttons {
       apart: `${Math.round(100 * replay.apart)} %`,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
-      eta3: form(walk.eta3[seen], 3),
-      played: seen,
+      eta3: form(0.15 * walk.eta3[seen], 3),
+      played: `${seen} of ${walk.number.length - 1}`,
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text

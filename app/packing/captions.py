@@ -7,7 +7,7 @@ from ..results.library import Cell
 from ..results.selection import Selection
 from ..state.app_state import AppState
 from ..state.view_settings import WIDTHS
-from .view import colour_bar, colour_words
+from .view import colour_bar, colour_words, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
 NAMED = 4  # known forces in a caption
@@ -23,7 +23,8 @@ def caption(state: AppState) -> dict[str, Any]:
         "ink": contrast,
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
-            f"Width: {WIDTHS[looks.thickness]}; colour: {colour_words(looks, pulled)}.",
+            f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
+            f"colour: {colour_words(state, pulled)}.",
             origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",
@@ -36,13 +37,13 @@ def origin(cell: Cell) -> str:
     return f"μ = {cell.mu:g}, {cell.series}"
 
 
-def known_words(state: AppState) -> Iterator[str]:
-    """The known forces as a line of a caption, or nothing."""
+def known_words(state: AppState, most: int = NAMED) -> Iterator[str]:
+    """The held forces as a line of a caption, or nothing; most: how many are named."""
     number = state.replay.backbone
     statements = [one.words(number[one.contact]) for one in state.knowledge.known]
     if statements:
-        more = f" and {len(statements) - NAMED} more" if len(statements) > NAMED else ""
-        yield f"Known: {'; '.join(statements[:NAMED])}{more}."
+        more = f" and {len(statements) - most} more" if len(statements) > most else ""
+        yield f"Held: {'; '.join(statements[:most])}{more}."
 
 
 def stem(selection: Selection) -> str:

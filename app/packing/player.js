@@ -171,13 +171,16 @@ class Player {
     const { model, live } = this, { style } = document.documentElement
     this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.showRequested(live.moves || this.grows ? "" : model.requested)
-    // Neighbouring plots are dimmed by these: a style set from Python would make Bokeh lay out the
-    // whole page again.
+    // Neighbouring plots are dimmed, or hidden beside another packing, by these: a style set from
+    // Python would make Bokeh lay out the whole page again.
     const pale = { "--still": model.requested, "--growing": model.requested && !this.grows }
     for (const [name, old] of Object.entries(pale)) {
       style.setProperty(name, old ? OLD : 1)
       style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
+      style.setProperty(`${name}-plots`, old ? (model.live ? 0 : OLD) : 1)
     }
+    const waits = { intervals: pale["--growing"], plane: pale["--growing"], statistics: model.requested, perturb: model.requested }
+    style.setProperty("--waiting", model.live && waits[model.tab] ? '"Being computed …"' : "none")
   }
 
   select() {
@@ -342,7 +345,7 @@ class Player {
       requested: () => this.showRequested(),
       opened: () => buttons.tellOpen(model.opened),
       paused: loaded(() => { if (model.paused === this.playing && this.playback.resting === null) this.play(!model.paused && !STILL.matches) }),
-      live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
+      live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } else this.showRequested() },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),
       keepable: loaded(() => this.tellTrack()),
@@ -381,6 +384,7 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
+  model.on("tab", () => player.showRequested())
   model.on(["tab", "wide", "pushing"], () => {
     if (!player.replay || player.live.moves) return
     player.tellTab()

@@ -72,11 +72,11 @@ export class PlayerBar {
     this.playButton.setAttribute("aria-label", word)
   }
 
-  /** The number of networks passed per second, including those not stored. */
+  /** The number of networks seen per second: the stored ones, and more where the player follows a walk. */
   showRate() {
-    const rate = this.speed * (this.replay?.stride ?? 1)
-    const shown = rate < 10 ? Number(rate.toFixed(1)) : Math.round(rate)
-    this.rate.textContent = this.replay?.swinging ? "" : `${shown} network${shown === 1 ? "" : "s"}/s`
+    const { speed, replay } = this, shown = speed < 10 ? Number(speed.toFixed(1)) : Math.round(speed)
+    const words = `${replay?.walk.room ? "≥ " : ""}${shown}${replay?.stride > 1 ? " stored" : ""} network${shown === 1 ? "" : "s"}/s`
+    this.rate.textContent = replay?.swinging ? "" : words
   }
 
   /** Show another track: its length, and whether the omitted networks can be computed. */
@@ -94,7 +94,7 @@ export class PlayerBar {
   /** Show the present position. */
   show(replay) {
     this.scrub.value = replay.position
-    this.place.textContent = replay.place
+    this.place.textContent = this.place.title = replay.place
     if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
   }
 }

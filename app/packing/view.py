@@ -33,7 +33,7 @@ LEGEND = """
 <span>up to <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩</span>
-<span tabindex="0" data-term="rattler">pale disks carry no force</span>
+<span tabindex="0" data-term="rattler">pale disks: no force</span>
 <details><summary>Scales</summary>
 <label>colours full at <input name="full" type="number" step="any" placeholder="auto"
   min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
@@ -48,8 +48,7 @@ THRUST = """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
 <span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
-<span>pale disks: no contacts; dashed: the box, which shrinks; disks outside it are periodic
-copies</span>
+<span>pale disks: no contacts; dashed: the shrinking box; disks outside: periodic copies</span>
 """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
@@ -250,7 +249,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
         return change
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
-        "mobilised": ("slips one way −1", diverging, "1 the other way"),
+        "mobilised": ("−1", diverging, "+1 (slides)"),
         "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
@@ -260,14 +259,20 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     }[looks.colour]
 
 
-def colour_words(looks: Looks, pulled: bool) -> str:
+def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
+    """Labels {name: words}, COLOURS or WIDTHS; those of intervals say whether they are exact."""
+    exact = exact_intervals(state.possible, state.shown)
+    return labels | {"extent": f"{labels['extent']}, {'exact' if exact else 'seen'}"}
+
+
+def colour_words(state: AppState, pulled: bool) -> str:
     """The present meaning of colours."""
-    return "change by the pull" if pulled else COLOURS[looks.colour]
+    return "change by the pull" if pulled else quantities(state, COLOURS)[state.looks.colour]
 
 
 def _full(looks: Looks, most: float) -> str:
     """The ΔF_n of full colour, and the reason for it."""
-    why = "" if looks.full else f" ({SATURATION:g} quantile; larger are full colour)"
+    why = "" if looks.full else f" ({SATURATION:g} quantile)"
     return f"≥ {most:.2f} ⟨fₙ⟩{why}"
 
 
@@ -290,7 +295,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
-    meaning = colour_words(looks, pulled)
+    meaning = colour_words(state, pulled)
     if pulled and looks.tab == "perturb" and not state.hand.pulls:
         meaning = "change by the push"
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
@@ -325,7 +330,8 @@ def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, 
 
 def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     """A list of the quantities that lines can show, as HTML; the player handles the choice."""
-    value, available = getattr(state.looks, name), meaningful(state, labels, name)
+    value = getattr(state.looks, name)
+    available = meaningful(state, quantities(state, labels), name)
     options = "".join(
         f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
         for key, words in available.items()

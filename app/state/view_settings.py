@@ -8,18 +8,18 @@ import param
 COLOURS = {
     "change": "change from the forces as packed",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
-    "extent": "length of the interval ΔFₙ",
+    "extent": "interval ΔFₙ",
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
-    "known": "known forces: fraction of the interval removed",
+    "known": "known forces: fraction of the exact interval removed",
     "deviation": "inferred minus measured fₙ, in σ",
 }
 WIDTHS = {
     "normal": "normal force fₙ",
-    "extent": "ΔFₙ",
+    "extent": "interval ΔFₙ",
     "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
-    "known": "known forces: length of the interval removed",
+    "known": "known forces: length of the exact interval removed",
     "measured": "measured fₙ",
 }
 # Glossary key of each quantity shown by colour or width.
@@ -37,9 +37,9 @@ EXPLAINED = {
 }
 SORTS = {
     "original": "force as packed",
-    "extent": "ΔFₙ of all networks",
-    "exact": "exact ΔFₙ",
-    "position": "place as packed in its interval",
+    "extent": "interval ΔFₙ, seen",
+    "exact": "interval ΔFₙ, exact",
+    "position": "place as packed in its exact interval",
     "shortened": "how much the known forces shortened it",
 }
 DRAWN = {"all": "all", "some": "a few"}

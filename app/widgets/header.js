@@ -2,9 +2,12 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { copyButton } from "../browser/clipboard.js"
+import { lastView } from "../browser/local_storage.js"
 
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
-const DOORS = [["explore", "Explore", ""], ["learn", "Learn", "learn"]]
+// Entry pages: name, title, and query; that of Explore is its last view, in which a packing of the visitor's own
+// is named by its content.
+const DOORS = [["explore", "Explore", lastView], ["learn", "Learn", () => "learn"]]
 
 export function render({ model }) {
   const root = document.createElement("div"), header = root.appendChild(document.createElement("header"))
@@ -13,13 +16,13 @@ export function render({ model }) {
 
   /** The address of an entry page, in the theme of this page. */
   const address = (query) => {
-    const asked = [query, model.dark ? "dark=1" : ""].filter(Boolean).join("&")
+    const asked = [query.replace(/^\?|&?\bdark=[01]/g, ""), model.dark ? "dark=1" : ""].filter(Boolean).join("&")
     return window.location.pathname + (asked && `?${asked}`)
   }
 
   function show() {
     nav.replaceChildren(...DOORS.map(([door, textContent, query]) => {
-      const link = createElement("a", { textContent, href: address(query) })
+      const link = createElement("a", { textContent, href: address(query()) })
       if (door === model.door) link.ariaCurrent = "page"
       return link
     }))

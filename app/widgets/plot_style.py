@@ -103,6 +103,7 @@ def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
         "sizing_mode": "stretch_width",
         "min_border_left": 56,
         "min_border_right": 18,
+        "styles": {"flex-shrink": "0"},  # in a low window texts would cover it
     }
     fig = Figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
     if fig.toolbar.tools:

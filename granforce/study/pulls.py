@@ -94,6 +94,11 @@ class Puller:
         pulled = pull(self._S, contact, [value], state)
         return pulled.states[0], float(pulled.residual[0])
 
+    def near(self, state: Floats) -> tuple[Floats, float]:
+        """The network (N_c, 2) of S nearest to any forces `state`, and its residual."""
+        forces = nearest(self._S, state).forces
+        return forces, float(self._S.residual(forces[None])[0])
+
     def loaded(self, contact: int, load: float) -> Loaded:
         """Networks under force pairs on a contact, from none to `load` (force), with some between.
 
@@ -129,7 +134,7 @@ class Puller:
         S; a point outside the polygon is replaced by the nearest one on its edge. `state` may be
         rounded: the nearest network of S is used.
         """
-        state = nearest(self._S, state).forces
+        state, _ = self.near(state)
         (here,) = self._points(axes, state[None])
         k, (a, b) = _triangle(fan.points, here, _inside(fan.points, np.asarray(point, float)))
         after = (k + 1) % len(fan.points)

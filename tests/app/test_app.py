@@ -207,7 +207,7 @@ def test_frames_beyond_the_budget_are_left_out_and_counted(library):
     whole = replays.make_replay(packing, dataset, cell.mu)
     short = replays.make_replay(packing, dataset, cell.mu, 8 * 5 * whole.normal.shape[1])
     assert len(short.number) == 6 and short.summary["kept"] == 5
-    assert "Shown: 5 evenly spaced of 30" in left_out(short.summary)
+    assert "Played: 5 of the 30 networks" in left_out(short.summary)
     among = np.searchsorted(whole.number, short.number)
     np.testing.assert_array_equal(whole.normal[among], short.normal)
 
@@ -645,11 +645,11 @@ def test_the_sentence_of_the_intervals_says_what_is_drawn(state):
     state.choose(mu=1)
     wait_for(state)
     view = View(state)
-    assert "pale" not in view.lead.object and f"dark: {STATES} random ones" in view.lead.object
+    assert "pale" not in view.lead.object and f"in {STATES} random networks" in view.lead.object
     state.compute_exact()
-    assert "pale: exact bounds, as they are found" in view.lead.object
+    assert "pale: exact, as bounds are found" in view.lead.object
     wait_for(state)
-    assert "pale: every admissible network" in view.lead.object
+    assert "every admissible network" in view.lead.object
     state.choose(mu=0)
     wait_for(state)
     assert "Not at all" in view.lead.object and "dark" not in view.lead.object
@@ -659,13 +659,16 @@ def test_the_axis_holds_every_bar_and_names_the_order_that_there_is(state):
     state.looks.sort = "exact"
     view = View(state)
     label = view.drawing.figure.xaxis[0].axis_label
-    assert label.endswith("sorted by force as packed: no exact ΔFₙ yet")
+    assert label.endswith("sorted by force as packed: no interval ΔFₙ, exact yet")
     state.compute_exact()
     label = view.drawing.figure.xaxis[0].axis_label
     assert label.endswith("sorted by force as packed: exact bounds are being computed")
     wait_for(state)
     data, every = view.drawing.bars.data, len(state.replay.order)
-    assert view.drawing.figure.xaxis[0].axis_label == f"{every} contacts, sorted by exact ΔFₙ"
+    assert (
+        view.drawing.figure.xaxis[0].axis_label
+        == f"{every} contacts, sorted by interval ΔFₙ, exact"
+    )
     assert np.all(np.diff(data["exact_high"] - data["exact_low"]) > -1e-6)
     assert view.drawing.figure.y_range.end > np.nanmax(data["exact_high"])
     for sort in SORTS:  # all of them in any order
@@ -1331,7 +1334,7 @@ def test_left_out_work_is_counted(library):
     text = left_out(replay_at(library, 0).summary)
     assert "forces along contacts" in text and f"{STATES} <span" in text
     assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
-    assert f"Shown: {KEPT}" in text
+    assert f"Played: {KEPT}" in text
 
 
 def test_every_relaxation_has_a_name_on_screen():

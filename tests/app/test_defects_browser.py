@@ -1,5 +1,7 @@
 """What visitors stumbled over, one test each: the page answers, and says what is so."""
 
+import re
+
 import numpy as np
 import pytest
 from serving import (
@@ -144,14 +146,23 @@ def test_a_mark_of_the_slider_is_chosen_by_a_click(page):
     shows(page, 1)
 
 
+def rgb(locator, name):
+    """Red, green, blue and, unless it is 1, opacity of a colour of an element."""
+    colour = locator.evaluate("(e, name) => getComputedStyle(e)[name]", name)
+    return [float(part) for part in re.findall(r"[\d.]+", colour)]
+
+
 def test_an_error_bar_below_0_holds_nothing(visit):
     page = visit()
     page.keyboard.press("n")
-    page.locator("input.error").fill("-1")
+    field = page.locator("input.uncertainty")
+    ink, paper = (rgb(field, name) for name in ("color", "backgroundColor"))
+    assert paper[3:] == [0] and min(ink) > 200  # light, on the dark ground of the tools
+    field.fill("-1")
     page.locator("button.hold").click()
     page.locator(".message").get_by_text("Enter an error bar of 0 or more").wait_for()
     assert "hold=" not in page.url
-    page.locator("input.error").fill("0.1")
+    page.locator("input.uncertainty").fill("0.1")
     page.locator("button.hold").click()
     searched(page, "hold=")
 
@@ -211,6 +222,16 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
     assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
+    # Neither a look at Learn nor its link back loses the packing and the view.
+    page.get_by_role("tab", name="Friction").click()
+    searched(page, "tab=statistics")
+    for back in (page.go_back, page.get_by_role("link", name="Explore", exact=True).click):
+        page.get_by_role("link", name="Learn", exact=True).first.click()
+        page.get_by_role("heading", name="How hard does the wall press?").first.wait_for()
+        back()
+        page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
+        page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
+        searched(page, "packing=")
 
 
 # 6: Keys

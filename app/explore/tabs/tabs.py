@@ -129,10 +129,13 @@ class Tabs:
 
 
 def pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
-    """Dim parts (name, view) that belong to older states than requested; see player.js."""
+    """Dim parts (name, view) that belong to older states than requested; see player.js.
+
+    Plots are hidden while the requested states are being computed.
+    """
     for name, part in parts:
         old = "growing" if name in GROWING else "still"
         part.styles = part.styles | {
-            "opacity": f"var(--{old}, 1)",
+            "opacity": f"var(--{old}{'-plots' if name in PLOTTED else ''}, 1)",
             "filter": f"var(--{old}-colours, none)",
         }

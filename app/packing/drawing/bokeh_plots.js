@@ -113,7 +113,7 @@ export class Plots {
   }
 
   /** The present forces; for a walk in progress also the values seen, which otherwise do not change. */
-  showBars(bars, { walk, mixed, seen, low, high }, scale) {
+  showBars(bars, { walk, mixed }, scale) {
     const column = (name) => bars.get_column(name)
     const at = column("at"), bottom = column("low"), top = column("high"), now = column("now")
     const grows = Boolean(walk.numbers)
@@ -122,8 +122,8 @@ export class Plots {
       const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
       now[k] = mixed.normal[c] / unit
       if (!grows) continue
-      bottom[k] = Math.min(seen ? low[c] / unit : now[k], now[k])
-      top[k] = Math.max(seen ? high[c] / unit : now[k], now[k])
+      bottom[k] = walk.low[c] / unit
+      top[k] = walk.high[c] / unit
       if (top[k] > reached) reached = top[k]
     }
     if (grows && scale !== "own") this.reachBars(reached)

@@ -88,7 +88,7 @@ export class Look {
 
   // Details of the contact under the pointer: rows of name and value
 
-  contact(k, { mixed, seen, low, high }) {
+  contact(k, { mixed }) {
     const { walk, exact } = this, c = walk.contact[k]
     const n = mixed.normal[c], t = mixed.tangential[c]
     const interval = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
@@ -99,8 +99,8 @@ export class Look {
       ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
-    if (seen) rows.push(["fₙ seen", interval(low[c], high[c])])
-    if (exact) rows.push(["fₙ possible", interval(exact.low[c], exact.high[c])])
+    if (exact) rows.push(["interval of fₙ, exact", interval(exact.low[c], exact.high[c])])
+    if (walk.number.length > 1) rows.push(["interval of fₙ, seen", interval(walk.low[c], walk.high[c])])
     return rows
   }
 

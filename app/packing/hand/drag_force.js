@@ -244,7 +244,7 @@ export class Grab {
 
   describe(contact, value) {
     const { walk } = this.replay, { rail, end } = this
-    const possible = rail ? ` (possible ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
+    const possible = rail ? ` (exact ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
     let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)}${possible} × the mean force`
     if (rail && end) {
       const { opened, sliding } = this.holding

@@ -26,7 +26,7 @@ export class Replay {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
     this.held = null // a pulled network, shown instead of the states
-    this.forget()
+    this.seen = 0 // networks passed; the original one (frame 0) is not a state of the walk
     this.follow(between)
   }
 
@@ -64,7 +64,7 @@ export class Replay {
 
   go(to) {
     this.position = Math.max(0, Math.min(this.last, to))
-    if (!this.swinging) this.passed(this.frame)
+    if (!this.swinging) this.seen = this.frame
     this.mix()
   }
 
@@ -75,28 +75,6 @@ export class Replay {
       return
     }
     for (const [name, out] of Object.entries(this.mixed)) between(this.walk[name], ...this.spot, out)
-  }
-
-  // Passed states; the original network (frame 0) is not a state of the walk
-
-  forget() {
-    this.seen = 0
-    this.low = new Float32Array(this.walk.contacts).fill(Infinity)
-    this.high = new Float32Array(this.walk.contacts).fill(-Infinity)
-  }
-
-  /** The range of each f_n in the states up to a frame: going forward costs one frame, going back all of them. */
-  passed(frame) {
-    const { contacts, normal } = this.walk
-    if (frame < this.seen) this.forget()
-    while (this.seen < frame) {
-      const begin = ++this.seen * contacts, { low, high } = this
-      for (let c = 0; c < contacts; c++) {
-        const value = normal[begin + c]
-        if (value < low[c]) low[c] = value
-        if (value > high[c]) high[c] = value
-      }
-    }
   }
 
   // Text and numbers

@@ -106,7 +106,7 @@ VIEW = (
         (SELECTION, "", "this link cannot be read: source must be walk or uniform"),
         (SELECTION[:10], "", "this link cannot be read: friction coefficient 1e+300 is too"),
         (("sweeps",), "mu=0.2&n=30&states=3&seed=14&", "the number of sweeps must lie between"),
-        (VIEW, "mu=0.1&n=30&states=30&relax=nearest_piqp&", "seen in 30 networks"),
+        (VIEW, "mu=0.1&n=30&states=30&relax=nearest_piqp&", "seen in all 30 networks"),
     ],
     ids=["every parameter", "every number", "sweeps", "every choice of the view"],
 )

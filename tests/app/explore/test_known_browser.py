@@ -33,8 +33,17 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     assert scene(page, "scene.hand.player.pins.has(4)")
     page.wait_for_function(f"() => {MODEL}('bars').get_column('whole_low').every(Number.isFinite)")
     assert span(page, "exact") < 0.99 * span(page, "whole")
+    page.get_by_text("All contacts as a table").click()
+    page.locator("tr[data-contact]").nth(3).wait_for()
+    groups, headings = page.locator(".frame thead tr").all()
+    assert "exact" in groups.inner_text() and "seen" in groups.inner_text()
+    cut = "e => [...e.querySelectorAll('button')].some((b) => b.scrollWidth > b.clientWidth)"
+    assert headings.inner_text().split().count("ΔFₙ") == 2 and not headings.evaluate(cut)
+    cells = page.locator("tr[data-contact='4'] td").all_inner_texts()
+    assert cells[4] == cells[5] == cells[2] and cells[6] == "0.000"  # held: no interval is left
+    assert float(cells[9]) > 0 and cells[10] == "held"
     select(page, 9)
-    page.locator("input.error").fill("0.2")
+    page.locator("input.uncertainty").fill("0.2")
     page.locator("button.hold").click()
     chips(page, 2)
     picture(page, "known/held")

@@ -25,6 +25,7 @@ from app.browser.messages import TO_BROWSER, listed
 from app.explore import results_line
 from app.explore.controls import Controls
 from app.explore.result_values import between
+from app.explore.results_line import Results
 from app.explore.tabs.export import export as export_view
 from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
@@ -202,6 +203,17 @@ def test_disks_without_a_box_ask_for_it(state):
     press(view.read)
     wait_for(state, lambda: "disks.csv" in view.report.object)
     assert not view.waiting.visible and not view.box.error_state
+
+
+def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
+    """A row of disks that touches its images, in a box with room above."""
+    view, results = upload_view.View(state), Results(state)
+    assert "bears no" not in results.html
+    view._dropped([("row.csv", b"x,y,r\n0.5,0.5,0.5\n1.5,0.5,0.5\n2.5,0.5,0.5\n")])
+    view.box.value = "3, 30"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported)
+    assert "bears no vertical stress" in results.html
 
 
 @pytest.mark.parametrize("contacts", [False, True])
@@ -470,9 +482,12 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
 def test_a_tap_on_a_point_opens_such_a_packing_or_computes_it(state):
     view = friction_tab(state)
     points = view.indeterminacy.etas.points[1].data_source
+    rings = []
+    state.param.watch(lambda event: rings.extend(view.indeterminacy.etas.here.data["x"]), "replay")
     points.selected.indices = [list(points.data["x"]).index(1)]
     wait_for(state, lambda: list(view.indeterminacy.etas.here.data["x"]) == [1, 1, 1])
     assert state.cell.mu == 1 and not state.missing  # the store has it
+    assert not rings  # the old ring was removed as the new packing appeared
     points.selected.indices = [list(points.data["x"]).index(0.3)]
     assert state.selection.mu == 0.3 and state.work.computation.running
     state.work.cancel()
@@ -579,7 +594,7 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
     wait_for(state)
     head, held = table()
     number, after = state.replay.backbone[4], state.knowledge.narrowed.after
-    assert f"Known: contact {number}: fₙ = " in head and "exact given these held forces" in head
+    assert f"Held: contact {number}: fₙ = " in head and "exact given these held forces" in head
     assert list(np.flatnonzero(held["known"])) == [4] and f"hold={number}%3A" in head
     scale = state.replay.force_scale
     for name in ("low", "high"):
@@ -588,6 +603,14 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
         unheld = held[f"f_n_{name}_without_known [mean]"]
         np.testing.assert_allclose(unheld, free[f"f_n_{name} [mean]"], atol=1e-6)
     assert np.ptp([held["f_n_low [mean]"][4], held["f_n_high [mean]"][4]]) < 1e-3
+    away = np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4])
+    state.looks.frame = int(np.argmax(away))
+    head, played = table()  # of another network, in which this force is another one
+    force = played["f_n [mean]"]
+    assert "moved to the nearest network with the held forces" in head
+    assert abs(force[4] - state.replay.normal[state.looks.frame, 4]) > 0.01
+    assert np.all(force >= played["f_n_low [mean]"] - 1e-3)
+    assert np.all(force <= played["f_n_high [mean]"] + 1e-3)
 
 
 def test_unknown_keys_are_ignored(state):
@@ -755,6 +778,9 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     assert all(offered("sign", "difference")) and not any(offered("known"))
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
     assert all(offered("known"))
+    assert ">interval ΔFₙ, seen</option>" in player.legend
+    wait_for(state)
+    assert ">interval ΔFₙ, exact</option>" in player.legend  # the colours are of the exact ones now
     player.colour = "known"  # chosen in the legend
     assert state.looks.colour == "known"
     state.knowledge.release(3)

@@ -5,6 +5,7 @@ from small_store import ROOT
 
 from app.explore import result_values
 from app.explore.result_values import between, short, with_error
+from app.explore.results_line import tables
 from app.results.library import Library
 
 
@@ -25,6 +26,10 @@ def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
         value, error = map(float, found[name].seen.split(" ± "))
         assert value == pytest.approx(summary[name], rel=1e-2) and 0 < error < 0.05 * value
     assert found["eta3"].seen == short(0.15 * summary["eta3"])
+    kept = 0.15 * ready.replay.growth["eta3"][-1]  # of the 50 networks that are stored
+    assert float(found["eta3"].seen) > kept + 0.01
+    told = tables(ready, None, False)
+    assert "seen in all 1000 networks" in told and "from these 50, the values from all 1000" in told
     assert found["eta3"].exact == short(0.15 * ready.exact["eta3"].item())
     assert float(found["extent"].exact) > float(found["extent"].seen) > 0
 

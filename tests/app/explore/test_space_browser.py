@@ -89,7 +89,7 @@ def test_force_space_opens_without_a_warning_and_its_tools_cover_nothing(visit):
     def listen(page):
         page.on("console", lambda one: one.type == "warning" and told.append(one.text))
 
-    page = visit("?tab=plane", prepare=listen)
+    page = visit("?tab=plane", 1024, 700, prepare=listen)
     ready(page)
     frame, tools = page.evaluate(
         """() => {
@@ -101,6 +101,9 @@ def test_force_space_opens_without_a_warning_and_its_tools_cover_nothing(visit):
         }"""
     )
     assert tools <= frame
+    plot, below = page.locator(".bk-Figure").first, page.locator("fieldset", has_text="Plane")
+    box = plot.bounding_box()
+    assert box["height"] > 200 and below.bounding_box()["y"] >= box["y"] + box["height"] - 1
     assert not told
 
 

@@ -108,7 +108,7 @@ def test_pictures_say_what_they_are(page, tmp_path):
     text = taken(page, "SVG", tmp_path).read_text()
     for words in (
         "5 largest radii",
-        "colour: length of the interval",
+        "colour: interval ΔFₙ, ",
         "granforce ?",
         "linearGradient",
     ):

@@ -104,9 +104,18 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
     """Pale at once, then a shrinking box, then a walk that grows."""
     page = visit()
     page.locator(".scene").evaluate(WATCH)
+    bars, values = page.locator(".in-intervals"), page.locator(".results td")
+    faint = "e => getComputedStyle(e).opacity"
+    z = values.all_inner_texts()[-4]
     ask_for_many_states(page)
     ask(page, "0.41")
+    # Beside the new packing there is no number of the old one.
+    until(page, "scene.hand.player.live.moves")
+    assert bars.evaluate(faint) == "0" and set(values.all_inner_texts()[1:5]) == {"–"}
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    assert bars.evaluate(faint) == "1"  # of the walk that grows
+    assert values.all_inner_texts()[-4] not in (z, "–")  # z is already that of the new packing
+    assert set(values.all_inner_texts()[1:5]) == {"–"}
     shows(page, 0.41)
     seen = page.evaluate("seen")
     assert seen["pale"] and len(seen["pictures"]) >= 12 and seen["states"]
@@ -483,7 +492,15 @@ def test_the_packing_is_seen_whole_below_its_controls(visit, width):
     page.get_by_label("logarithm of μ").wait_for()
     at_rest(page.locator(".scene").first)
     assert inside(page, ".scene") and inside(page, ".friction")
-    if width > 900:  # everything is on one screen
+    if width > 900:  # everything is on one screen, and keeps its size when lines come and go
+        before = at_rest(page.locator(".scene").first)
+        for key in ("n", "Enter"):
+            page.keyboard.press(key)
+            page.locator(".message", has_text="contact").wait_for()
+        page.locator(".legend select").first.select_option("extent")
+        ask(page, "none")
+        page.get_by_role("alert").filter(has_text="none").wait_for()
+        assert at_rest(page.locator(".scene").first) == before
         for part in ("button.play", ".legend", ".results", ".line"):
             assert inside(page, part), part
 

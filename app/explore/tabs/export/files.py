@@ -108,11 +108,12 @@ def _meaning(column: str) -> str:
     return f"{COLUMNS[name.removesuffix(FREE)]}{free}"
 
 
-def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
-    """The network on screen, in words."""
+def on_screen(replay: Replay, frame: int, held: Held | None, known: bool = False) -> str:
+    """The network of a table, in words; known: whether forces are held."""
+    words = f"Network {replay.number[frame]}" if frame else "Network as packed"
     if held is not None:
-        return "Network: pulled by hand"
-    return f"Network {replay.number[frame]}" if frame else "Network as packed"
+        words = "Network: pulled by hand"
+    return f"{words}, moved to the nearest network with the held forces" if known else words
 
 
 def bounds_of(knowledge: Knowledge) -> str:

@@ -35,7 +35,7 @@ class View(TabView):
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "shown", looks=["contact", "pair"], work=["fourfold"])
         self.drawing = SpaceFigure(self.name, self._choose)
-        self.planes = question("Plane", PLANES, self.looks, "axes", width=250, margin=(4, 8))
+        self.planes = question("Plane", PLANES, self.looks, "axes", width=310, margin=(4, 8))
         self.task, self.placing = state.work.task(), state.work.task(reading)
         self.others = OtherStates(state, self._show_others)
         self.lead, self.finding, self.details = note("Placing the networks …"), note(), note()
@@ -76,6 +76,7 @@ class View(TabView):
         if same and state.plane is not None:
             return
         if self.shown is None or self.shown[0] is not replay:
+            self._clear()
             self.others.look()
         self.shown = request
         self.task.cancel()

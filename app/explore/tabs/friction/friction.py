@@ -35,6 +35,7 @@ THIS = (
     "0.15 η₃ by other samplers, and exact",
 )
 WIDE = {"sizing_mode": "stretch_width"}
+NOWHERE: dict[str, list[float]] = {"x": [], "y": []}  # no ring
 
 
 class Rows(NamedTuple):
@@ -60,6 +61,7 @@ class View(TabView):
         self.indeterminacy: Indeterminacy | None = None
         self.correlations: Correlations | None = None
         self.scatter: ContactScatter | None = None
+        self._of: Replay | None = None  # whose rings are drawn
         self.looks.param.watch(self._mark, "contact")
         self.catch_up()
 
@@ -82,8 +84,21 @@ class View(TabView):
             return
         cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
         replay = state.replay
+        if replay is not self._of:
+            self._clear()
+        self._of = replay
         work = read(state.library, cells, state.cell)
         self.task.start(work, lambda rows: state.work.piecewise(self._show(replay, rows)))
+
+    def _clear(self) -> None:
+        """Remove the rings and figures of another packing."""
+        if self.indeterminacy is not None:
+            self.indeterminacy.etas.here.data = self.indeterminacy.z.here.data = NOWHERE
+        if self.correlations is not None:
+            self.correlations.drawn.here.data = NOWHERE
+        self.scatter = None
+        for figures in self.folded[:2]:
+            figures.objects = []
 
     def _show(self, replay: Replay, rows: Rows) -> Iterator[None]:
         """Draw Figure 1 first; a generator of steps."""

@@ -103,7 +103,7 @@ def samplers(page_rows: list[Row], exact: list[Row]) -> Figure:
 def extents(page_rows: list[Row], mu: float) -> tuple[Figure, str]:
     """Figure 4: P(ΔF_n) for some μ of the study, and of the page's packings at this μ."""
     fig = figure(
-        "extents", None, "length ΔFₙ of a contact's interval, in mean forces", "P(ΔFₙ)",
+        "extents", None, "interval ΔFₙ, seen, in mean forces", "P(ΔFₙ)",
         height=300, y_axis_type="log",
     )  # fmt: skip
     table = study_data.study()

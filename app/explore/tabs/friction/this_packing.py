@@ -18,10 +18,10 @@ LARGEST, BINS = 6.0, 40  # of P(f_n): end of the axis in ⟨f_n⟩, and number o
 
 def extents(replay: Replay, exact: Bounds, select: Callable[[int], object]) -> ContactScatter:
     """ΔF_n of each contact against f_n as packed."""
-    layers = [("seen in the networks", (replay.high - replay.low)[:, 0], DARK, 4.5)]
+    layers = [("interval ΔFₙ, seen", (replay.high - replay.low)[:, 0], DARK, 4.5)]
     if exact:
-        layers.insert(0, ("possible (exact)", exact["high"] - exact["low"], PALE, 6))
-    words = "length ΔFₙ of its interval, in mean forces", "ΔFₙ"
+        layers.insert(0, ("interval ΔFₙ, exact", exact["high"] - exact["low"], PALE, 6))
+    words = "interval ΔFₙ, in mean forces", "ΔFₙ, seen"
     drawn = ContactScatter("extent_against_force", words, replay, layers, select)
     legend_above(drawn.figure)
     return drawn

@@ -60,8 +60,8 @@ class BarsFigure:
                 ("contact", "@contact"),
                 ("now", "@now{0.000}"),
                 ("as packed", "@original{0.000}"),
-                ("seen", "@low{0.000} … @high{0.000}"),
-                ("possible", "@exact_low{0.000} … @exact_high{0.000}"),
+                ("interval, exact", "@exact_low{0.000} … @exact_high{0.000}"),
+                ("interval, seen", "@low{0.000} … @high{0.000}"),
             ),
         )
         marks = *self.layers, self.packed, self.dots

@@ -4,17 +4,26 @@
 const ROWS = 200 // shown at once
 const AGAIN_MS = 250 // between two updates during motion
 const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3) : "–")
-// Of each column: heading, value for contact c, its format.
-const COLUMNS = [
-  ["contact", (on, c) => on.walk.backbone[c], String],
-  ["between", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
-  ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
-  ["fₜ", (on, c) => on.mixed.tangential[c], NUMBER],
-  ["smallest fₙ", (on, c) => on.low[c], NUMBER],
-  ["largest fₙ", (on, c) => on.high[c], NUMBER],
-  ["ΔFₙ", (on, c) => on.high[c] - on.low[c], NUMBER],
-  ["held", (on, c) => Number(on.known.has(c)), (value) => (value ? "held" : "")],
+const interval = (of) => [
+  ["least", (on, c) => on[of].low?.[c], NUMBER],
+  ["largest", (on, c) => on[of].high?.[c], NUMBER],
+  ["ΔFₙ", (on, c) => on[of].high?.[c] - on[of].low?.[c], NUMBER],
 ]
+// Groups of columns [heading, columns], and of each column: heading, value for contact c, its format.
+const GROUPS = [
+  ["", [
+    ["contact", (on, c) => on.walk.backbone[c], String],
+    ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
+  ]],
+  ["on screen", [
+    ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
+    ["fₜ", (on, c) => on.mixed.tangential[c], NUMBER],
+  ]],
+  ["interval of fₙ, exact", interval("exact")],
+  ["interval of fₙ, seen", interval("walk")],
+  ["", [["held", (on, c) => Number(on.known.has(c)), (value) => (value ? "held" : "")]]],
+]
+const COLUMNS = GROUPS.flatMap(([, columns]) => columns)
 const FORCE = 2 // the column by which the table is sorted at first
 
 export function render({ model, view }) {
@@ -25,7 +34,7 @@ export function render({ model, view }) {
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
     </div>
     <p class="status" role="status"></p>
-    <div class="frame"><table><thead><tr></tr></thead><tbody></tbody></table></div>`
+    <div class="frame"><table><thead></thead><tbody></tbody></table></div>`
   const part = (name) => root.querySelector(name), body = part("tbody")
   const sorted = { by: FORCE, down: true }
   const player = () => page.get_model_by_name("player")?.player
@@ -36,8 +45,7 @@ export function render({ model, view }) {
     const on = player(), { replay, look } = on, { walk, mixed } = replay
     const pairs = Array(walk.contacts)
     for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]]
-    const { low, high } = look.exact ?? walk
-    return { walk, mixed, pairs, low, high, known: new Set(on.pins.pins.contacts ?? []), exact: Boolean(look.exact) }
+    return { walk, mixed, pairs, known: new Set(on.pins.pins.contacts ?? []), exact: look.exact ?? {} }
   }
 
   function fits(on, c) {
@@ -55,7 +63,7 @@ export function render({ model, view }) {
     shown = matching.slice(from, from + ROWS)
     part(".status").textContent = `${matching.length} of ${all.length} contacts` +
       (matching.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
-      `; forces in mean forces; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}; ` +
+      `; forces in mean forces; seen: in ${on.walk.room ? "the networks so far" : `all ${on.walk.states} networks`}; ` +
       "a heading sorts the table, “Sort bars” the bars above"
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
@@ -72,7 +80,8 @@ export function render({ model, view }) {
   }
 
   function heads() {
-    part("thead tr").innerHTML = COLUMNS.map(([words], k) => {
+    const groups = GROUPS.map(([words, { length }]) => `<th colspan="${length}" scope="colgroup">${words}</th>`)
+    part("thead").innerHTML = `<tr>${groups.join("")}</tr><tr>` + COLUMNS.map(([words], k) => {
       const order = k === sorted.by ? (sorted.down ? "descending" : "ascending") : "none"
       return `<th aria-sort="${order}"><button type="button" data-k="${k}">${words}` +
         `${order === "none" ? "" : sorted.down ? " ↓" : " ↑"}</button></th>`

@@ -1,4 +1,4 @@
-"""η1, η2 and 0.15 η3 of the networks shown so far."""
+"""η1, η2 and 0.15 η3 of the stored networks played so far."""
 
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d, Span
@@ -21,7 +21,7 @@ class GrowthFigure:
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
         self.figure = fig = figure(
-            "eta_so_far", None, "networks shown so far", "indeterminacy η", height=210, tools="",
+            "eta_so_far", None, "", "indeterminacy η", height=210, tools="",
             x_range=Range1d(0, 1), y_range=Range1d(0, 1, name="growth_range"),
         )  # fmt: skip
         fig.name = "growth_figure"
@@ -37,6 +37,8 @@ class GrowthFigure:
     def show(self, replay: Replay, growing: bool) -> None:
         """Curves of a Replay, or of a walk in progress with unknown end."""
         number = progress_feed.numbers(replay.summary) if growing else replay.number
+        counted = f"{len(number) - 1} stored of {replay.summary['states']} networks"
+        self.figure.xaxis.axis_label = f"number of the network; η of the {counted} played so far"
         unseen = np.full(len(number), np.nan, dtype=np.float32)
         self.growth.data = {"state": number.astype(np.int32)} | {
             name: unseen.copy() for name in LABELS

@@ -49,7 +49,7 @@ class View(TabView):
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.choices = [
             self.drawn,
-            question("Sort bars", SORTS, self.looks, "sort", **SMALL),
+            question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196}),
             question("Unit", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
@@ -119,13 +119,13 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     held = len(state.knowledge.known)
     parts = []
     if exact:
-        words = f"pale: every admissible network ({term('exact', 'exact')})"
+        words = f"pale: {term('exact', 'exact')}, every admissible network"
         parts.append(mark(PALE, words + (f" with {held} held; faintest: without" if held else "")))
     elif state.work.arriving is not None:
-        parts.append(mark(PALE, "pale: exact bounds, as they are found"))
+        parts.append(mark(PALE, "pale: exact, as bounds are found"))
     count = replay.summary["states"]
-    random = "random networks so far" if state.growing else f"{count} random ones"
-    parts.append(mark(DARK, f"dark: {random}"))
+    random = "random networks so far" if state.growing else f"{count} random networks"
+    parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
     parts.append(mark(now(state.looks.dark), "dot: now", "50%"))
     parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
     text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
