@@ -247,12 +247,16 @@ def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
 
 
 def extents(dataset: xr.Dataset) -> dict[str, float]:
-    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n."""
+    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n.
+
+    Infinite ones do not count.
+    """
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    extent = extent[np.isfinite(extent)]
     return {
         "mean_normal_force": dataset["force_scale"].item(),
-        "mean_extent_of_f_n": float(extent.mean()),
-        "largest_extent_of_f_n": float(extent.max()),
+        "mean_extent_of_f_n": float(extent.mean()) if len(extent) else np.nan,
+        "largest_extent_of_f_n": float(extent.max()) if len(extent) else np.nan,
     }
 
 
