@@ -150,7 +150,8 @@ def intervals(
             watch(Bound(int(ensemble.index[key[0]]), *key[1:], float(value)))
 
     given = (determined if needs_no_program(ensemble, system) else _pinned)(ensemble, every)
-    given |= _without_limit(ensemble, system, [key for key in every if key not in given])
+    if system.grows is not None:
+        given |= _without_limit(ensemble, system, [key for key in every if key not in given])
     if progress:
         progress(len(given), len(every))
     for key, value in given.items():

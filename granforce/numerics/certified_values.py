@@ -67,8 +67,7 @@ class System(NamedTuple):
 
     def without_limit(self, tasks: Sequence[Program]) -> Mask:
         """(k,) bool: whether the minimum of each load-free task is −∞, proved by a ray."""
-        if self.grows is None:
-            return np.zeros(len(tasks), dtype=bool)
+        assert self.grows is not None  # nothing falls for ever in a bounded S
         return certificates.without_limit(_with_unit_rows(self.A), self.grows, tasks)
 
     def carries_any(self, contact: int) -> bool:

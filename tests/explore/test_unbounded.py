@@ -11,7 +11,7 @@ from granforce.cli.parser import main
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.contact_problem import make_system
 from granforce.numerics import certificates
-from granforce.records import UnboundedError
+from granforce.records import InputError, UnboundedError
 from granforce.tolerances import INTERVAL_GAP
 
 FRICTION = [0.0, 0.1, 0.5, 1.5, 10.0]
@@ -127,6 +127,20 @@ def test_what_needs_a_bounded_set_still_refuses():
     for refused in (gf.sample_uniform, gf.volume, gf.informative):
         with pytest.raises(UnboundedError, match=r"Grains 0, 1, 2, 3, 4 .* are wedged"):
             refused(S)
+
+
+def test_loads_move_what_is_not_wedged():
+    S = gf.ensemble(heap())
+    limit = gf.limit_loads(S, [0])[0]
+    found = gf.critical_force(S, 0)
+    assert found.converged and 0 < found.low <= limit + INTERVAL_GAP
+    with pytest.raises(InputError, match="grains of contacts 1, 4: other contacts can balance any"):
+        gf.critical_forces(S, [0, 1, 4])
+    # A disk at the top rolls over its right neighbour: a force on it alone carries nothing across,
+    # so it points along the line of centres, 30° from the vertical.
+    factor = gf.load_factor(S)
+    assert factor.gap <= INTERVAL_GAP
+    assert factor.factor == pytest.approx(np.tan(np.radians(30)), abs=1e-7)
 
 
 def test_the_command_reports_what_is_bounded_and_how_much_is_not(tmp_path, capsys):
