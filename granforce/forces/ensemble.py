@@ -281,6 +281,11 @@ class Ensemble:
             y = np.append(y, rest / self.units[known.contact, known.component])
         return np.maximum(y, 0.0)
 
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether S is bounded; the pressure bounds every force."""
+        return self.has_pressure_row or certificates.recession(self.scaled_form[0]) is None
+
     def unbounded(self) -> UnboundedError:
         """The error for unbounded forces: which can grow without a load, and what bounds them."""
         ray = certificates.widest_recession(self.scaled_form[0])

@@ -166,3 +166,21 @@ def test_the_command_reports_what_is_bounded_and_how_much_is_not(tmp_path, capsy
 def test_a_picture_of_the_intervals_is_drawn(tmp_path):
     gf.figures.save(gf.plot(heap(), colour="interval"), tmp_path / "heap.png")
     assert (tmp_path / "heap.png").stat().st_size > 1e4
+
+
+def test_a_walk_says_that_its_measures_mean_nothing(tmp_path, capsys):
+    with pytest.warns(UserWarning, match="S is unbounded, .* η1, η2 and η3 are undefined"):
+        states = gf.walk(gf.ensemble(heap()), 5).states
+    assert gf.ensemble(heap()).admits(states).all()
+    file = tmp_path / "heap.npz"
+    gf.save_packing(heap(), file)
+    options = [str(file), "--states", "5", "--cache", str(tmp_path / "store"), "--json"]
+    for cached in (False, True):  # once from the walk, once from the store
+        assert main(["walk", *options]) == 0
+        captured = capsys.readouterr()
+        report = json.loads(captured.out)
+        assert report["cached"] is cached and report["eta1"] is None
+        assert captured.err.count("S is unbounded") == 1
+    assert main(["measure", *options]) == 2
+    captured = capsys.readouterr()
+    assert not captured.out and "nothing to measure" in captured.err
