@@ -141,6 +141,8 @@ MEANINGS = {
     "mean_change_of_f_n": "mean |inferred − measured| f_n",
     "suspects": "contacts that deviate by more than 3 σ",
     "mean_standard_error": "mean standard error of a force",
+    "unmeasured_spread": "standard error with which unmeasured forces count as 0, in units of "
+    "⟨f_n⟩; if S is unbounded, error bars of forces without measured bounds depend on it",
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "unmeasured contacts that carry force in every network within 3 σ",
     "mean_interval_now": "mean length of the interval of f_n before a measurement, in units of "
@@ -209,8 +211,16 @@ PERTURB = (
 )
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
-    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_contacts"),
-    *("carry_for_certain", "states", "mean_standard_error", *_MIXING, "held", "setup_seconds"),
+    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
+    *(
+        "unmeasured_contacts",
+        "carry_for_certain",
+        "states",
+        "mean_standard_error",
+        *_MIXING,
+        "held",
+        "setup_seconds",
+    ),
     *("sampling_seconds", "seconds", "cached"),
 )
 

@@ -73,12 +73,14 @@ def inference_dataset(
     sigma: Floats,
     certain: Any = None,
     *,
+    unmeasured: float,
     keep: int | None = None,
     seconds: float = 0.0,
 ) -> xr.Dataset:
     """An Inference and its measurement as a dataset; draws stored as in `walk_dataset`.
 
-    certain: a Carrying of contacts that were not measured, if requested.
+    certain: a Carrying of contacts that were not measured, if requested. unmeasured: the standard
+    error of unmeasured components, in ⟨f_n⟩.
     """
     arrays: dict[str, Any] = {
         "backbone": S.index,
@@ -90,6 +92,8 @@ def inference_dataset(
         "suspect": inference.suspects,
         "chi_square": inference.chi_square,
         "freedom": inference.freedom,
+        "unmeasured": unmeasured,
+        "bounded": int(S.bounded),
         "force_scale": S.force_scale,
         **extension(S),
         **S.skipped,

@@ -184,3 +184,42 @@ def test_a_walk_says_that_its_measures_mean_nothing(tmp_path, capsys):
     assert main(["measure", *options]) == 2
     captured = capsys.readouterr()
     assert not captured.out and "nothing to measure" in captured.err
+
+
+def test_error_bars_of_what_nothing_bounds_have_the_size_of_a_usual_force(tmp_path, capsys):
+    packing = heap()
+    S = gf.ensemble(packing)
+    measured = S.original.copy()
+    wedged = ~gf.intervals(S).bounded
+    measured[wedged] = np.nan
+    sigma = 0.1 * S.force_scale
+    for estimate in (gf.infer, gf.remeasured):
+        usual = estimate(S, measured, sigma, states=40)
+        np.testing.assert_array_equal(
+            usual.error, estimate(S, measured, sigma, states=40, unmeasured=1).error
+        )
+        assert usual.error[wedged, 0].mean() < 3 * S.force_scale
+        wide = estimate(S, measured, sigma, states=40, unmeasured=1000)
+        assert wide.error[wedged, 0].mean() > 20 * usual.error[wedged, 0].mean()
+    file, table = tmp_path / "heap.npz", tmp_path / "heap.csv"
+    gf.save_packing(packing, file)
+    columns = np.column_stack([S.index, measured, np.full((len(S.index), 2), sigma)])
+    header = "contact,f_n,f_t,sigma_n,sigma_t"
+    np.savetxt(table, columns[~wedged], delimiter=",", header=header, comments="", fmt="%.17g")
+    run = ["infer", str(file), "--measured", str(table), "--states", "40", "--json"]
+    for given, spread in ([], 1), (["--unmeasured", "2"], 2):
+        assert main([*run, *given, "--cache", str(tmp_path / "store")]) == 0
+        captured = capsys.readouterr()
+        assert json.loads(captured.out)["unmeasured_spread"] == spread
+        assert captured.err.count("S is unbounded") == 1
+        assert f"--unmeasured, which is {spread} ⟨f_n⟩" in captured.err
+
+
+def test_where_everything_is_bounded_unmeasured_forces_may_be_any():
+    S = gf.ensemble(gf.scene("groove", 0.3))
+    assert S.bounded
+    none = np.full_like(S.original, np.nan)
+    usual = gf.infer(S, none, 1.0, states=20)
+    np.testing.assert_array_equal(
+        usual.error, gf.infer(S, none, 1.0, states=20, unmeasured=1000).error
+    )
