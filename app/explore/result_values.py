@@ -155,7 +155,8 @@ def _mean_extent(possible: xr.Dataset | None) -> str:
     if possible is None:
         return ""
     extent = (possible["high"] - possible["low"]).values[:, 0] / possible["force_scale"].item()
-    return short(float(extent.mean()))
+    finite = extent[np.isfinite(extent)]
+    return short(float(finite.mean())) if len(finite) else ""
 
 
 def unborne(replay: Replay) -> str:

@@ -225,9 +225,13 @@ def measured(state: AppState, replay: Replay) -> dict[str, Any]:
 
 
 def normal_extent(replay: Replay, exact: Bounds) -> Any:
-    """ΔF_n (N_c,) in ⟨f_n⟩: exact if known, otherwise from all states."""
+    """ΔF_n (N_c,) in ⟨f_n⟩: exact if known, otherwise from all states.
+
+    Infinite ones are drawn as long as the longest finite one.
+    """
     if exact:
-        return exact["high"] - exact["low"]
+        extent = exact["high"] - exact["low"]
+        return np.minimum(extent, extent.max(where=np.isfinite(extent), initial=0.0))
     return replay.high[:, 0] - replay.low[:, 0]
 
 

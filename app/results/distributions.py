@@ -71,7 +71,9 @@ def _row(store: Store, name: str, selection: Selection) -> Row:
         row: Row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
         row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
         low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
-        row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
+        normal, extent = dataset["original"].values[:, 0] / scale, (high - low) / scale
+        bounded = np.isfinite(extent)
+        row |= {"normal": normal[bounded], "extent": extent[bounded]}
     with _lock:
         _rows[key] = row
         while len(_rows) > KEPT:

@@ -79,7 +79,7 @@ MEANINGS = {
     "states": "number of states",
     "eta2": "indeterminacy η2 from pairs of states",
     "eta3": "indeterminacy η3 from intervals",
-    "exact_eta3": "η3 of the exact intervals",
+    "exact_eta3": "η3 of the exact intervals; undefined if some are infinite",
     "accepted": "number of accepted attempts",
     "mean_iterations": "mean number of iterations of a relaxation",
     "largest_residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
@@ -87,6 +87,9 @@ MEANINGS = {
     "mean_distance_to_centre": "mean distance of states from the centre, in units of ⟨f_n⟩",
     "mean_extent_of_f_n": "mean length of the interval of f_n",
     "largest_extent_of_f_n": "length of the longest interval of f_n",
+    "contacts_with_unbounded_f_n": "contacts whose f_n has no upper bound, as grains are wedged; "
+    "not in the mean and largest extent",
+    "contacts_with_unbounded_f_t": "contacts whose f_t has no bound on one or both sides",
     "correlation": "corr(f_n, ΔF_n) of the original network",
     "correlation_low": "smallest corr(f_n, ΔF_n) of any state",
     "correlation_high": "largest corr(f_n, ΔF_n) of any state",
@@ -102,6 +105,7 @@ MEANINGS = {
     "mean_limit_load": "mean limit load (largest force pair that can be balanced)",
     "least_limit_load": "smallest limit load of a contact",
     "largest_limit_load": "largest limit load of a contact",
+    "contacts_without_a_limit": "contacts on which any force pair can be balanced; not in the mean",
     "largest_shear_over_pressure": "largest √((σ_xx − σ_yy)²/4 + σ_xy²)/P that the contacts can "
     "carry",
     "certainly_not_above": "certified upper bound on this ratio",
@@ -137,6 +141,8 @@ MEANINGS = {
     "mean_change_of_f_n": "mean |inferred − measured| f_n",
     "suspects": "contacts that deviate by more than 3 σ",
     "mean_standard_error": "mean standard error of a force",
+    "unmeasured_spread": "standard error with which unmeasured forces count as 0, in units of "
+    "⟨f_n⟩; if S is unbounded, error bars of forces without measured bounds depend on it",
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "unmeasured contacts that carry force in every network within 3 σ",
     "mean_interval_now": "mean length of the interval of f_n before a measurement, in units of "
@@ -176,12 +182,13 @@ VOLUME = (
 _SOLVED = ("programs", "again", "largest_duality_gap", "seconds", "cached")
 INTERVALS = (
     *("contacts", "dimension", "coordination", "exact_eta3", "mean_normal_force"),
-    *("mean_extent_of_f_n", "largest_extent_of_f_n", "correlation", "determined_contacts"),
+    *("mean_extent_of_f_n", "largest_extent_of_f_n", "contacts_with_unbounded_f_n"),
+    *("contacts_with_unbounded_f_t", "correlation", "determined_contacts"),
     *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
 LIMIT_LOADS = (
     *("contacts", "mean_normal_force", "mean_limit_load", "least_limit_load"),
-    *("largest_limit_load", *_SOLVED),
+    *("largest_limit_load", "contacts_without_a_limit", *_SOLVED),
 )
 LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
@@ -204,8 +211,16 @@ PERTURB = (
 )
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
-    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_contacts"),
-    *("carry_for_certain", "states", "mean_standard_error", *_MIXING, "held", "setup_seconds"),
+    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
+    *(
+        "unmeasured_contacts",
+        "carry_for_certain",
+        "states",
+        "mean_standard_error",
+        *_MIXING,
+        "held",
+        "setup_seconds",
+    ),
     *("sampling_seconds", "seconds", "cached"),
 )
 

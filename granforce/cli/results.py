@@ -2,6 +2,7 @@
 
 import argparse
 import threading
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
+from granforce.explore.random_walk import UNBOUNDED_WALK
 from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
@@ -247,26 +249,33 @@ def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
 
 
 def extents(dataset: xr.Dataset) -> dict[str, float]:
-    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n."""
+    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n.
+
+    Infinite ones do not count.
+    """
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    extent = extent[np.isfinite(extent)]
     return {
         "mean_normal_force": dataset["force_scale"].item(),
-        "mean_extent_of_f_n": float(extent.mean()),
-        "largest_extent_of_f_n": float(extent.max()),
+        "mean_extent_of_f_n": float(extent.mean()) if len(extent) else np.nan,
+        "largest_extent_of_f_n": float(extent.max()) if len(extent) else np.nan,
     }
 
 
 def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
     """The walk of the options; output: a file that will be written."""
-    return found(
-        *(arguments, kinds.WALK, output),
-        watching=telling_eta,
-        states=arguments.states,
-        seed=arguments.walk_seed,
-        relax=RELAXATIONS[arguments.relax],
-        chains=arguments.chains,
-        **conditions(arguments),
-    )
+    with warnings.catch_warnings():
+        # The commands say so themselves, also of stored walks.
+        warnings.filterwarnings("ignore", UNBOUNDED_WALK)
+        return found(
+            *(arguments, kinds.WALK, output),
+            watching=telling_eta,
+            states=arguments.states,
+            seed=arguments.walk_seed,
+            relax=RELAXATIONS[arguments.relax],
+            chains=arguments.chains,
+            **conditions(arguments),
+        )
 
 
 def extension(dataset: xr.Dataset) -> dict[str, Any]:

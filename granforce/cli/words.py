@@ -148,7 +148,7 @@ def add_infer(commands: Commands) -> None:
         commands,
         "infer",
         "find the most likely admissible network given measured forces, with error bars",
-        "granforce infer frame.npz --measured frame.csv --unmeasured 1\n"
+        "granforce infer frame.npz --measured frame.csv\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
         lines=report_lines.INFER,
     )
@@ -172,8 +172,8 @@ def add_infer(commands: Commands) -> None:
         "--unmeasured",
         type=float,
         help="treat unmeasured forces as measured to be 0 with this standard error, in units of "
-        "⟨f_n⟩. Default: 1000, which allows any force; 2 with --again; 1 with --frames. If no "
-        "pressure is prescribed for the frame, use about 1",
+        "⟨f_n⟩. Default: 1 if S is unbounded, as in frames between walls, and with --frames; "
+        "otherwise 1000, which allows any force, or 2 with --again",
     )
     group.add_argument(
         "--again",

@@ -11,7 +11,7 @@ from granforce import notebook
 from granforce.explore.intervals import Bounds, Key, SmallestForces, solved
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import UNMEASURED, checked, likeliest
+from granforce.forces.likeliest import checked, likeliest
 from granforce.numerics.certified_values import Solver
 from granforce.records import positive, takes
 from granforce.system import cancelling
@@ -51,7 +51,7 @@ def carrying(
     contacts: npt.ArrayLike | None = None,
     *,
     within: float = 3.0,
-    unmeasured: float = UNMEASURED,
+    unmeasured: float | None = None,
     workers: int = 1,
     progress: Progress | None = None,
     cancel: Cancel | None = None,

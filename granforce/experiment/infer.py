@@ -24,7 +24,7 @@ from granforce.explore import billiard, uniform
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
+from granforce.forces.likeliest import Likeliest, checked, likeliest, spread_of
 from granforce.records import random_seed, takes, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
@@ -117,7 +117,7 @@ def infer(
     *,
     states: int = 0,
     seed: int = 0,
-    unmeasured: float = UNMEASURED,
+    unmeasured: float | None = None,
     chains: int = 4,
     workers: int = 1,
     progress: Progress | None = None,
@@ -131,13 +131,15 @@ def infer(
     workers: threads, which do not change the result. progress(done, total) counts draws.
 
     unmeasured: unmeasured components count as 0 with a standard error of this many ⟨f_n⟩. The
-    default only selects the least of networks that fit equally well; if neither S nor the
-    measurement bounds some forces (no pressure is prescribed), only this does.
+    default in a bounded S, 1000, only selects the least of networks that fit equally well. In an
+    unbounded S it is 1: where the measurement does not bound a force either, only this does, and
+    its error bar depends on it.
 
     Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
+    unmeasured = spread_of(ensemble, unmeasured)
     m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers)
     draws = None
     if numbers[0]:

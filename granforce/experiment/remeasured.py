@@ -24,13 +24,13 @@ from granforce import notebook
 from granforce.experiment.infer import Inference, arguments_of, inference_of, judged
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import fitted_many
+from granforce.forces.likeliest import fitted_many, spread_of
 from granforce.numerics.lanes import LANES
 from granforce.records import random_seed, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
 
-# Standard error of unmeasured forces beforehand, in ⟨f_n⟩.
+# Standard error of unmeasured forces beforehand in a bounded S, in ⟨f_n⟩.
 UNMEASURED = 2.0
 
 
@@ -63,7 +63,7 @@ def remeasured(
     *,
     states: int = 200,
     seed: int = 0,
-    unmeasured: float = UNMEASURED,
+    unmeasured: float | None = None,
     chains: int = 4,
     workers: int = 1,
     progress: Progress | None = None,
@@ -71,7 +71,8 @@ def remeasured(
 ) -> Remeasured:
     """The network with the least Σ ((f − m)/σ)², with error bars from repeated measurement.
 
-    A Remeasured, with the same arguments as `infer`; its draws are independent of each other (their
+    A Remeasured, with the arguments of `infer`; `unmeasured` is 2 by default, and 1 in an unbounded
+    S. Its draws are independent of each other (their
     mixing is not diagnosed: NaN) and need no set-up: one contact program each, eight at a time.
     workers: threads, which do not change the result.
 
@@ -79,6 +80,7 @@ def remeasured(
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
+    unmeasured = spread_of(ensemble, unmeasured, UNMEASURED)
     m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)

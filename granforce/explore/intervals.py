@@ -40,13 +40,19 @@ class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
     contacts: Integers  # (k,) their numbers in the packing
-    low: Floats  # (k, 2) least value, force; NaN if cancelled or not certified
-    high: Floats  # (k, 2) largest value, force; NaN likewise
+    low: Floats  # (k, 2) least value, force; −inf without a limit; NaN: cancelled, not certified
+    high: Floats  # (k, 2) largest value, force; inf without a limit; NaN likewise
     gap: Floats  # (k, 2, 2) duality gap of [component, low or high] in ⟨f_n⟩
     backbone: Mask  # (k,) bool, largest f_n > 0
     max_gap: float  # largest gap among the certified bounds
-    converged: bool  # every bound was certified with a gap ≤ INTERVAL_GAP
+    converged: bool  # every bound was certified, with a gap ≤ INTERVAL_GAP in a bounded S
     counts: dict[str, int]  # programs solved, skipped by reason, solved again by HiGHS; iterations
+
+    @property
+    def bounded(self) -> Mask:
+        """Mask (k,) of contacts whose f_n and f_t both have finite bounds."""
+        finite = np.isfinite(self.low) & np.isfinite(self.high)
+        return np.asarray(finite.all(axis=1))
 
     def _repr_html_(self) -> str:
         """HTML for notebooks."""
@@ -54,10 +60,14 @@ class Intervals(NamedTuple):
             "contacts": len(self.contacts),
             "all bounds certified": self.converged,
         }
-        if self.converged and len(self.contacts):
-            extent = measures.normal_extent(self.low, self.high)
-            lines |= {"exact η3": measures.eta3(self.low, self.high), "mean ΔFₙ": extent.mean()}
-            lines |= {"largest ΔFₙ": extent.max()}
+        bounded = self.bounded
+        if self.converged and bounded.any():
+            low, high = self.low[bounded], self.high[bounded]
+            extent = measures.normal_extent(low, high)
+            # In an unbounded S η3 would be ∞/∞.
+            whole = {"exact η3": measures.eta3(low, high)}
+            lines |= whole if bounded.all() else {"of bounded contacts": len(extent)}
+            lines |= {"mean ΔFₙ": extent.mean(), "largest ΔFₙ": extent.max()}
         lines |= {"largest duality gap / ⟨fₙ⟩": self.max_gap, **self.counts}
         return notebook.table("Exact intervals over S", lines)
 
@@ -108,8 +118,13 @@ def intervals(
     changed by INTERVAL_GAP at most. progress(done, total) is called as programs end. cancel() →
     True ends early: missing bounds are NaN and ``converged`` is False.
 
-    Raises InputError for a contact that carries nothing and if the forces in S are not bounded,
-    NotJammedError if S is empty, Cancelled if cancelled before the first program.
+    In an unbounded S, bounds that a self-balanced change of forces moves without end are ±inf, and
+    all others are certified as usual; rounding then allows a gap of up to 10⁻¹² of the largest sum
+    of the bounded forces.
+
+    Raises InputError for a contact that carries nothing, NotJammedError if S is empty,
+    UndecidedError and UnboundedError if it cannot be proved which forces are bounded, Cancelled if
+    cancelled before the first program.
     """
     places = _positions(ensemble, contacts)
     frictionless = ensemble.mu == 0
@@ -121,7 +136,7 @@ def intervals(
     lower = [(c, 0, 0) for c in widest]
     every = upper + tangential + lower
     known = SmallestForces(ensemble, states)
-    system = make_system(ensemble)
+    system = make_system(ensemble, unbounded=True)
 
     def record_state(key: Key, y: Floats) -> None:
         # Networks that attain lower bounds are not used here: only the others decide which programs
@@ -130,11 +145,13 @@ def intervals(
             known.add(y)
 
     def report_bound(key: Key, attained: float, bound: float) -> None:
-        if watch and abs(attained - bound) <= INTERVAL_GAP:
+        if watch and (attained == bound or abs(attained - bound) <= system.accuracy):
             value = (-attained if key[2] else attained) * ensemble.force_scale
             watch(Bound(int(ensemble.index[key[0]]), *key[1:], float(value)))
 
     given = (determined if needs_no_program(ensemble, system) else _pinned)(ensemble, every)
+    if system.grows is not None:
+        given |= _without_limit(ensemble, system, [key for key in every if key not in given])
     if progress:
         progress(len(given), len(every))
     for key, value in given.items():
@@ -162,8 +179,10 @@ def intervals(
         "frictionless contact": 2 * len(places) if frictionless else 0,
     }
     if ensemble.known is not None:
-        counts["known exactly"] = len(given)
-    return _intervals(ensemble, places, bounds, counts)
+        counts["known exactly"] = sum(bool(np.isfinite(value)) for value, _ in given.values())
+    if system.grows is not None:
+        counts["without a limit"] = sum(bool(np.isinf(value)) for value, _ in given.values())
+    return _intervals(ensemble, places, bounds, counts, system.accuracy)
 
 
 def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
@@ -172,6 +191,12 @@ def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
         return {}
     value = np.stack([ensemble.known.value, -ensemble.known.value], axis=-1)
     return {key: (float(value[key]),) * 2 for key in keys if ensemble.known.pinned[key[:2]]}
+
+
+def _without_limit(ensemble: Ensemble, system: System, keys: Sequence[Key]) -> Bounds:
+    """{key: (−∞, −∞)} of bounds that are infinite, as a ray of S proves."""
+    falls = system.without_limit([bound_of(ensemble, *key) for key in keys])
+    return {key: (-np.inf, -np.inf) for key, fall in zip(keys, falls, strict=True) if fall}
 
 
 def needs_no_program(ensemble: Ensemble, system: System) -> bool:
@@ -203,16 +228,20 @@ def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
 
 
 def _intervals(
-    ensemble: Ensemble, places: Integers, bounds: Bounds, counts: dict[str, int]
+    ensemble: Ensemble,
+    places: Integers,
+    bounds: Bounds,
+    counts: dict[str, int],
+    accuracy: float,
 ) -> Intervals:
     keys = itertools.product((int(c) for c in places), (0, 1), (0, 1))
     attained, gap = (one.reshape(-1, 2, 2) for one in values_and_gaps(bounds, list(keys)))
     value = attained * [1.0, -1.0]
     if ensemble.mu == 0:
         value[:, 1], gap[:, 1] = 0.0, 0.0
-    value[~(gap <= INTERVAL_GAP)] = np.nan
+    value[~(gap <= accuracy)] = np.nan
     value *= ensemble.force_scale
-    max_gap, converged = _judged(gap)
+    max_gap, converged = _judged(gap, accuracy)
     backbone = value[:, 0, 1] > CARRYING * ensemble.force_scale
     low, high = ordered(value[..., 0], value[..., 1], FLAT)
     return Intervals(ensemble.index[places], low, high, gap, backbone, max_gap, converged, counts)
@@ -243,19 +272,23 @@ def limit_load_bounds(
     PRE 79, 052302. The pair adds F to the normal force on the contact, in the balance and in the
     pressure, but not in the contact's own cone. (Left out of the pressure, the limit would be
     F/(1 − F ℓ/2P0V).) Infinite if neither grain has to balance, as no equation then contains the
-    load. Options and errors as in `intervals`.
+    load, and in an unbounded S where contact forces balance the pair alone. Options and errors as
+    in `intervals`.
     """
     places = [int(place) for place in _positions(ensemble, contacts)]
     met = np.diff(ensemble.A.tocsc().indptr)[:: ensemble.per_contact] > 0
-    keys = [place for place in places if met[place]]
-    solver = Solver(make_system(ensemble), workers=workers, progress=progress, total=len(keys))
+    system = make_system(ensemble, unbounded=True)
+    bounds: dict[Any, tuple[float, float]] = {
+        place: (-np.inf, -np.inf) for place in places if not met[place] or system.carries_any(place)
+    }
+    keys = [place for place in places if place not in bounds]
+    solver = Solver(system, workers=workers, progress=progress, total=len(keys))
     # For each contact: maximise F, with f_n + F and f_t acting on the grains.
-    bounds = solver.solve(keys, [Program([], [], key) for key in keys])
-    bounds |= {place: (0.0, 0.0) for place in places if not met[place]}
+    bounds |= solver.solve(keys, [Program([], [], key) for key in keys])
     attained, gap = values_and_gaps(bounds, places)
-    load = np.where(gap <= INTERVAL_GAP, -attained * ensemble.force_scale, np.nan)
-    load[~met[places]] = np.inf
-    return LimitLoads(ensemble.index[places], load, gap, *_judged(gap), solver.counts)
+    load = np.where(gap <= system.accuracy, -attained * ensemble.force_scale, np.nan)
+    judged = _judged(gap, system.accuracy)
+    return LimitLoads(ensemble.index[places], load, gap, *judged, solver.counts)
 
 
 def values_and_gaps(
@@ -264,13 +297,15 @@ def values_and_gaps(
     """Values attained and duality gaps (k,) of keys; NaN for unfinished programs."""
     none = np.nan, np.nan
     both = np.array([bounds.get(key, none) for key in keys]).reshape(-1, 2)
-    return both[:, 0], np.abs(both[:, 0] - both[:, 1])
+    with np.errstate(invalid="ignore"):  # ∞ − ∞
+        apart = np.abs(both[:, 0] - both[:, 1])
+    return both[:, 0], np.where(both[:, 0] == both[:, 1], 0.0, apart)
 
 
-def _judged(gap: Floats) -> tuple[float, bool]:
+def _judged(gap: Floats, accuracy: float) -> tuple[float, bool]:
     """Largest gap, and whether all bounds are finished with small gaps."""
     reached = gap[~np.isnan(gap)]
-    return float(reached.max(initial=0.0)), bool(np.all(gap <= INTERVAL_GAP))
+    return float(reached.max(initial=0.0)), bool(np.all(gap <= accuracy))
 
 
 def _positions(ensemble: Ensemble, contacts: npt.ArrayLike | None) -> Integers:

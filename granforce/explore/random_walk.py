@@ -8,6 +8,7 @@ the page on results).
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -35,6 +36,7 @@ from granforce.types import Cancel, Floats, Integers, Progress
 
 # Number of chains from which a thread vectorises them: eight lanes cost as much as three chains.
 WORTH_LANES = 4
+UNBOUNDED_WALK = "S is unbounded, so that forces grow with the number of states"
 SHUFFLED = ("order", "seed")  # options of relaxations with their own order of contacts
 
 
@@ -122,7 +124,10 @@ def walk(
     thread; neither changes the result. cancel() returning True raises Cancelled.
 
     If S is a single point (h = 0), every state is that point and no relaxation is done, unless skip
-    is False: sweeps end at a small residual, not exactly at that point. Raises InputError for sizes
+    is False: sweeps end at a small residual, not exactly at that point. A warning says if S is
+    unbounded: forces then grow with the number of states.
+
+    Raises InputError for sizes
     below 1, for several chains with `begun` or `enough`, and if `begun` has other arguments;
     NotJammedError if max_attempts yield too few states of a whole walk.
     """
@@ -147,6 +152,8 @@ def walk(
             progress(sum(chain.counts["accepted"] for chain in all_chains), states)
 
     point = ensemble.dimension == 0 and skip
+    if not ensemble.bounded:
+        warnings.warn(f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined", stacklevel=2)
     if begun is not None:
         ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
     if begun is not None and len(begun.states) and not point:

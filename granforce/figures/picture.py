@@ -130,12 +130,15 @@ def _coloured(
 
 
 def _extents(packing: Packing) -> Floats:
-    """Lengths (N_c,) of the exact intervals of f_n, force; 0 where no network presses."""
+    """Lengths (N_c,) of the exact intervals of f_n, force; 0 where no network presses.
+
+    Infinite ones get the colour of the longest finite one.
+    """
     S = ensemble(packing)
     bounds = intervals(S)
     extents = np.zeros(len(packing.contacts.i))
     extents[S.index] = bounds.high[:, 0] - bounds.low[:, 0]
-    return extents
+    return np.minimum(extents, extents.max(where=np.isfinite(extents), initial=0.0))
 
 
 def _lines(

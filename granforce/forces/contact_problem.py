@@ -16,6 +16,7 @@ from granforce.forces import knowledge
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import Polygons
 from granforce.numerics import (
+    certificates,
     certified_values,
     contact_matrix,
     contact_program,
@@ -25,6 +26,7 @@ from granforce.numerics import (
 from granforce.numerics.contact_matrix import Network
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre
+from granforce.records import UnboundedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
@@ -190,16 +192,18 @@ def centre_of(ensemble: Ensemble) -> Centre:
     return shared.centre
 
 
-def make_system(ensemble: Ensemble) -> certified_values.System:
+def make_system(ensemble: Ensemble, *, unbounded: bool = False) -> certified_values.System:
     """The certified_values.System of an ensemble, in the cone coordinates of its Problem.
 
-    It is built on first use and cached with the ensemble. Raises Cancelled on request, and the
-    errors of `certified_values.make_system`.
+    It is built on first use and cached with the ensemble. unbounded: S may be unbounded. Raises
+    Cancelled on request, and the errors of `certified_values.make_system`.
     """
     cancelling.check()
     shared = _shared_of(ensemble)
     if shared.system is None:
         shared.system = _new_system(ensemble)
+    if shared.system.grows is not None and not unbounded:
+        raise UnboundedError(certificates.UNBOUNDED)
     return shared.system
 
 

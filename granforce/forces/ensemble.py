@@ -281,6 +281,11 @@ class Ensemble:
             y = np.append(y, rest / self.units[known.contact, known.component])
         return np.maximum(y, 0.0)
 
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether S is bounded; the pressure bounds every force."""
+        return self.has_pressure_row or certificates.recession(self.scaled_form[0]) is None
+
     def unbounded(self) -> UnboundedError:
         """The error for unbounded forces: which can grow without a load, and what bounds them."""
         ray = certificates.widest_recession(self.scaled_form[0])
@@ -298,9 +303,9 @@ class Ensemble:
             grains, are = ("Grain", "is") if len(free) == 1 else ("Grains", "are")
             numbers = self.index[locked]
             one = numbers[np.unique(group, return_index=True)[1]]
-            smaller = (
-                "" if self.mu == 0 else "a smaller friction coefficient (--ensemble-mu, mu=), "
-            )
+            smaller = ""
+            if self.mu > 0 and not self._grows_without_friction:
+                smaller = "a smaller friction coefficient (--ensemble-mu, mu=) or "
             some = "of one of these contacts"
             if len(one) > 1:
                 some = f"of one contact in each of {len(one)} groups, such as {brief_list(one)},"
@@ -308,11 +313,19 @@ class Ensemble:
                 "the forces in S are not bounded: some can press against each other without a "
                 f"load. {grains} {brief_list(free)} (counted from 0) {are} wedged between walls or "
                 f"fixed grains by contacts {brief_list(numbers)} at friction {self.mu:g}. Use "
-                f"{smaller}an upper bound on f_n {some} (f_n_high in --known, known=), or a wall "
-                "that is not held but carries a weight"
+                f"{smaller}an upper bound on f_n {some} (f_n_high in --known, known=)"
             )
         error.named = True
         return error
+
+    @property
+    def _grows_without_friction(self) -> bool:
+        """Whether S is unbounded at every friction: forces without f_t are part of all cones."""
+        A, sides = self.scaled_form[0], 2 * len(self.index)
+        normal = A[:, 0:sides:2] + A[:, 1:sides:2]
+        return (
+            certificates.recession(sparse.hstack([normal, A[:, sides:]], format="csc")) is not None
+        )
 
     @cached_property
     def _row_scale(self) -> Floats:

@@ -27,8 +27,9 @@ from granforce.tolerances import BALANCED, ERRORS, MEASURED
 from granforce.types import Floats
 
 # Default standard error, in ⟨f_n⟩, with which unmeasured components count as 0: among networks that
-# the measurement cannot distinguish, it selects the one with the smallest forces.
-UNMEASURED = 1e3
+# the measurement cannot distinguish, it selects the one with the smallest forces. In an unbounded S
+# it is all that limits some forces, and so a usual force.
+UNMEASURED, UNMEASURED_UNBOUNDED = 1e3, 1.0
 _PARTS = "f_n", "f_t"
 # Steps of the contact program; it ends balanced, with a mean product of forces and multipliers
 # (in ⟨f_n⟩², the largest weight 1) which gives forces to its square root. Bounds on single forces
@@ -51,20 +52,32 @@ class Likeliest(NamedTuple):
     deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
 
 
+def spread_of(ensemble: Ensemble, given: float | None, bounded: float = UNMEASURED) -> float:
+    """The standard error of unmeasured components, in ⟨f_n⟩: the given one, or the default of S.
+
+    bounded: the default in a bounded S.
+    """
+    if given is not None:
+        return given
+    return bounded if ensemble.bounded else UNMEASURED_UNBOUNDED
+
+
 def likeliest(
     ensemble: Ensemble,
     measured: npt.ArrayLike,
     sigma: npt.ArrayLike,
-    unmeasured: float = UNMEASURED,
+    unmeasured: float | None = None,
 ) -> Likeliest:
     """The network of S with the least Σ ((f − m)/σ)²; a Likeliest.
 
     measured, sigma: m and σ as `checked` takes them. unmeasured: standard error, in ⟨f_n⟩, with
-    which components that were not measured count as 0; they are not part of χ².
+    which components that were not measured count as 0, by default that of `spread_of`; they are not
+    part of χ².
 
     Raises InputError as `checked` does, NotJammedError where S is empty.
     """
     m, s = checked(ensemble, measured, sigma)
+    unmeasured = spread_of(ensemble, unmeasured)
     if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
         raise InputError(f"unmeasured must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}")
     forces = fitted(ensemble, m, s, unmeasured)

@@ -3,26 +3,38 @@
     S is empty       λ with Aᵀλ ≤ 0 and b·λ > 0 (Farkas)
     S is unbounded   d ≥ 0, d ≠ 0 with A d = 0
     S is bounded     π with Aᵀπ > 0
+    y_k grows        d as above with d_k > 0; the others do not if Aᵀπ ≥ 0, and > 0 for them
     g·y is small     λ with Aᵀλ ≥ g and b·λ small (duality)
 
  Solvers only propose; every proof is checked here against A and b. If one solver fails, others are
 tried; if all fail, the question is reported as undecided.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import NamedTuple
 
+import highspy
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import lsmr
 
 from granforce.numerics import highs as programs
+from granforce.numerics.linear_programs import Program
 from granforce.records import InputError, NotJammedError, UnboundedError, UndecidedError
+from granforce.system import cancelling
 from granforce.tolerances import BALANCED, CARRYING
-from granforce.types import Floats
+from granforce.types import Floats, Mask
 
 # Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks despite rounding.
 _LARGEST_MEAN = 1e4
 # Largest |A d| of a direction d with Σ d = 1, rows of A of order 1.
 _BALANCED_DIRECTION = 1e-13
+# Largest |Aᵀπ| at coordinates that grow, relative to π; number of corrections to reach it.
+_LEVEL, _CORRECTIONS = 1e-13, 2
+# Least change of a cost along a ray d with Σ d = 1, relative to the cost, beyond rounding.
+_FALLS = 1e-9
 # Mean of y (in ⟨f_n⟩) up to which a contact is proved to carry no force: the mean is 1 in S.
 _USUAL_MEAN = 2.0
 UNBOUNDED = (
@@ -96,16 +108,110 @@ def recession(A: sparse.csr_matrix) -> Floats | None:
 
 
 def widest_recession(A: sparse.csr_matrix) -> Floats | None:
-    """The same, positive wherever any such d is: A (s + e) = 0, s ≤ 1, for the largest Σ s."""
+    """The same, positive wherever any such d is."""
+    for d, _ in widest(A):
+        if _is_ray(A, d):
+            return d / d.sum()
+    return recession(A)
+
+
+def widest(A: sparse.csr_matrix) -> Iterator[tuple[Floats, Floats]]:
+    """Yield d ≥ 0 and multipliers π ≥ 0 of A (s + e) = 0, s ≤ 1, for the largest Σ s.
+
+    By several methods, d = s + e; nothing is checked.
+    """
     count = A.shape[1]
     zero, cost = np.zeros(A.shape[0]), np.concatenate([-np.ones(count), np.zeros(count)])
     limits = np.zeros(2 * count), np.concatenate([np.ones(count), np.full(count, np.inf)])
     model = programs.bounded(sparse.hstack([A, A]), (zero, zero), limits, cost)
     for _, y in programs.solutions(model):
-        d = np.maximum(y[:count] + y[count:], 0.0) if len(y) else np.zeros(count)
-        if d.any() and np.abs(A @ d).max(initial=0.0) <= _BALANCED_DIRECTION * d.sum():
-            return d / d.sum()
-    return recession(A)
+        if len(y):
+            yield np.maximum(y[:count] + y[count:], 0.0), -np.array(model.getSolution().row_dual)
+
+
+def _is_ray(A: sparse.csr_matrix, d: Floats) -> bool:
+    """Whether d ≥ 0 (n,), d ≠ 0, balances without a load, to rounding."""
+    return bool(d.any() and np.abs(A @ d).max(initial=0.0) <= _BALANCED_DIRECTION * d.sum())
+
+
+class Growing(NamedTuple):
+    """The coordinates of S that grow, proved both ways."""
+
+    mask: Mask  # (n,) bool
+    rays: list[Floats]  # d (n,) with Σ d = 1; the first is positive all over the mask
+    rows: Floats  # (m,) π with Aᵀπ = 0 in the mask, to rounding, and > 0 elsewhere
+
+
+def growing(A: sparse.csr_matrix) -> Growing | None:
+    """What grows in a nonempty S, rows of A of order 1; None if nothing grows, or not proved."""
+    for d, rows in widest(A):
+        # In an optimum of that program both d and Aᵀπ are 0 or at least 1.
+        mask = d > 0.5
+        if not mask.any():
+            continue
+        d = np.where(mask, d, 0.0)
+        d[mask] = np.maximum(_in_kernel(A[:, mask], d[mask]), 0.0)
+        rows = _in_kernel(sparse.csc_matrix(A[:, mask].T), rows)
+        weight = A.T @ rows
+        off = np.abs(weight[mask]).max() / np.abs(rows).max(initial=1.0)
+        if _is_ray(A, d) and weight[~mask].min(initial=1.0) > 0.5 and off <= _LEVEL:
+            return Growing(mask, [d / d.sum()], rows)
+    return None
+
+
+def _in_kernel(A: sparse.csc_matrix, x: Floats) -> Floats:
+    """x (n,) with A x = 0 restored by the least change."""
+    for _ in range(_CORRECTIONS):
+        x = x - cancelling.apart(partial(lsmr, atol=0.0, btol=_LEVEL), A, A @ x)[0]
+    return x
+
+
+def without_limit(A: sparse.csr_matrix, grows: Growing, tasks: Sequence[Program]) -> Mask:
+    """Whether a ray proves that the cost of each of the load-free tasks falls for ever, (k,) bool.
+
+    Rays that were needed are added to those of `grows`.
+    """
+    inside = np.flatnonzero(grows.mask)
+    both, one = _with_sum(A[:, inside])
+    model = programs.going_on(both, one)
+    falls = np.zeros(len(tasks), dtype=bool)
+    for k, task in enumerate(tasks):
+        cost = np.zeros(A.shape[1])
+        cost[task.columns] = task.costs
+        least = -_FALLS * np.abs(cost).max(initial=0.0)
+        if not cost[inside].min() < 0:
+            continue
+        falls[k] = any(cost @ ray < least for ray in grows.rays)
+        # A single coordinate, or one sign, is decided by the first ray.
+        if falls[k] or cost[inside].max() <= 0:
+            continue
+        cancelling.check()
+        programs.set_cost(model, cost[inside])
+        ray = np.zeros(A.shape[1])
+        ray[inside] = _corner(model, both, one, cost[inside])
+        falls[k] = _is_ray(A, ray) and cost @ ray < least * ray.sum()
+        if falls[k]:
+            grows.rays.append(ray / ray.sum())
+    return falls
+
+
+def _corner(model: highspy.Highs, A: sparse.csc_matrix, b: Floats, cost: Floats) -> Floats:
+    """The y ≥ 0 (n,) at which a solved model ends, to rounding if it has a basis."""
+    y = programs.solve(model)[1]
+    basis = programs.basis(model)
+    if basis is not None:
+        with suppress(RuntimeError):  # singular basis
+            y = programs.vertex(A, b, cost, *basis)[0]
+    return np.maximum(y, 0.0)
+
+
+def balances(A: sparse.csr_matrix, b: Floats) -> bool:
+    """Whether some y ≥ 0 has A y = b, to rounding; rows of A and b of order 1."""
+    return any(
+        np.abs(A @ y - b).max(initial=0.0) <= _BALANCED_DIRECTION * max(1.0, y.sum())
+        for y in programs.points(A, b)
+        if len(y) == A.shape[1]
+    )
 
 
 def bounding_rows(A: sparse.csr_matrix) -> Floats | None:

@@ -6,7 +6,9 @@ bound the value from the other side. For any λ and slack s = c − Aᵀλ,
     c·y = b·λ + s·y ≥ b·λ − W max_k(−s_k/w_k)₊   for all y ≥ 0 in S,
 
 where w > 0 is a fixed combination of the rows of A (the pressure row, if there is one) and W its
-prescribed value. Programs that the interior-point method does not finish are solved from scratch by
+prescribed value. In an unbounded S no such w exists, but one that is positive where y cannot grow
+(`certificates.growing`), and 0 elsewhere: there s ≥ 0 is required up to rounding, which is counted
+for y up to _FAR. Programs that the interior-point method does not finish are solved from scratch by
 HiGHS.
 """
 
@@ -23,16 +25,22 @@ import numpy as np
 from scipy import sparse
 
 from granforce.numerics import certificates, highs, linear_programs
+from granforce.numerics.certificates import Growing
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre, Program, ProgramOutcome
-from granforce.records import Cancelled, worker_count
+from granforce.records import Cancelled, UnboundedError, worker_count
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
-from granforce.types import Floats, Progress
+from granforce.types import Floats, Mask, Progress
 
 # HiGHS accepts a vertex as the optimum if no slack is below −10⁻¹⁰ of its costs; summed over all
 # forces this can exceed INTERVAL_GAP.
 _DEARER = 1e3
+# Largest y, in ⟨f_n⟩, of coordinates that grow, up to which bounds hold in spite of rounding.
+_FAR = 1e4
+# Rounding of bounds in an unbounded S, relative to W: near the friction at which more contacts
+# could grow, bounds may be thousands of ⟨f_n⟩.
+_ROUNDED = 1e-12
 
 
 class System(NamedTuple):
@@ -43,10 +51,12 @@ class System(NamedTuple):
     A: sparse.csc_matrix  # (rows, n)
     b: Floats
     loads: sparse.csc_matrix  # (rows, N_c) added to A y by F = 1 on each contact
-    weight: Floats  # (n,) w > 0
-    total: float  # W: w·y = W for every y in S; a load F on contact c adds F gains[c]
+    weight: Floats  # (n,) w > 0; inf at coordinates that grow, which it does not bound
+    total: float  # W ≥ w·y for every y in S; a load F on contact c adds F gains[c]
     gains: Floats  # (N_c,)
     combination: Floats  # (rows,) w = Aᵀ combination
+    grows: Growing | None  # None if S is bounded
+    accuracy: float  # largest gap of a certified value: INTERVAL_GAP, or the rounding if larger
 
     def under(self, load: Floats) -> System:
         """The same with one load on the balance, A y + F load = b, instead of pairs on contacts."""
@@ -54,6 +64,19 @@ class System(NamedTuple):
         rows[: len(load)] = load
         gain = np.array([-(rows @ self.combination)])
         return self._replace(loads=sparse.csc_matrix(rows[:, None]), gains=gain)
+
+    def without_limit(self, tasks: Sequence[Program]) -> Mask:
+        """(k,) bool: whether the minimum of each load-free task is −∞, proved by a ray."""
+        assert self.grows is not None  # nothing falls for ever in a bounded S
+        return certificates.without_limit(_with_unit_rows(self.A), self.grows, tasks)
+
+    def carries_any(self, contact: int) -> bool:
+        """Whether the load F on this contact has no limit, as forces balance it alone."""
+        if self.grows is None:
+            return False
+        scale = _row_scale(self.A)
+        load = scale * self.loads[:, [contact]].toarray().ravel()
+        return certificates.balances(_with_unit_rows(self.A), -load)
 
 
 def make_system(
@@ -69,9 +92,10 @@ def make_system(
     bounding: the row of A that bounds y > 0, or None. The rows of A are the Problem's balance, then
     its sides and pinned components.
 
-    Raises NotJammedError if S is empty, InputError if it is unbounded, UndecidedError if neither
-    can be proved.
+    Raises NotJammedError if S is empty, UnboundedError if it is unbounded and what grows cannot be
+    proved, UndecidedError if neither can be proved.
     """
+    grows = None
     if bounding is not None:
         combination = np.zeros(len(b))
         combination[bounding] = 1.0
@@ -82,9 +106,15 @@ def make_system(
         combination = -linear_programs.multipliers(problem, A, no_cost, balance, middle.z)
         weight = A.T @ combination
         if not middle.reached or weight.min(initial=1.0) <= 0:
-            combination = _bounding_rows(A, b)
+            combination, grows = _bounding_rows(A, b)
             weight = A.T @ combination
         total = float(b @ combination)
+    accuracy = INTERVAL_GAP
+    if grows is not None:
+        middle = middle._replace(reached=False)
+        total += _FAR * np.maximum(-weight[grows.mask], 0.0).sum()
+        weight = np.where(grows.mask, np.inf, weight)
+        accuracy = max(accuracy, _ROUNDED * total)
     return System(
         problem=problem,
         middle=middle,
@@ -95,21 +125,27 @@ def make_system(
         total=total,
         gains=-(loads.T @ combination),
         combination=combination,
+        grows=grows,
+        accuracy=accuracy,
     )
 
 
-def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
-    """π with Aᵀπ > 0: the duals of max Σ y, which exist if S is bounded and not empty."""
+def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Growing | None]:
+    """π with Aᵀπ > 0, where nothing grows: the duals of max Σ y, if S is bounded and not empty."""
     model = highs.standard_form(A, b)
     highs.set_cost(model, -np.ones(A.shape[1]))
     for status, _ in highs.solutions(model):
         rows = -np.array(model.getSolution().row_dual)
         if status == highs.OPTIMAL and (A.T @ rows).min(initial=1.0) > 0:
-            return rows
+            return rows, None
     rows = certificates.bounding_rows(A)
-    if rows is None:
-        raise certificates.why_unsolved(A, b)
-    return rows
+    if rows is not None:
+        return rows, None
+    why = certificates.why_unsolved(A, b)
+    grows = certificates.growing(_with_unit_rows(A)) if isinstance(why, UnboundedError) else None
+    if grows is None:
+        raise why
+    return _row_scale(A) * grows.rows, grows
 
 
 class _Batch(NamedTuple):
@@ -119,13 +155,14 @@ class _Batch(NamedTuple):
     tasks: Sequence[Program]
     bounds: dict[Any, tuple[float, float]]  # {key: (value attained in S, value that bounds it)}
     points: dict[Any, Floats] | None  # {key: y (n,) at which the value is attained}
+    accuracy: float
 
     def open(self, numbers: Iterable[int]) -> list[int]:
-        """The numbers whose value and bound are not yet within INTERVAL_GAP."""
+        """The numbers whose value and bound are not yet within the accuracy."""
         none = np.inf, -np.inf
         known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
         # A value below its bound comes from a state whose unbalance, though small, costs too much.
-        return [k for k, value, bound in known if not abs(value - bound) <= INTERVAL_GAP]
+        return [k for k, value, bound in known if not abs(value - bound) <= self.accuracy]
 
 
 class Solver:
@@ -161,7 +198,7 @@ class Solver:
         points: a dict to fill with the y (n,) at which each key's value is attained. After
         cancelling, the programs finished so far are returned.
         """
-        batch = _Batch(keys, tasks, {}, points)
+        batch = _Batch(keys, tasks, {}, points, self.system.accuracy)
         with suppress(Cancelled):
             self._solve(batch, range(len(keys)))
         return batch.bounds
@@ -254,9 +291,12 @@ def _certify(
             multiplier[:, k] *= 1 / pull if pull > 0 else np.nan
             gain[k] = max(0.0, system.gains[task.loaded])
     slack = cost - system.A.T @ multiplier
+    far = np.zeros(len(outcomes))
+    if system.grows is not None:
+        far = _FAR * np.maximum(-slack[system.grows.mask], 0.0).sum(axis=0)
     short = np.maximum(np.max(-slack / system.weight[:, None], axis=0), 0.0)
     # One by one: the rounding of a matrix product would depend on the other programs.
-    bound = np.array([system.b @ one for one in multiplier.T.copy()]) - system.total * short
+    bound = np.array([system.b @ one for one in multiplier.T.copy()]) - system.total * short - far
     # w·y may grow with the load: −F ≥ bound − short · gain · F.
     bound = np.where(short * gain < 1, bound / (1 - short * gain), -np.inf)
     admitted = (np.abs(unbalance).max(axis=0) <= BALANCED) & (y.min(axis=0) >= 0)
@@ -294,7 +334,7 @@ def most_under(system: System) -> tuple[float, float, Floats]:
         bound = max(bound, below)
         if value < best:
             best, reached = value, outcome.y
-        if best - bound <= INTERVAL_GAP:
+        if best - bound <= system.accuracy:
             return best, bound, reached
     # F has no limit if forces balance the load alone.
     load = system.loads.toarray().ravel()
@@ -329,6 +369,11 @@ def _row_scale(A: sparse.csr_matrix) -> Floats:
     """Factors that scale the largest entry of each row to 1, the row size of the tolerances."""
     largest = abs(A).max(axis=1).toarray().ravel()
     return 1 / np.where(largest > 0, largest, 1.0)
+
+
+def _with_unit_rows(A: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A with the largest entry of each row scaled to 1."""
+    return sparse.csr_matrix(sparse.diags(_row_scale(A)) @ A)
 
 
 def _cost_of(system: System, task: Program) -> Floats:

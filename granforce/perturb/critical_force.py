@@ -36,6 +36,7 @@ from granforce.records import (
     InputError,
     Packing,
     UndecidedError,
+    brief_list,
     moderate,
     positive,
     real,
@@ -172,9 +173,12 @@ def critical_forces(
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # cancelling leaves limit loads uncomputed
-    for number in np.asarray(contacts)[np.isposinf(limit_loads)]:
+    stuck = np.asarray(contacts)[np.isposinf(limit_loads)]
+    if len(stuck):
+        of = f"contact {stuck[0]}" if len(stuck) == 1 else f"contacts {brief_list(stuck)}"
         raise InputError(
-            f"the balance of both grains of contact {number} is not required: no load moves them"
+            f"no force pair moves the grains of {of}: other contacts can balance any, or the "
+            "balance of neither grain is required; choose other contacts (--contacts, contacts=)"
         )
     if not np.isfinite(limit_loads).all():
         number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]

@@ -92,8 +92,8 @@ def load_factor(
     to +x. Loads on grains whose balance is left open have no effect. One linear program, by HiGHS;
     the network and the multipliers that certify the limit are checked here.
 
-    Raises InputError if a pressure is prescribed, if the load acts on no grain, and if forces in S
-    are unbounded; UndecidedError if the limit could not be certified.
+    Raises InputError if a pressure is prescribed, and if the load acts on no grain; UndecidedError
+    if the limit could not be certified.
     """
     return _limit(with_idle(ensemble), load)
 
@@ -102,7 +102,8 @@ def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LoadFactor:
     load = _loads(S.packing, load)
     direction, unit = _direction(S, load)
     unit /= S.force_scale
-    value, bound, y = most_under(make_system(S).under(direction))
+    system = make_system(S, unbounded=True).under(direction)
+    value, bound, y = most_under(system)
     if value == -np.inf:
         return LoadFactor(np.inf, 0.0, load, np.full((len(S.packing.contacts.i), 2), np.nan))
     if np.isfinite(value):
@@ -112,7 +113,7 @@ def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LoadFactor:
         under = replace(S, b=S.b + value * S.force_scale * direction, computed=None)
         forces = some_network(under, starting_network(S))
         value = value if under.admits(forces) else np.inf
-    if not abs(value - bound) <= INTERVAL_GAP:
+    if not abs(value - bound) <= system.accuracy:
         raise UndecidedError("the limit of this load could not be certified")
     # Differences of two rounded numbers; λ is 0 if nothing but the weights can be balanced.
     return LoadFactor(max(0.0, -value) / unit, abs(value - bound) / unit, load, S.expand(forces))

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import xarray as xr
 
 from granforce import measures
@@ -19,14 +20,22 @@ UNDETERMINED = 1e-6
 
 
 def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -> xr.Dataset:
-    """Intervals as a dataset, with their measures and the clusters of undetermined contacts."""
+    """Intervals as a dataset, with their measures and the clusters of undetermined contacts.
+
+    In an unbounded S η3 would be ∞/∞ and is NaN; the correlation is that of the bounded contacts.
+    """
     low, high = bounds.low, bounds.high
     place = S.positions(bounds.contacts)
     original = S.original[place]
     tolerance = UNDETERMINED * S.force_scale
     i, j = S.contacts.i[place], S.contacts.j[place]
     cluster, _ = measures.undetermined_clusters(i, j, high - low, tolerance)
-    extent = measures.normal_extent(low, high)
+    some = bounds.bounded
+    position, correlation = np.full(len(place), np.nan), np.nan
+    if some.any():
+        within = low[some], high[some]
+        position[some] = measures.position_in_interval(original[some, 0], *within)
+        correlation = measures.correlation(original[some, 0], measures.normal_extent(*within))
     return labelled(
         {
             "backbone": bounds.contacts,
@@ -35,10 +44,10 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
             "high": high,
             "interval_gap": bounds.gap,
             "max_gap": bounds.max_gap,
-            "position": measures.position_in_interval(original[:, 0], low, high),
+            "position": position,
             "cluster": cluster,
-            "eta3": measures.eta3(low, high),
-            "correlation": measures.correlation(original[:, 0], extent),
+            "eta3": measures.eta3(low, high) if some.all() else np.nan,
+            "correlation": correlation,
             **extension(S),
             "coordination": S.coordination,
             "packing_fraction": S.packing.packing_fraction,

@@ -73,12 +73,14 @@ def inference_dataset(
     sigma: Floats,
     certain: Any = None,
     *,
+    unmeasured: float,
     keep: int | None = None,
     seconds: float = 0.0,
 ) -> xr.Dataset:
     """An Inference and its measurement as a dataset; draws stored as in `walk_dataset`.
 
-    certain: a Carrying of contacts that were not measured, if requested.
+    certain: a Carrying of contacts that were not measured, if requested. unmeasured: the standard
+    error of unmeasured components, in ⟨f_n⟩.
     """
     arrays: dict[str, Any] = {
         "backbone": S.index,
@@ -90,6 +92,8 @@ def inference_dataset(
         "suspect": inference.suspects,
         "chi_square": inference.chi_square,
         "freedom": inference.freedom,
+        "unmeasured": unmeasured,
+        "bounded": int(S.bounded),
         "force_scale": S.force_scale,
         **extension(S),
         **S.skipped,
@@ -127,6 +131,12 @@ def _picked(count: int, keep: int | None) -> slice | Integers:
     return np.linspace(0, count - 1, keep).astype(int)
 
 
+_MEASURES = (
+    *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
+    "original_distance",
+)
+
+
 def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, Any]:
     """Measures of all states, and the picked states; NaN without states."""
     known = {
@@ -143,13 +153,13 @@ def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, 
         return known | {"distance_to_centre": [], "low": unknown, "high": unknown}
     centre = measures.mean_network(states)
     low, high = measures.sampled_intervals(states)
+    distance = measures.distances(states, centre) / S.force_scale
+    known |= {"distance_to_centre": distance[pick], "low": low, "high": high}
+    if not S.bounded:  # measures would grow with the number of states
+        return known | dict.fromkeys(_MEASURES, np.nan)
     extent = measures.normal_extent(low, high)
     in_error = measures.correlation_range(states, extent)
-    distance = measures.distances(states, centre) / S.force_scale
     return known | {
-        "distance_to_centre": distance[pick],
-        "low": low,
-        "high": high,
         "eta1": measures.eta1(states),
         "eta2": measures.eta2(states),
         "eta3": measures.eta3(low, high),

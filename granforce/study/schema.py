@@ -108,6 +108,8 @@ VARIABLES: dict[str, Variable] = {
     "suspect": _whole("beyond", "contacts in the packing beyond 3 σ"),
     "chi_square": _real("", "1", "χ² of the likeliest network"),
     "freedom": _whole("", "degrees of freedom of χ²"),
+    "unmeasured": _real("", _SCALE, "standard error with which unmeasured forces count as 0"),
+    "bounded": _whole("", "1 if S is bounded, 0 if only `unmeasured` limits some forces"),
     # results from a set of states: bounds seen, measures, cost
     "original": _real("contact component", "force", f"the packing's own network, {_COMPONENT}"),
     "low": _real("contact component", "force", f"smallest value, {_COMPONENT}"),

@@ -94,8 +94,12 @@ def intervals(arguments: argparse.Namespace) -> None:
     _, parameters, dataset, ends = _exact(arguments, kinds.INTERVALS)
     forces = unit(arguments, dataset)
     low, high = (dataset[side].values for side in ("low", "high"))
+    bounded = np.isfinite(high - low)
     # Entries of earlier versions also have positions of determined forces.
-    position = measures.position_in_interval(dataset["original"].values[:, 0], low, high)
+    position = np.full(len(low), np.nan)
+    if (whole := bounded.all(axis=1)).any():
+        normal = dataset["original"].values[whole, 0]
+        position[whole] = measures.position_in_interval(normal, low[whole], high[whole])
     cluster = dataset["cluster"].values
     undetermined = np.isfinite(position)
     histogram = np.histogram(np.clip(position[undetermined], 0, 1), bins=10, range=(0, 1))[0]
@@ -105,6 +109,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "coordination": dataset["coordination"].item(),
         "exact_eta3": dataset["eta3"].item(),
         **forces.reported(extents(dataset)),
+        **_without_limit(bounded),
         "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
@@ -124,19 +129,33 @@ def intervals(arguments: argparse.Namespace) -> None:
             write_columns(arguments.out, columns | {"cluster": cluster})
 
 
+def _without_limit(bounded: Any) -> dict[str, int]:
+    """Numbers of contacts with an infinite interval, of bounded (N_c, 2) f_n and f_t; if any."""
+    if bounded.all():
+        return {}
+    return {
+        "contacts_with_unbounded_f_n": int(np.sum(~bounded[:, 0])),
+        "contacts_with_unbounded_f_t": int(np.sum(~bounded[:, 1])),
+    }
+
+
 def limit_loads(arguments: argparse.Namespace) -> None:
     """Compute or load limit loads, and report them."""
     _, parameters, dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
     forces, load = unit(arguments, dataset), dataset["limit_load"].values
-    reported = {
-        "mean_normal_force": dataset["force_scale"].item(),
-        "mean_limit_load": float(load.mean()),
-        "least_limit_load": float(load.min()),
-        "largest_limit_load": float(load.max()),
-    }
+    finite = load[np.isfinite(load)]
+    reported = {"mean_normal_force": dataset["force_scale"].item()}
+    if len(finite):
+        reported |= {
+            "mean_limit_load": float(finite.mean()),
+            "least_limit_load": float(finite.min()),
+            "largest_limit_load": float(finite.max()),
+        }
+    without = len(load) - len(finite)
     lines = {
         "contacts": len(load),
         **forces.reported(reported),
+        **({"contacts_without_a_limit": without} if without else {}),
         **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,

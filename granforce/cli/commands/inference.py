@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 
 import numpy as np
 
@@ -99,6 +100,8 @@ def infer(arguments: argparse.Namespace) -> int | None:
         **forces.reported({"mean_change_of_f_n": float(np.nanmean(change[:, 0]))}),
         "suspects": dataset["suspect"].values.tolist(),
     }
+    if "unmeasured" in dataset:  # entries of earlier versions lack it
+        lines["unmeasured_spread"] = dataset["unmeasured"].item()
     columns = contact_labels(arguments, parameters, dataset)
     for k, part in enumerate(("f_n", "f_t")):
         columns |= forces.named({part: dataset["inferred"].values[:, k]})
@@ -110,6 +113,12 @@ def infer(arguments: argparse.Namespace) -> int | None:
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
         columns |= forces.named({"f_n_least": least})
+    if states and "bounded" in dataset and not dataset["bounded"].item():
+        print(
+            "granforce: S is unbounded: error bars of forces that the measurements do not bound "
+            f"depend on --unmeasured, which is {lines['unmeasured_spread']:g} ⟨f_n⟩",
+            file=sys.stderr,
+        )
     if states:
         error = dataset["standard_error"].values
         lines |= {"states": dataset.sizes["state"]}

@@ -21,7 +21,8 @@ from granforce.cli.results import (
     without_work,
 )
 from granforce.cli.tables import write_columns, write_csv, write_states
-from granforce.records import whole, worker_count
+from granforce.explore.random_walk import UNBOUNDED_WALK
+from granforce.records import InputError, whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
@@ -37,6 +38,8 @@ DIGITS = 9
 def walk(arguments: argparse.Namespace) -> None:
     """Make or load a random walk, and report its course."""
     entry, parameters, dataset, ends = walked(arguments, arguments.out)
+    if np.isnan(dataset["eta1"].item()):
+        print(f"granforce: {UNBOUNDED_WALK}: η1, η2 and η3 are undefined", file=sys.stderr)
     write_states(arguments, parameters, dataset)
     lines = {
         "entry": entry,
@@ -117,6 +120,10 @@ def volume(arguments: argparse.Namespace) -> int:
 def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or loaded."""
     _, parameters, dataset, _ = walked(arguments, arguments.out)
+    if np.isnan(dataset["eta1"].item()):
+        raise InputError(
+            f"{UNBOUNDED_WALK}: nothing to measure; granforce intervals has its bounds"
+        )
     forces = unit(arguments, dataset)
     names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
     lines = {

@@ -15,7 +15,7 @@ from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import LEAST_ACCURACY, volume
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import UNMEASURED
+from granforce.forces.likeliest import UNMEASURED, spread_of
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.motion.gauss_seidel import gauss_seidel
@@ -271,9 +271,8 @@ def _inference_parameters(
     asked: the conditions.
     """
     size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
-    if unmeasured is None:
-        unmeasured = remeasured.UNMEASURED if again else UNMEASURED
-    named = {"measured": hash_of(*measured), "unmeasured": positive(unmeasured, "unmeasured")}
+    spread = None if unmeasured is None else positive(unmeasured, "unmeasured")
+    named = {"measured": hash_of(*measured), "unmeasured": spread}
     named |= {"again": True} if again else {}
     return {**cones_of(packing, mu, **asked), **size, **named, "certain": bool(certain)}
 
@@ -296,22 +295,29 @@ def _inference(
     S = ensemble_of(store, parameters)
     forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
     again = parameters.get("again") and parameters["states"]
+    usual = remeasured.UNMEASURED if again else UNMEASURED
+    unmeasured = spread_of(S, parameters["unmeasured"], usual)
     result = (remeasured.remeasured if again else infer)(
         *(S, forces, sigma),
         states=parameters["states"],
         seed=parameters["seed"],
         chains=parameters["chains"],
-        unmeasured=parameters["unmeasured"],
+        unmeasured=unmeasured,
         workers=workers,
         progress=progress,
     )
     certain = None
     if parameters["certain"]:
-        options = {"unmeasured": parameters["unmeasured"], "workers": workers}
-        certain = carrying(S, forces, sigma, progress=progress, **options)
+        certain = carrying(
+            S, forces, sigma, unmeasured=unmeasured, workers=workers, progress=progress
+        )
         cancelling.check("inference")
-    options = {"keep": parameters["keep"], "seconds": time.perf_counter() - begin}
-    return inference_dataset(S, result, forces, sigma, certain, **options)
+    return inference_dataset(
+        *(S, result, forces, sigma, certain),
+        unmeasured=unmeasured,
+        keep=parameters["keep"],
+        seconds=time.perf_counter() - begin,
+    )
 
 
 def _informative_parameters(

@@ -1,11 +1,14 @@
 """The numbers of the results line: values with errors, and what they are worth in words."""
 
+import numpy as np
 import pytest
+import xarray as xr
 from small_store import ROOT
 
 from app.explore import result_values
 from app.explore.result_values import between, short, with_error
 from app.explore.results_line import tables
+from app.packing import view
 from app.results.library import Library
 
 
@@ -59,3 +62,18 @@ def test_errors_have_two_digits():
     assert with_error(0.5, float("nan")) == "0.5"
     assert between(1.40012, 1.40034) == "1.40012 … 1.40034" and between(2.0, 2.0) == "2"
     assert short(1e-17) == "0" and short(float("nan")) == "–"
+
+
+def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
+    high = np.array([[3.0, 0.0], [np.inf, 0.0], [1.0, 0.0]])
+    possible = xr.Dataset(
+        {
+            "low": (("contact", "component"), np.zeros((3, 2))),
+            "high": (("contact", "component"), high),
+            "force_scale": 2.0,
+        }
+    )
+    assert result_values._mean_extent(possible) == "1"
+    exact = {"low": np.zeros(3), "high": high[:, 0]}
+    assert view.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
+    assert np.isfinite(view.full_extent(None, exact))

@@ -98,6 +98,7 @@ class BarsFigure:
         self.dots.glyph.size = size
         set_range(self.figure.x_range, 0, len(contacts) + 1)
         highest = np.fmax.reduce([scaled[name] for name in ("whole_high", "exact_high", "high")])
+        highest = np.where(np.isinf(highest), np.nan, highest)  # without an upper bound
         counted = original >= CARRYING if relative else np.ones(len(original), dtype=bool)
         top = 1.04 * float(np.nanmax(highest[counted], initial=1.0))
         set_range(self.figure.y_range, 0, top)
