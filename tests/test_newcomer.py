@@ -830,3 +830,14 @@ def test_the_library_scans_the_cells_of_the_command(cache):
 def test_walls_on_which_nothing_presses_are_refused_with_what_to_add(walls):
     with pytest.raises(gf.InputError, match=r"add --gravity 1 \(gravity=1\)"):
         gf.from_disks([[0.5, 0.5], [0.5, 1.5]], [0.5, 0.5], mu=0.5, walls=walls)
+
+
+def test_a_sample_that_is_too_small_is_noted(cache, capsys):
+    gf.save_packing(packed(12, 0.3), "p.npz")
+    Path("m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
+    for command in ("uniform p.npz", "infer p.npz --measured m.csv"):
+        assert main([*command.split(), "--states", "8"]) == 0
+        told = capsys.readouterr().err.splitlines()[-1]
+        assert told.startswith("granforce: the sample is unreliable: ") and "--states" in told
+    assert main("uniform p.npz --states 600".split()) == 0
+    assert "unreliable" not in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar, Self
 
@@ -30,6 +30,13 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
         for part in value if sentences else [value]:
             print(f"{name:<{width}}  {text(part)}")
             name = ""
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Notes on a report as lines on stderr; after it, where both go to one place."""
+    sys.stdout.flush()
+    for note in notes:
+        print(f"granforce: {note}", file=sys.stderr)
 
 
 @contextmanager

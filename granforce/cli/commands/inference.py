@@ -11,6 +11,7 @@ from granforce.cli.results import (
     conditions,
     contact_labels,
     found,
+    sample_notes,
     unit,
     without_work,
 )
@@ -19,7 +20,7 @@ from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.system.plain import spaced
-from granforce.system.terminal import report_after, table
+from granforce.system.terminal import print_notes, report_after, table
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -121,4 +122,6 @@ def infer(arguments: argparse.Namespace) -> int | None:
     with report_after(without_work(lines | ends, arguments), arguments.json):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
+    if states and not arguments.again:  # those draws are independent
+        print_notes(sample_notes(dataset))
     return None
