@@ -841,3 +841,22 @@ def test_a_sample_that_is_too_small_is_noted(cache, capsys):
         assert told.startswith("granforce: the sample is unreliable: ") and "--states" in told
     assert main("uniform p.npz --states 600".split()) == 0
     assert "unreliable" not in capsys.readouterr().err
+
+
+def test_numbers_per_contact_bound_the_normal_force_alone():
+    packing = gf.scene("groove", 0.3)
+
+    def bounds(*known, **sides):
+        exact = gf.intervals(gf.ensemble(packing, known=gf.Known(*known, **sides)))
+        return exact.low.tolist(), exact.high.tolist()
+
+    for brief, full in (
+        (([0], [0.6]), ([0], [[0.6, -np.inf]])),
+        ((0, 0.6, 0.6), ([0], [[0.6, -np.inf]], [[0.6, np.inf]])),
+        (([0, 1], [0.5, 0.6]), ([0, 1], [[0.5, -np.inf], [0.6, -np.inf]])),
+    ):
+        assert bounds(*brief) == bounds(*full)
+    assert bounds([0], high=[0.6]) == bounds([0], [[-np.inf] * 2], [[0.6, np.inf]])
+    for wrong in (gf.Known([0, 1, 2], [0.5, 0.6]), {13: 0.05}):
+        with pytest.raises(gf.InputError, match=r"f_n alone, as in gf\.Known\("):
+            gf.ensemble(packing, known=wrong)

@@ -66,8 +66,7 @@ def test_a_groove_locks_itself_where_friction_is_as_steep_as_its_walls(angle):
     assert found.intervals[1][:, 0] == pytest.approx([np.inf, np.inf])
     with pytest.raises(InputError, match=r"not bounded: .* Grain 0 .* is wedged .*contacts 0, 1"):
         gf.intervals(S)
-    limit = [np.inf, np.inf]
-    bounded = gf.Known([1], [np.negative(limit)], [[2 * S.force_scale, np.inf]])
+    bounded = gf.Known([1], high=2 * S.force_scale)
     assert np.isfinite(gf.intervals(gf.ensemble(S.packing, known=bounded)).high).all()
 
 
@@ -81,7 +80,7 @@ def test_all_wedged_rows_are_named_at_once(mu):
     assert ("a smaller friction" in message) == (mu > 0)
     if mu == 0:  # three rows, which share no direction: bounds on one contact of each are enough
         found = re.search(r"each of 3 groups, such as (\d+), (\d+), (\d+),", message)
-        known = gf.Known(list(map(int, found.groups())), [-np.inf] * 2, [9.0, np.inf])
+        known = gf.Known(list(map(int, found.groups())), high=9.0)
         assert gf.intervals(gf.ensemble(packing, known=known)).converged
 
 
