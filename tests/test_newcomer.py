@@ -207,10 +207,10 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "measure P --states 4": set(),
     "uniform P --states 8": {"reached"},
     "volume P --accuracy 0.5": set(),
-    "intervals P": set(),
+    "intervals P --contacts 0,1": set(),
     "limit-loads P --contacts 0": set(),
     "stress P --angles 4": set(),
-    "perturb P --random 1": set(),
+    "perturb P --random 1": {"critical_force_deciles"},
     "informative P --states 40 --best 2 --check 1": set(),
     "load-factor wall.npz --load horizontal --critical": set(),
     "infer P --measured m.csv --states 8 --certain": set(),
@@ -246,7 +246,7 @@ def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsy
     }
     for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
         stored.pop(name)  # the store gives these names to something else, or one for each state
-    for name in ("pressure", "reached", "critical_force"):
+    for name in ("pressure", "reached"):
         stored.pop(name)
     assert len(stored) > 25 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals p.npz".split()) == 0
@@ -860,3 +860,28 @@ def test_numbers_per_contact_bound_the_normal_force_alone():
     for wrong in (gf.Known([0, 1, 2], [0.5, 0.6]), {13: 0.05}):
         with pytest.raises(gf.InputError, match=r"f_n alone, as in gf\.Known\("):
             gf.ensemble(packing, known=wrong)
+
+
+@pytest.mark.parametrize(
+    "command, columns",
+    [
+        ("intervals", ["f_n low [packing]", "f_t low [packing]", "f_n high [packing]"]),
+        ("limit-loads", ["limit load [packing]"]),
+        ("perturb", ["limit load [packing]", "critical low [packing]", "critical high [packing]"]),
+    ],
+)
+def test_few_contacts_are_listed_under_the_report(command, columns, cache, capsys):
+    gf.save_packing(packing := packed(12, 0.3), "p.npz")
+    first, second = gf.ensemble(packing).index[[0, 4]]
+    words = f"{command} p.npz --contacts {second},{first} --out t.csv"
+    assert main(words.split()) == 0
+    told = capsys.readouterr().out
+    *_, heads, one, _ = told.splitlines()
+    assert heads.startswith("contact") and int(one.split()[0]) in (first, second)
+    assert all(column in heads for column in columns) and "deciles" not in told
+    told = report(capsys, *words.split())
+    assert sorted(told["contact"]) == [first, second]
+    written = pd.read_csv("t.csv")[columns[-1].replace(" ", "_", columns[-1].count(" ") - 1)]
+    assert told[written.name] == written.tolist()
+    if command == "perturb":
+        assert told["fit_range"] is None or np.all(np.diff(told["fit_range"]) > 0)

@@ -4,6 +4,8 @@ import textwrap
 
 from granforce.system.plain import spaced
 
+# The largest number of contacts that a report on exact results lists.
+FEW = 30
 # Names as in --json; those that are stored have the long names of the stored arrays.
 MEANINGS = {
     "dimension": "dimension h of the ensemble",
@@ -87,6 +89,11 @@ MEANINGS = {
     "mean_distance_to_centre": "mean distance of states from the centre, in units of ⟨f_n⟩",
     "mean_extent_of_f_n": "mean length of the interval of f_n",
     "largest_extent_of_f_n": "length of the longest interval of f_n",
+    "f_n_low": "smallest f_n of this contact in any network",
+    "f_n_high": "largest f_n",
+    "f_t_low": "smallest f_t, negative in the other direction",
+    "f_t_high": "largest f_t",
+    "cluster": "cluster of undetermined contacts, −1 where determined",
     "correlation": "corr(f_n, ΔF_n) of the original network",
     "correlation_low": "smallest corr(f_n, ΔF_n) of any state",
     "correlation_high": "largest corr(f_n, ΔF_n) of any state",
@@ -99,7 +106,7 @@ MEANINGS = {
     "ln_volume_per_grain": "ln V per grain of the backbone",
     "extent_over_mean_normal_force": "extent V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩",
     "paths": "paths of the billiard walk",
-    "mean_limit_load": "mean limit load (largest force pair that can be balanced)",
+    "mean_limit_load": "mean limit load",
     "least_limit_load": "smallest limit load of a contact",
     "largest_limit_load": "largest limit load of a contact",
     "largest_shear_over_pressure": "largest √((σ_xx − σ_yy)²/4 + σ_xy²)/P that the contacts can "
@@ -108,13 +115,16 @@ MEANINGS = {
     "own_shear_over_pressure": "this ratio for the packing's original forces",
     "own_normal_difference": "(σ_xx − σ_yy)/2P of the packing's original forces",
     "own_shear_stress": "σ_xy/P of the packing's original forces",
-    "critical_force": "mean critical force F_crit, the force pair at which grains start to move",
+    "mean_critical_force": "mean critical force F_crit, the force pair at which grains start to "
+    "move",
     "critical_force_deciles": "F_crit: smallest value, deciles, largest value",
-    "limit_load": "mean of the largest force pair that can be balanced",
+    "critical_low": "F_crit: largest load at rest",
+    "critical_high": "smallest load not at rest, or the limit load",
+    "limit_load": "largest force pair that can be balanced",
     "decay_exponent": "exponent α of the mean displacement |u| ~ r^−α",
     "decay_low": "lower end of the 95 % interval of α",
     "decay_high": "upper end of the 95 % interval of α",
-    "fit_range": "distances r of the fit, in the packing's units",
+    "fit_range": "distances r of the fit, in the packing's units; undefined in small packings",
     "loads_at_rest": "loads that ended at rest",
     "loads_moving": "loads that ended in steady motion",
     "loads_undecided": "loads that ended in unsteady motion",
@@ -179,10 +189,12 @@ INTERVALS = (
     *("mean_extent_of_f_n", "largest_extent_of_f_n", "correlation", "determined_contacts"),
     *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
+BOUNDS = ("f_n_low", "f_t_low", "f_n_high", "f_t_high", "cluster")
 LIMIT_LOADS = (
     *("contacts", "mean_normal_force", "mean_limit_load", "least_limit_load"),
     *("largest_limit_load", *_SOLVED),
 )
+LOADS = ("limit_load",)
 LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
     *("critical_factor_high", "precision", "residual", "breach", "converged"),
@@ -197,11 +209,13 @@ STRESS = (
     *("normal_difference_from_to", "shear_stress_from_to", "admissible_stress", *_SOLVED),
 )
 PERTURB = (
-    *("contacts", "mean_normal_force", "critical_force", "critical_force_deciles", "limit_load"),
+    *("contacts", "mean_normal_force", "mean_critical_force", "mean_limit_load"),
+    "critical_force_deciles",
     *("decay_exponent", "decay_low", "decay_high", "fit_range", "loads_at_rest", "loads_moving"),
     *("loads_undecided", "rattlers", "unloaded_contacts", "largest_residual", "largest_breach"),
     *("seconds", "cached"),
 )
+CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_contacts"),

@@ -474,12 +474,9 @@ def add_intervals(commands: Commands) -> None:
         "compute the exact interval of every contact force",
         "granforce intervals -n 400 --mu 0.1 --seed 1 --out bounds.csv",
         lines=report_lines.INTERVALS,
+        columns=report_lines.BOUNDS,
     )
-    add_exact(
-        command,
-        "; the column cluster gives the number of the group of connected undetermined contacts, "
-        "starting with the largest; −1 where forces are determined",
-    )
+    add_exact(command)
 
 
 def add_limit_loads(commands: Commands) -> None:
@@ -490,6 +487,7 @@ def add_limit_loads(commands: Commands) -> None:
         "packing can carry",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
         lines=report_lines.LIMIT_LOADS,
+        columns=report_lines.LOADS,
     )
     add_exact(command)
 
@@ -553,6 +551,7 @@ def add_perturb(commands: Commands) -> None:
         "force and the first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
         lines=report_lines.PERTURB,
+        columns=report_lines.CRITICAL,
     )
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")

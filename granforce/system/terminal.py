@@ -39,13 +39,31 @@ def print_notes(notes: Iterable[str]) -> None:
         print(f"granforce: {note}", file=sys.stderr)
 
 
+def print_columns(columns: Mapping[str, Sequence[Any]]) -> None:
+    """Columns {name: values} as a table on stdout."""
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    table(rows, list(columns), {name: spaced(name) for name in columns})
+
+
 @contextmanager
-def report_after(lines: Mapping[str, Any], as_json: bool) -> Iterator[None]:
-    """Print a report once the files are written, or cannot be: a closed pipe costs no file."""
+def report_after(
+    lines: Mapping[str, Any],
+    as_json: bool,
+    columns: Mapping[str, Sequence[Any]] | None = None,
+    **worded: Sequence[Any],
+) -> Iterator[None]:
+    """Print a report once the files are written, or cannot be: a closed pipe costs no file.
+
+    columns {name: values}: a table under the report, or more lines of the JSON report; worded:
+    values of some columns as texts, for the table.
+    """
+    columns = columns or {}
     try:
         yield
     finally:
-        print_report(lines, as_json)
+        print_report({**lines, **columns} if as_json else lines, as_json)
+        if columns and not as_json:
+            print_columns({**columns, **worded})
 
 
 def table(
