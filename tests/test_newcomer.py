@@ -4,6 +4,7 @@ import inspect
 import json
 import os
 import pydoc
+import re
 import subprocess
 import sys
 from contextlib import suppress
@@ -213,6 +214,7 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "perturb P --random 1": {"critical_force_deciles"},
     "informative P --states 40 --best 2 --check 1": set(),
     "load-factor wall.npz --load horizontal --critical": set(),
+    "rest P": {"reason"},
     "infer P --measured m.csv --states 8 --certain": set(),
     "import table pile.csv --mu 0.6 --walls floor --gravity 1": {
         *("timestep", "time", "contacts_skipped"),
@@ -885,3 +887,36 @@ def test_few_contacts_are_listed_under_the_report(command, columns, cache, capsy
     assert told[written.name] == written.tolist()
     if command == "perturb":
         assert told["fit_range"] is None or np.all(np.diff(told["fit_range"]) > 0)
+
+
+@pytest.fixture
+def pile():
+    """A pile of three disks on a floor, under gravity."""
+    x = [[1, 1], [3, 1], [2, 1 + 3**0.5]]
+    return gf.from_disks(x, np.ones(3), 0.6, walls="floor", gravity=1)
+
+
+def test_a_packing_is_tested_for_rest_and_the_reason_is_given(pile, cache, capsys):
+    gf.save_packing(pile, "pile.npz")
+    told = report(capsys, "rest", "pile.npz")
+    assert told["at_rest"] is True and "reason" not in told and told["draws_at_rest"] == [3, 3]
+    assert gf.rest(pile).reason == ""
+    rows = [(0.5 * (1 + k) + i, 0.5 + k * 0.75**0.5) for k in range(3) for i in range(5 - k)]
+    heap = gf.rest(gf.from_disks(rows, np.full(12, 0.5), 0.5, walls="floor", gravity=1))
+    assert not heap.at_rest and heap.reason[:30] in repr(heap) and not np.isnan(heap.distance)
+    assert re.fullmatch(r"grains move in 1 of 3 draws with noise of 0.01 ⟨f_n⟩", heap.reason)
+
+
+def test_conditions_of_a_periodic_box_are_refused_in_an_open_one(pile, cache, capsys):
+    gf.save_packing(pile, "pile.npz")
+    for words, said in (
+        ("stress pile.npz", "in a periodic box only; this box is open"),
+        ("intervals pile.npz --prescribe pressure", "leave it out"),
+        ("intervals pile.npz --mu 0.3", "or use --ensemble-mu for other Coulomb cones"),
+        ("pack --friction 0.1", "did you mean --mu?"),
+        ("critical-load pile.npz", "did you mean load-factor --critical?"),
+    ):
+        with suppress(SystemExit):
+            assert main(words.split()) == 2
+        told = capsys.readouterr().err
+        assert said in told and told.count("\n") == 1, words

@@ -239,8 +239,8 @@ def add_conditions(command: Parser, known: bool = True, also: str = "") -> None:
     group.add_argument(
         "--prescribe",
         choices=["pressure", "stress", "none"],
-        default="pressure",
-        help=f"prescribe the pressure (default), the whole stress, or nothing{also}",
+        help="prescribe the pressure (default in a periodic box), the whole stress (periodic box "
+        f"only), or nothing (default in an open box{also})",
     )
     group.add_argument(
         "--stress",
@@ -374,7 +374,7 @@ def add_exact(command: Parser) -> None:
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
     add_unit(group)
-    add_conditions(command, also=" (always so with --slice)")
+    add_conditions(command, also=", and with --slice")
     add_store(command)
     command.leaves_out(
         "with --slice, where the frozen contacts determine the stress",

@@ -66,6 +66,10 @@ MEANINGS = {
     "also with noise on its forces",
     "distance_to_rest": "largest change of a force before contact dynamics, solved to machine "
     "precision, comes to rest, in units of ⟨f_n⟩",
+    "reason": "why it is not at rest",
+    "noise": "standard deviations of the noise on every force, in units of ⟨f_n⟩",
+    "draws_at_rest": "draws that came to rest, for each of these",
+    "draws": "draws of noise for each of these",
     "scene": "name of the scene",
     "timestep": "time step of the snapshot",
     "time": "time of the snapshot",
@@ -199,6 +203,7 @@ LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
     *("critical_factor_high", "precision", "residual", "breach", "converged"),
 )
+REST = ("at_rest", "reason", "distance_to_rest", "noise", "draws_at_rest", "draws")
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),
     *("twins", "seconds", "cached"),

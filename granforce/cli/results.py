@@ -118,6 +118,10 @@ def prepared(
         named = packing_parameters(arguments, required_mu(arguments), arguments.seed)
     else:
         packing = importers.load_packing(arguments.packing)
+        if np.isnan(packing.pressure) and getattr(arguments, "prescribe", None) == "pressure":
+            raise InputError(
+                "--prescribe pressure needs a periodic box with a pressure: leave it out"
+            )
         named = kinds.imported_parameters(packing)
     parameters = name(named)
     check_outputs(*outputs)
@@ -190,7 +194,7 @@ def telling_eta(bar: Any) -> Callable[[Any], None]:
 def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
     """The conditions in the options, as parameters of kinds."""
     chosen = {
-        "prescribed": arguments.prescribe,
+        "prescribed": arguments.prescribe or "pressure",
         "stress": numbers("--stress", arguments.stress, float),
     }
     return chosen | known_forces(arguments)

@@ -522,6 +522,19 @@ def add_load_factor(commands: Commands) -> None:
     command.leaves_out("without --critical", lambda given: not given.critical, {"precision"})
 
 
+def add_rest(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "rest",
+        "test whether the grains of a packing stay at rest in contact dynamics, also with noise on "
+        "the forces",
+        "granforce rest packing.npz",
+        lines=report_lines.REST,
+    )
+    add_packing_file(command)
+    add_ensemble_mu(command)
+
+
 def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -851,6 +864,7 @@ COMMANDS = (
     add_intervals,
     add_limit_loads,
     add_load_factor,
+    add_rest,
     add_stress,
     add_perturb,
     add_study,

@@ -27,6 +27,7 @@ from granforce.cli.tables import write_columns
 from granforce.explore.stress_outline import stress_inside
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
+from granforce.motion import rest as motion
 from granforce.packing import importers
 from granforce.perturb import grain_loads
 from granforce.perturb.critical_force import COUNTS
@@ -175,6 +176,16 @@ def load_factor(arguments: argparse.Namespace) -> None:
             "breach": critical.breach,
             "converged": critical.converged,
         }
+    print_report(lines, arguments.json)
+
+
+def rest(arguments: argparse.Namespace) -> None:
+    """Test whether contact dynamics leaves a packing at rest."""
+    found = motion.rest(importers.load_packing(arguments.packing), mu=arguments.ensemble_mu)
+    lines: dict[str, Any] = {"at_rest": found.at_rest}
+    lines |= {} if found.at_rest else {"reason": found.reason}
+    lines |= {"distance_to_rest": found.distance, "noise": list(found.noise)}
+    lines |= {"draws_at_rest": found.stayed.sum(axis=1).tolist(), "draws": found.stayed.shape[1]}
     print_report(lines, arguments.json)
 
 
