@@ -4,6 +4,7 @@ import inspect
 import json
 import os
 import pydoc
+import re
 import subprocess
 import sys
 from contextlib import suppress
@@ -207,12 +208,13 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "measure P --states 4": set(),
     "uniform P --states 8": {"reached"},
     "volume P --accuracy 0.5": set(),
-    "intervals P": set(),
+    "intervals P --contacts 0,1": set(),
     "limit-loads P --contacts 0": set(),
     "stress P --angles 4": set(),
-    "perturb P --random 1": set(),
+    "perturb P --random 1": {"critical_force_deciles"},
     "informative P --states 40 --best 2 --check 1": set(),
     "load-factor wall.npz --load horizontal --critical": set(),
+    "rest P": {"reason"},
     "infer P --measured m.csv --states 8 --certain": set(),
     "import table pile.csv --mu 0.6 --walls floor --gravity 1": {
         *("timestep", "time", "contacts_skipped"),
@@ -246,7 +248,7 @@ def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsy
     }
     for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
         stored.pop(name)  # the store gives these names to something else, or one for each state
-    for name in ("pressure", "reached", "critical_force"):
+    for name in ("pressure", "reached"):
         stored.pop(name)
     assert len(stored) > 25 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals p.npz".split()) == 0
@@ -830,3 +832,91 @@ def test_the_library_scans_the_cells_of_the_command(cache):
 def test_walls_on_which_nothing_presses_are_refused_with_what_to_add(walls):
     with pytest.raises(gf.InputError, match=r"add --gravity 1 \(gravity=1\)"):
         gf.from_disks([[0.5, 0.5], [0.5, 1.5]], [0.5, 0.5], mu=0.5, walls=walls)
+
+
+def test_a_sample_that_is_too_small_is_noted(cache, capsys):
+    gf.save_packing(packed(12, 0.3), "p.npz")
+    Path("m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
+    for command in ("uniform p.npz", "infer p.npz --measured m.csv"):
+        assert main([*command.split(), "--states", "8"]) == 0
+        told = capsys.readouterr().err.splitlines()[-1]
+        assert told.startswith("granforce: the sample is unreliable: ") and "--states" in told
+    assert main("uniform p.npz --states 600".split()) == 0
+    assert "unreliable" not in capsys.readouterr().err
+
+
+def test_numbers_per_contact_bound_the_normal_force_alone():
+    packing = gf.scene("groove", 0.3)
+
+    def bounds(*known, **sides):
+        exact = gf.intervals(gf.ensemble(packing, known=gf.Known(*known, **sides)))
+        return exact.low.tolist(), exact.high.tolist()
+
+    for brief, full in (
+        (([0], [0.6]), ([0], [[0.6, -np.inf]])),
+        ((0, 0.6, 0.6), ([0], [[0.6, -np.inf]], [[0.6, np.inf]])),
+        (([0, 1], [0.5, 0.6]), ([0, 1], [[0.5, -np.inf], [0.6, -np.inf]])),
+    ):
+        assert bounds(*brief) == bounds(*full)
+    assert bounds([0], high=[0.6]) == bounds([0], [[-np.inf] * 2], [[0.6, np.inf]])
+    for wrong in (gf.Known([0, 1, 2], [0.5, 0.6]), {13: 0.05}):
+        with pytest.raises(gf.InputError, match=r"f_n alone, as in gf\.Known\("):
+            gf.ensemble(packing, known=wrong)
+
+
+@pytest.mark.parametrize(
+    "command, columns",
+    [
+        ("intervals", ["f_n low [packing]", "f_t low [packing]", "f_n high [packing]"]),
+        ("limit-loads", ["limit load [packing]"]),
+        ("perturb", ["limit load [packing]", "critical low [packing]", "critical high [packing]"]),
+    ],
+)
+def test_few_contacts_are_listed_under_the_report(command, columns, cache, capsys):
+    gf.save_packing(packing := packed(12, 0.3), "p.npz")
+    first, second = gf.ensemble(packing).index[[0, 4]]
+    words = f"{command} p.npz --contacts {second},{first} --out t.csv"
+    assert main(words.split()) == 0
+    told = capsys.readouterr().out
+    *_, heads, one, _ = told.splitlines()
+    assert heads.startswith("contact") and int(one.split()[0]) in (first, second)
+    assert all(column in heads for column in columns) and "deciles" not in told
+    told = report(capsys, *words.split())
+    assert sorted(told["contact"]) == [first, second]
+    written = pd.read_csv("t.csv")[columns[-1].replace(" ", "_", columns[-1].count(" ") - 1)]
+    assert told[written.name] == written.tolist()
+    if command == "perturb":
+        assert told["fit_range"] is None or np.all(np.diff(told["fit_range"]) > 0)
+
+
+@pytest.fixture
+def pile():
+    """A pile of three disks on a floor, under gravity."""
+    x = [[1, 1], [3, 1], [2, 1 + 3**0.5]]
+    return gf.from_disks(x, np.ones(3), 0.6, walls="floor", gravity=1)
+
+
+def test_a_packing_is_tested_for_rest_and_the_reason_is_given(pile, cache, capsys):
+    gf.save_packing(pile, "pile.npz")
+    told = report(capsys, "rest", "pile.npz")
+    assert told["at_rest"] is True and "reason" not in told and told["draws_at_rest"] == [3, 3]
+    assert gf.rest(pile).reason == ""
+    rows = [(0.5 * (1 + k) + i, 0.5 + k * 0.75**0.5) for k in range(3) for i in range(5 - k)]
+    heap = gf.rest(gf.from_disks(rows, np.full(12, 0.5), 0.5, walls="floor", gravity=1))
+    assert not heap.at_rest and heap.reason[:30] in repr(heap) and not np.isnan(heap.distance)
+    assert re.fullmatch(r"grains move in 1 of 3 draws with noise of 0.01 ⟨f_n⟩", heap.reason)
+
+
+def test_conditions_of_a_periodic_box_are_refused_in_an_open_one(pile, cache, capsys):
+    gf.save_packing(pile, "pile.npz")
+    for words, said in (
+        ("stress pile.npz", "in a periodic box only; this box is open"),
+        ("intervals pile.npz --prescribe pressure", "leave it out"),
+        ("intervals pile.npz --mu 0.3", "or use --ensemble-mu for other Coulomb cones"),
+        ("pack --friction 0.1", "did you mean --mu?"),
+        ("critical-load pile.npz", "did you mean load-factor --critical?"),
+    ):
+        with suppress(SystemExit):
+            assert main(words.split()) == 2
+        told = capsys.readouterr().err
+        assert said in told and told.count("\n") == 1, words

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
-from granforce.cli.report_lines import IMPORT, explained
+from granforce.cli.report_lines import FEW, IMPORT, explained
 from granforce.glossary import RELAXATIONS
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
@@ -25,12 +25,15 @@ def subcommand(
     *,
     reports: bool = True,
     lines: tuple[str, ...] = (),
+    columns: tuple[str, ...] = (),
 ) -> Parser:
     """Add a command, which runs the function of its name in `granforce.cli.commands`.
 
-    lines: those of its report that the help explains.
+    lines: those of its report that the help explains; columns: those of its list of contacts.
     """
     report = f"Lines of the report:\n{explained(lines)}\n\n" if lines else ""
+    if columns:
+        report += f"At most {FEW} contacts are listed, with columns\n{explained(columns)}\n\n"
     command = commands.add_parser(
         name,
         help=summary,
@@ -236,8 +239,8 @@ def add_conditions(command: Parser, known: bool = True, also: str = "") -> None:
     group.add_argument(
         "--prescribe",
         choices=["pressure", "stress", "none"],
-        default="pressure",
-        help=f"prescribe the pressure (default), the whole stress, or nothing{also}",
+        help="prescribe the pressure (default in a periodic box), the whole stress (periodic box "
+        f"only), or nothing (default in an open box{also})",
     )
     group.add_argument(
         "--stress",
@@ -353,8 +356,8 @@ def add_scheduler(command: argparse._ActionsContainer) -> None:
     )
 
 
-def add_exact(command: Parser, also: str = "") -> None:
-    """Add the options of exact results; also: words on other columns of the table."""
+def add_exact(command: Parser) -> None:
+    """Add the options of exact results."""
     add_any_packing(command)
     group = command.add_argument_group("the ensemble")
     add_ensemble_mu(group)
@@ -369,9 +372,9 @@ def add_exact(command: Parser, also: str = "") -> None:
         "its sides, such as 0.2,0.8,0,1",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    add_out(group, "the result per contact", also)
+    add_out(group, "the result per contact")
     add_unit(group)
-    add_conditions(command, also=" (always so with --slice)")
+    add_conditions(command, also=", and with --slice")
     add_store(command)
     command.leaves_out(
         "with --slice, where the frozen contacts determine the stress",

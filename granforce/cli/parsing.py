@@ -82,12 +82,30 @@ def refused(reason: str) -> int:
 
 def _closest(word: str, names: Iterable[str]) -> str:
     """A question for the name that resembles a mistyped word; empty if none does."""
+    names = list(names)
+    called = _CALLED.get(word, "")
+    if called.partition(" ")[0] in names:
+        return f"; did you mean {called}?"
     near = difflib.get_close_matches(word, [str(name) for name in names], n=1, cutoff=0.7)
     return f"; did you mean {near[0]}?" if near else ""
 
 
 def _unrecognized(words: Sequence[str]) -> str:
     return f"unrecognized arguments: {' '.join(words)}"
+
+
+# Names of other programs, or of the library, and what they are called here.
+_CALLED = {
+    "--friction": "--mu",
+    "--disks": "-n",
+    "critical-load": "load-factor --critical",
+    "critical-force": "perturb",
+    "critical-forces": "perturb",
+    "sample": "uniform",
+    "bounds": "intervals",
+}
+# Options that a useless one may be mistaken for, as attributes.
+_INSTEAD = {"mu": "ensemble_mu"}
 
 
 class _Once(argparse.Action):
@@ -147,10 +165,17 @@ class Parser(argparse.ArgumentParser):
             for way in ways:
                 if useless := [typed for name, typed in given.items() if name in way.names]:
                     have, them = ("has", "it") if len(useless) == 1 else ("have", "them")
+                    other = self._instead(given.keys() & way.names)
                     self.error(
                         f"{' and '.join(useless)} {have} no effect {way.words}; leave {them} out"
+                        + (f", or use {other} for other Coulomb cones" if other else "")
                     )
         return found, unknown
+
+    def _instead(self, useless: Iterable[str]) -> str | None:
+        """The option that was meant by a useless one, as typed, or None."""
+        others = [_INSTEAD[name] for name in useless if name in _INSTEAD]
+        return self.options.get(others[0]) if others else None
 
     def _unknown(self, unknown: Sequence[str], args: Sequence[str]) -> str:
         """Why words are not understood: mistyped options, or a second value of an option."""

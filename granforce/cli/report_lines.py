@@ -4,6 +4,8 @@ import textwrap
 
 from granforce.system.plain import spaced
 
+# The largest number of contacts that a report on exact results lists.
+FEW = 30
 # Names as in --json; those that are stored have the long names of the stored arrays.
 MEANINGS = {
     "dimension": "dimension h of the ensemble",
@@ -64,6 +66,10 @@ MEANINGS = {
     "also with noise on its forces",
     "distance_to_rest": "largest change of a force before contact dynamics, solved to machine "
     "precision, comes to rest, in units of ⟨f_n⟩",
+    "reason": "why it is not at rest",
+    "noise": "standard deviations of the noise on every force, in units of ⟨f_n⟩",
+    "draws_at_rest": "draws that came to rest, for each of these",
+    "draws": "draws of noise for each of these",
     "scene": "name of the scene",
     "timestep": "time step of the snapshot",
     "time": "time of the snapshot",
@@ -90,6 +96,11 @@ MEANINGS = {
     "contacts_with_unbounded_f_n": "contacts whose f_n has no upper bound, as grains are wedged; "
     "not in the mean and largest extent",
     "contacts_with_unbounded_f_t": "contacts whose f_t has no bound on one or both sides",
+    "f_n_low": "smallest f_n of this contact in any network",
+    "f_n_high": "largest f_n",
+    "f_t_low": "smallest f_t, negative in the other direction",
+    "f_t_high": "largest f_t",
+    "cluster": "cluster of undetermined contacts, −1 where determined",
     "correlation": "corr(f_n, ΔF_n) of the original network",
     "correlation_low": "smallest corr(f_n, ΔF_n) of any state",
     "correlation_high": "largest corr(f_n, ΔF_n) of any state",
@@ -102,7 +113,7 @@ MEANINGS = {
     "ln_volume_per_grain": "ln V per grain of the backbone",
     "extent_over_mean_normal_force": "extent V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩",
     "paths": "paths of the billiard walk",
-    "mean_limit_load": "mean limit load (largest force pair that can be balanced)",
+    "mean_limit_load": "mean limit load",
     "least_limit_load": "smallest limit load of a contact",
     "largest_limit_load": "largest limit load of a contact",
     "contacts_without_a_limit": "contacts on which any force pair can be balanced; not in the mean",
@@ -112,13 +123,16 @@ MEANINGS = {
     "own_shear_over_pressure": "this ratio for the packing's original forces",
     "own_normal_difference": "(σ_xx − σ_yy)/2P of the packing's original forces",
     "own_shear_stress": "σ_xy/P of the packing's original forces",
-    "critical_force": "mean critical force F_crit, the force pair at which grains start to move",
+    "mean_critical_force": "mean critical force F_crit, the force pair at which grains start to "
+    "move",
     "critical_force_deciles": "F_crit: smallest value, deciles, largest value",
-    "limit_load": "mean of the largest force pair that can be balanced",
+    "critical_low": "F_crit: largest load at rest",
+    "critical_high": "smallest load not at rest, or the limit load",
+    "limit_load": "largest force pair that can be balanced",
     "decay_exponent": "exponent α of the mean displacement |u| ~ r^−α",
     "decay_low": "lower end of the 95 % interval of α",
     "decay_high": "upper end of the 95 % interval of α",
-    "fit_range": "distances r of the fit, in the packing's units",
+    "fit_range": "distances r of the fit, in the packing's units; undefined in small packings",
     "loads_at_rest": "loads that ended at rest",
     "loads_moving": "loads that ended in steady motion",
     "loads_undecided": "loads that ended in unsteady motion",
@@ -186,14 +200,17 @@ INTERVALS = (
     *("contacts_with_unbounded_f_t", "correlation", "determined_contacts"),
     *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
+BOUNDS = ("f_n_low", "f_t_low", "f_n_high", "f_t_high", "cluster")
 LIMIT_LOADS = (
     *("contacts", "mean_normal_force", "mean_limit_load", "least_limit_load"),
     *("largest_limit_load", "contacts_without_a_limit", *_SOLVED),
 )
+LOADS = ("limit_load",)
 LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
     *("critical_factor_high", "precision", "residual", "breach", "converged"),
 )
+REST = ("at_rest", "reason", "distance_to_rest", "noise", "draws_at_rest", "draws")
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),
     *("twins", "seconds", "cached"),
@@ -204,11 +221,13 @@ STRESS = (
     *("normal_difference_from_to", "shear_stress_from_to", "admissible_stress", *_SOLVED),
 )
 PERTURB = (
-    *("contacts", "mean_normal_force", "critical_force", "critical_force_deciles", "limit_load"),
+    *("contacts", "mean_normal_force", "mean_critical_force", "mean_limit_load"),
+    "critical_force_deciles",
     *("decay_exponent", "decay_low", "decay_high", "fit_range", "loads_at_rest", "loads_moving"),
     *("loads_undecided", "rattlers", "unloaded_contacts", "largest_residual", "largest_breach"),
     *("seconds", "cached"),
 )
+CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),

@@ -11,6 +11,7 @@ import xarray as xr
 
 from granforce import measures
 from granforce.explore.random_walk import UNBOUNDED_WALK
+from granforce.explore.uniform import FEWEST_EFFECTIVE, MIXED
 from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
@@ -119,6 +120,10 @@ def prepared(
         named = packing_parameters(arguments, required_mu(arguments), arguments.seed)
     else:
         packing = importers.load_packing(arguments.packing)
+        if np.isnan(packing.pressure) and getattr(arguments, "prescribe", None) == "pressure":
+            raise InputError(
+                "--prescribe pressure needs a periodic box with a pressure: leave it out"
+            )
         named = kinds.imported_parameters(packing)
     parameters = name(named)
     check_outputs(*outputs)
@@ -191,7 +196,7 @@ def telling_eta(bar: Any) -> Callable[[Any], None]:
 def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
     """The conditions in the options, as parameters of kinds."""
     chosen = {
-        "prescribed": arguments.prescribe,
+        "prescribed": arguments.prescribe or "pressure",
         "stress": numbers("--stress", arguments.stress, float),
     }
     return chosen | known_forces(arguments)
@@ -285,6 +290,23 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
         lines["directions_taken_as_pinned"] = dataset["flat_directions"].item()
         lines["as_narrower_than"] = dataset["resolution"].item()
     return lines
+
+
+def sample_notes(dataset: xr.Dataset) -> list[str]:
+    """A note if the states of a sample are not to be relied on, and what to do."""
+    r_hat, sizes = dataset["worst_r_hat"].item(), ("least_bulk_size", "least_tail_size")
+    effective = min(dataset[name].item() for name in sizes)
+    if not dataset["dimension"].item():
+        return []
+    if np.isnan(r_hat):
+        why = "too few states to test whether the chains have mixed"
+    elif r_hat > MIXED:
+        why = f"the chains have not mixed (worst R̂ {r_hat:.3g}, above {MIXED:g})"
+    elif effective < FEWEST_EFFECTIVE:
+        why = f"the effective sample size is only {effective:.3g} (below {FEWEST_EFFECTIVE})"
+    else:
+        return []
+    return [f"the sample is unreliable: {why}; use more --states"]
 
 
 # Work of the samplers, which only the JSON report has.

@@ -474,12 +474,9 @@ def add_intervals(commands: Commands) -> None:
         "compute the exact interval of every contact force",
         "granforce intervals -n 400 --mu 0.1 --seed 1 --out bounds.csv",
         lines=report_lines.INTERVALS,
+        columns=report_lines.BOUNDS,
     )
-    add_exact(
-        command,
-        "; the column cluster gives the number of the group of connected undetermined contacts, "
-        "starting with the largest; −1 where forces are determined",
-    )
+    add_exact(command)
 
 
 def add_limit_loads(commands: Commands) -> None:
@@ -490,6 +487,7 @@ def add_limit_loads(commands: Commands) -> None:
         "packing can carry",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
         lines=report_lines.LIMIT_LOADS,
+        columns=report_lines.LOADS,
     )
     add_exact(command)
 
@@ -524,6 +522,19 @@ def add_load_factor(commands: Commands) -> None:
     command.leaves_out("without --critical", lambda given: not given.critical, {"precision"})
 
 
+def add_rest(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "rest",
+        "test whether the grains of a packing stay at rest in contact dynamics, also with noise on "
+        "the forces",
+        "granforce rest packing.npz",
+        lines=report_lines.REST,
+    )
+    add_packing_file(command)
+    add_ensemble_mu(command)
+
+
 def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -553,6 +564,7 @@ def add_perturb(commands: Commands) -> None:
         "force and the first motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
         lines=report_lines.PERTURB,
+        columns=report_lines.CRITICAL,
     )
     add_any_packing(command)
     group = command.add_argument_group("the perturbation")
@@ -852,6 +864,7 @@ COMMANDS = (
     add_intervals,
     add_limit_loads,
     add_load_factor,
+    add_rest,
     add_stress,
     add_perturb,
     add_study,

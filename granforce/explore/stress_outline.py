@@ -142,7 +142,10 @@ def stress_axes(ensemble: Ensemble) -> Floats:
     Raises InputError if the pressure is not prescribed, or if the whole stress is.
     """
     if not ensemble.has_pressure_row:
-        raise InputError("an outline of stresses needs a prescribed pressure")
+        raise InputError(
+            "stresses are outlined at a prescribed pressure, in a periodic box only"
+            + ("" if np.isfinite(ensemble.packing.volume) else "; this box is open")
+        )
     if ensemble.prescribed == "stress":
         raise InputError("the whole stress is prescribed: prescribe the pressure for an outline")
     packing = ensemble.packing

@@ -55,6 +55,8 @@ WARM_UP = 20, 40
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed.,
 # 11.4); for mixed chains the largest R̂ of 1300 components is 1.01 with 1000 states, 1.06 with 200.
 MIXED = 1.1
+# Fewer effective states give means with errors above a tenth of a standard deviation.
+FEWEST_EFFECTIVE = 100
 # With an effective sample size requested, a run ends at this many times as many states.
 MOST_STATES = 10
 # States of each chain between two calls of progress and cancel.

@@ -25,11 +25,32 @@ _WEIGHTY = 1e-6
 
 @notebook.brief
 class Known(NamedTuple):
-    """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high; a side left out is open."""
+    """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high, or on f_n alone; see `sides`."""
 
     contacts: Integers  # (k,) numbers in the packing
-    low: Floats = np.array(-np.inf)  # (k, 2) force; −inf where nothing is known
-    high: Floats = np.array(np.inf)  # (k, 2) force; inf where nothing is known; low for a pin
+    # (k, 2) force, or (k,) or one number for f_n alone; −inf, or left out, where nothing is known
+    low: Floats = np.array(-np.inf)
+    high: Floats = np.array(np.inf)  # the same, inf where nothing is known; low for an exact value
+
+    @property
+    def sides(self) -> tuple[Floats, Floats]:
+        """low and high as (k, 2); ValueError or TypeError for other shapes."""
+        low, high = (
+            _both(side, np.size(self.contacts), unknown)
+            for side, unknown in ((self.low, -np.inf), (self.high, np.inf))
+        )
+        return low, high
+
+
+def _both(side: Floats, count: int, unknown: float) -> Floats:
+    """Bounds (count, 2) of those given, which are (count, 2) or bounds of f_n alone."""
+    given = np.asarray(side, dtype=np.float64)
+    if given.shape == (2,) and count == 1:  # of the only contact
+        given = given[None]
+    if given.ndim < 2:
+        given = np.broadcast_to(given, count)
+        given = np.column_stack([given, np.full(count, unknown)])
+    return np.broadcast_to(given, (count, 2))
 
 
 class Polygons(NamedTuple):
@@ -57,16 +78,14 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     contacts that do not exist, bounds of another shape or NaN, and low > high beyond rounding.
     """
     try:
-        contacts, low, high = known  # type: ignore[misc]  # other types are refused below
-        contacts = np.atleast_1d(np.asarray(contacts, dtype=np.float64))
-        low, high = (
-            np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
-            for side in (low, high)
-        )
+        if not isinstance(known, Known):
+            raise TypeError
+        contacts = np.atleast_1d(np.asarray(known.contacts, dtype=np.float64))
+        low, high = known.sides
     except (TypeError, ValueError):
         raise InputError(
             "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
-            "f_n and f_t"
+            "f_n and f_t or (k,) on f_n alone, as in gf.Known([13], [0.05], [0.05])"
         ) from None
     valid = are_whole(contacts, count - 1)
     if not valid.all():
@@ -76,7 +95,9 @@ def bounds_of(known: Known | None, count: int) -> Floats:
         )
     contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
-        raise InputError("a bound is NaN; use −inf and inf for unknown bounds")
+        raise InputError(
+            "a bound is NaN; use −inf and inf for unknown bounds, or give bounds (k,) on f_n alone"
+        )
     bounds = np.empty((count, 2, 2))
     bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
     np.maximum.at(bounds[..., 0], contacts, low)

@@ -24,7 +24,7 @@ from granforce.motion.works import follow, relax
 from granforce.numerics.lanes import ONE
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
-from granforce.types import Cancel, Floats, Mask
+from granforce.types import Cancel, Floats, Integers, Mask
 
 # Standard deviations of the noise on each force (in ⟨f_n⟩), and number of draws for each.
 NOISE, DRAWS = (1e-4, 1e-2), 3
@@ -39,9 +39,11 @@ class Rest(NamedTuple):
     at_rest: bool  # from the packing's own forces and, with noise, in every draw
     distance: float  # ⟨f_n⟩, from its own forces to the network reached; NaN without rest
     noise: tuple[float, ...]  # ⟨f_n⟩, standard deviations
-    stayed: Mask  # (len(noise), draws) bool, draws that came to rest; all False if not at rest
+    # (len(noise), draws) bool, draws that came to rest; all False if its own forces move grains
+    stayed: Mask
     # (contacts, 2) the network reached from its own forces; if grains move, the forces while moving
     forces: Floats
+    reason: str  # why it is not at rest; empty if it is
 
 
 @cancelling.cancellable
@@ -74,7 +76,8 @@ def rest(
     first = relax(step, _from(forces))
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)
-        return Rest(False, np.nan, noise, none, _on_all(S, first.forces))
+        why = "grains move under its own forces"
+        return Rest(False, np.nan, noise, none, _on_all(S, first.forces), why)
     rng = np.random.default_rng(random_seed(seed))
     starts = [
         first.forces + level * rng.standard_normal(forces.shape)
@@ -89,7 +92,18 @@ def rest(
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)
     distance = float(np.abs(first.forces - forces).max())
-    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, moving))
+    why = _reason(noise, draws - stayed.sum(axis=1), draws)
+    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, moving), why)
+
+
+def _reason(noise: tuple[float, ...], moved: Integers, draws: int) -> str:
+    """Why a packing is not at rest that rests under its own forces; moved: draws at each noise."""
+    parts = [
+        f"{count} of {draws} draws with noise of {level:g} ⟨f_n⟩"
+        for level, count in zip(noise, moved, strict=True)
+        if count
+    ]
+    return f"grains move in {' and '.join(parts)}" if parts else ""
 
 
 def _from(forces: Floats) -> Push:

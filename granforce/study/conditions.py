@@ -35,9 +35,8 @@ def conditions(
 def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
     """Rows of bounds, sorted by contact."""
     if isinstance(known, Known):
-        contacts = known.contacts
-        low, high = (np.broadcast_to(one, (len(contacts), 2)) for one in (known.low, known.high))
-        bounds = np.stack([low, high], axis=-1).reshape(-1, 4)
+        contacts = np.atleast_1d(known.contacts)
+        bounds = np.stack(known.sides, axis=-1).reshape(-1, 4)
         known = [[c, *row] for c, row in zip(contacts, bounds.tolist(), strict=True)]
     try:
         rows = [[contact, *bounds] for contact, *bounds in known]

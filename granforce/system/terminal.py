@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar, Self
 
@@ -32,13 +32,38 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
             name = ""
 
 
+def print_notes(notes: Iterable[str]) -> None:
+    """Notes on a report as lines on stderr; after it, where both go to one place."""
+    sys.stdout.flush()
+    for note in notes:
+        print(f"granforce: {note}", file=sys.stderr)
+
+
+def print_columns(columns: Mapping[str, Sequence[Any]]) -> None:
+    """Columns {name: values} as a table on stdout."""
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    table(rows, list(columns), {name: spaced(name) for name in columns})
+
+
 @contextmanager
-def report_after(lines: Mapping[str, Any], as_json: bool) -> Iterator[None]:
-    """Print a report once the files are written, or cannot be: a closed pipe costs no file."""
+def report_after(
+    lines: Mapping[str, Any],
+    as_json: bool,
+    columns: Mapping[str, Sequence[Any]] | None = None,
+    **worded: Sequence[Any],
+) -> Iterator[None]:
+    """Print a report once the files are written, or cannot be: a closed pipe costs no file.
+
+    columns {name: values}: a table under the report, or more lines of the JSON report; worded:
+    values of some columns as texts, for the table.
+    """
+    columns = columns or {}
     try:
         yield
     finally:
-        print_report(lines, as_json)
+        print_report({**lines, **columns} if as_json else lines, as_json)
+        if columns and not as_json:
+            print_columns({**columns, **worded})
 
 
 def table(

@@ -53,6 +53,7 @@ LINES = {
         "blocks.npz --load horizontal",
         "blocks.npz --load horizontal --critical --precision 0.01",
     ],
+    "rest": ["p.npz", "p.npz --ensemble-mu 0.2"],
     "stress": [f"{MU} --angles 4", "p.npz --angles 4"],
     "perturb": [
         f"{MU} --random 1",

@@ -125,6 +125,7 @@ COMMANDS = {
             "--colour": ["", "spread"],
         },
     ),
+    "rest": (["p.npz"], {"--ensemble-mu": ["", "-1", "nan"]}),
     "load-factor": (["p.npz", "--load", "horizontal"], {"--load": ["", "vertical"]}),
     "stress": (
         ["-n", "8", "--mu", "0.3"],

@@ -2,12 +2,14 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from granforce import measures
+from granforce.cli.report_lines import FEW
 from granforce.cli.results import (
     StoredResult,
     conditions,
@@ -25,6 +27,7 @@ from granforce.cli.tables import write_columns
 from granforce.explore.stress_outline import stress_inside
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
+from granforce.motion import rest as motion
 from granforce.packing import importers
 from granforce.perturb import grain_loads
 from granforce.perturb.critical_force import COUNTS
@@ -34,6 +37,12 @@ from granforce.system.terminal import print_report, report_after
 
 # Of COUNTS, which also has the work done.
 LOADS = ("loads_at_rest", "loads_moving", "loads_undecided")
+
+
+def listed(columns: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Columns of a result per contact for the report, which lists at most FEW contacts."""
+    few = len(columns["contact"]) <= FEW
+    return {name: values.tolist() for name, values in columns.items()} if few else {}
 
 
 def solved(dataset: xr.Dataset) -> dict[str, int]:
@@ -57,26 +66,28 @@ def perturb(arguments: argparse.Namespace) -> None:
     load = dataset["critical_low"].values
     reported = {
         "mean_normal_force": scale,
-        "critical_force": dataset["critical_force"].item() * scale,
-        "critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11)),
-        "limit_load": float(dataset["limit_load"].mean()),
+        "mean_critical_force": dataset["critical_force"].item() * scale,
+        "mean_limit_load": float(dataset["limit_load"].mean()),
     }
+    columns = contact_labels(arguments, parameters, dataset)
+    bounds = ("limit_load", "critical_low", "critical_high")
+    columns |= forces.named({name: dataset[name].values for name in bounds})
+    few, (inner, outer) = listed(columns), json.loads(dataset.attrs["fit_range"])
+    if not few:
+        reported["critical_force_deciles"] = np.quantile(load, np.linspace(0, 1, 11))
     lines = {
         "contacts": len(load),
         **forces.reported(reported),
         **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
-        "fit_range": json.loads(dataset.attrs["fit_range"]),
+        "fit_range": [inner, outer] if inner < outer else None,
         **{name: int(dataset[name].sum()) for name in LOADS},
         **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
         "largest_residual": float(dataset["load_residual"].max()),
         "largest_breach": float(dataset["motion_breach"].max()),
         **ends,
     }
-    with report_after(lines, arguments.json):
+    with report_after(lines, arguments.json, few):
         if arguments.out is not None:
-            names = ("limit_load", "critical_low", "critical_high")
-            columns = contact_labels(arguments, parameters, dataset)
-            columns |= forces.named({name: dataset[name].values for name in names})
             names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
             write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
 
@@ -118,15 +129,16 @@ def intervals(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    with report_after(lines, arguments.json):
+    bounds = {
+        f"{part}_{side}": dataset[side].values[:, k]
+        for side in ("low", "high")
+        for k, part in enumerate(("f_n", "f_t"))
+    }
+    columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
+    columns |= {"cluster": cluster}
+    with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
-            bounds = {
-                f"{part}_{side}": dataset[side].values[:, k]
-                for side in ("low", "high")
-                for k, part in enumerate(("f_n", "f_t"))
-            }
-            columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
-            write_columns(arguments.out, columns | {"cluster": cluster})
+            write_columns(arguments.out, columns)
 
 
 def _without_limit(bounded: Any) -> dict[str, int]:
@@ -160,10 +172,10 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    with report_after(lines, arguments.json):
+    columns = contact_labels(arguments, parameters, dataset) | forces.named({"limit_load": load})
+    with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
-            columns = contact_labels(arguments, parameters, dataset)
-            write_columns(arguments.out, columns | forces.named({"limit_load": load}))
+            write_columns(arguments.out, columns)
 
 
 def load_factor(arguments: argparse.Namespace) -> None:
@@ -183,6 +195,16 @@ def load_factor(arguments: argparse.Namespace) -> None:
             "breach": critical.breach,
             "converged": critical.converged,
         }
+    print_report(lines, arguments.json)
+
+
+def rest(arguments: argparse.Namespace) -> None:
+    """Test whether contact dynamics leaves a packing at rest."""
+    found = motion.rest(importers.load_packing(arguments.packing), mu=arguments.ensemble_mu)
+    lines: dict[str, Any] = {"at_rest": found.at_rest}
+    lines |= {} if found.at_rest else {"reason": found.reason}
+    lines |= {"distance_to_rest": found.distance, "noise": list(found.noise)}
+    lines |= {"draws_at_rest": found.stayed.sum(axis=1).tolist(), "draws": found.stayed.shape[1]}
     print_report(lines, arguments.json)
 
 

@@ -12,6 +12,7 @@ from granforce.cli.results import (
     conditions,
     contact_labels,
     found,
+    sample_notes,
     unit,
     without_work,
 )
@@ -19,8 +20,7 @@ from granforce.cli.tables import write_columns
 from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
-from granforce.system.plain import spaced
-from granforce.system.terminal import report_after, table
+from granforce.system.terminal import print_notes, report_after
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -50,13 +50,10 @@ def informative(arguments: argparse.Namespace) -> None:
     lines = {"entry": entry, "mean_interval_now [mean]": now, **ends}
     ranked = {name: values.tolist() for name, values in columns.items()} | {"twins": twins}
     del ranked["number_of_twins"]
-    with report_after(lines | ranked if arguments.json else lines, arguments.json):
+    worded = [" ".join(map(str, others)) or "none" for others in twins]
+    with report_after(lines, arguments.json, ranked, twins=worded):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
-    if not arguments.json:
-        ranked["twins"] = [" ".join(map(str, others)) or "none" for others in twins]
-        rows = [dict(zip(ranked, row, strict=True)) for row in zip(*ranked.values(), strict=True)]
-        table(rows, list(ranked), {name: spaced(name) for name in ranked})
 
 
 def infer(arguments: argparse.Namespace) -> int | None:
@@ -130,4 +127,6 @@ def infer(arguments: argparse.Namespace) -> int | None:
     with report_after(without_work(lines | ends, arguments), arguments.json):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
+    if states and not arguments.again:  # those draws are independent
+        print_notes(sample_notes(dataset))
     return None

@@ -1,7 +1,6 @@
 """Commands that make, import and export packings."""
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -25,7 +24,7 @@ from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
-from granforce.system.terminal import print_report
+from granforce.system.terminal import print_notes, print_report
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -60,9 +59,7 @@ def _report(
             importers.save_packing(packing, arguments.out)
     finally:
         print_report(with_units(lines), arguments.json)
-        sys.stdout.flush()  # where both go to one place, notes come after the report
-        for note in notes:
-            print(f"granforce: {note}", file=sys.stderr)
+        print_notes(notes)
 
 
 def _scene(arguments: argparse.Namespace) -> None:

@@ -16,6 +16,7 @@ from granforce.cli.results import (
     extents,
     found,
     packing_options,
+    sample_notes,
     unit,
     walked,
     without_work,
@@ -28,7 +29,7 @@ from granforce.study import kinds
 from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
-from granforce.system.terminal import Bar, print_report, report_after, table
+from granforce.system.terminal import Bar, print_notes, print_report, report_after, table
 from granforce.types import Rows
 
 # Digits in the table of a scan, whose numbers are means; the store has them exactly.
@@ -87,6 +88,7 @@ def uniform(arguments: argparse.Namespace) -> int:
         **ends,
     }
     print_report(without_work(lines, arguments), arguments.json)
+    print_notes(sample_notes(dataset))
     return 1 if arguments.effective is not None and not reached else 0
 
 
