@@ -12,7 +12,7 @@ import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, with_article
 from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
@@ -178,9 +178,8 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         arrays = _arrays(result, list(dimensions))
     if not dimensions:
         known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))
-        raise InputError(
-            f"a {type(result).__name__} cannot be labelled; labels exist for: {known}, networks"
-        )
+        kind = with_article(type(result).__name__)
+        raise InputError(f"{kind} cannot be labelled; labels exist for: {known}, networks")
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():

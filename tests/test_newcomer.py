@@ -22,8 +22,10 @@ from granforce.cli.parser import main
 from granforce.cli.words import make_parser
 from granforce.figures import picture
 from granforce.glossary import TERMS
+from granforce.packing.scenes import SCENES
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
+from granforce.system import terminal
 from granforce.system.plain import spaced
 
 
@@ -830,3 +832,28 @@ def test_the_library_scans_the_cells_of_the_command(cache):
 def test_walls_on_which_nothing_presses_are_refused_with_what_to_add(walls):
     with pytest.raises(gf.InputError, match=r"add --gravity 1 \(gravity=1\)"):
         gf.from_disks([[0.5, 0.5], [0.5, 1.5]], [0.5, 0.5], mu=0.5, walls=walls)
+
+
+def test_lines_of_reports_have_names_in_words_and_no_stray_underscore(capsys):
+    words = {spaced(name) for name in report_lines.MEANINGS}
+    assert not words & {"again", "programs", "turns", "held", "grains left open"}
+    assert spaced("unbalance_saved_if_tangential_forces") == "unbalance saved if tangential forces"
+    assert spaced("mean_change_of_f_n") == "mean change of f_n"
+    terminal.print_report({"again": 1, "programs": 2}, False)
+    assert len({line.rindex(" ") for line in capsys.readouterr().out.splitlines()}) == 1
+
+
+def test_help_and_pages_agree_with_what_is_done():
+    assert gf.Volume.__doc__.count("log_volume:") == 1
+    assert "plain mean" in report_lines.MEANINGS["mean_normal_force"]
+    assert "plain mean" in TERMS["mean_force"].sentence
+    howto = Path(gf.__file__).parent / "docs/pages/howto/own-packings.md"
+    assert all(f"`{name}`" in howto.read_text() for name in SCENES)
+    with pytest.raises(gf.InputError, match=r"^an Ensemble cannot be labelled"):
+        gf.to_dataset(gf.ensemble(gf.scene("groove")))
+
+
+def test_a_record_of_the_wrong_type_is_named_in_plain_words():
+    message = r"^intervals takes an Ensemble, not a Packing; make one first: S = gf\.ensemble"
+    with pytest.raises(gf.InputError, match=message):
+        gf.intervals(gf.scene("groove"))

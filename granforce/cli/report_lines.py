@@ -26,8 +26,8 @@ MEANINGS = {
     "undetermined_clusters": "connected groups of undetermined contacts",
     "position_of_f_n_in_tenths": "number of undetermined contacts whose original f_n is in the "
     "first, …, last tenth of its interval",
-    "programs": "linear programs solved",
-    "again": "programs solved a second time, with refined steps or by HiGHS",
+    "programs": "number of linear programs solved",
+    "again": "of these, solved a second time, with refined steps or by HiGHS",
     "expected_reduction": "estimated fraction by which the mean standard error of f_n decreases "
     "once this f_n is known, from covariances",
     "reduction": "fraction by which the mean interval of f_n of all contacts, including this one, "
@@ -41,7 +41,7 @@ MEANINGS = {
     "admissible_stress": "a stress well inside these ranges, to copy into --stress",
     # of a packing
     "grains": "disks or bodies required to be in equilibrium (backbone and rattlers)",
-    "grains_left_open": "all other grains, such as walls and fixed bodies",
+    "grains_left_open": "all grains whose equilibrium is not required",
     "bodies": "bodies required to be in equilibrium",
     "contacts": "number of contacts",
     "backbone_grains": "grains that can carry force",
@@ -51,7 +51,8 @@ MEANINGS = {
     "pressure": "pressure P0; undefined in an open packing",
     "packing_fraction": "packing fraction φ, rattlers included",
     "coordination": "mean coordination number z of the backbone",
-    "mean_normal_force": "mean normal force ⟨f_n⟩, weighted by the distance between centres",
+    "mean_normal_force": "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
+    "the pressure is prescribed, otherwise the plain mean of the original network",
     "residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
     "violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
     "largest_overlap": "largest overlap of two bodies, in units of the largest radius",

@@ -108,7 +108,7 @@ def intervals(
     changed by INTERVAL_GAP at most. progress(done, total) is called as programs end. cancel() →
     True ends early: missing bounds are NaN and ``converged`` is False.
 
-    Raises InputError for a contact that carries nothing and if the forces in S are not bounded,
+    Raises InputError for a contact that cannot carry force and if the forces in S are not bounded,
     NotJammedError if S is empty, Cancelled if cancelled before the first program.
     """
     places = _positions(ensemble, contacts)

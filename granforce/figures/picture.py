@@ -49,11 +49,12 @@ def plot(
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
     Bodies of other shapes are drawn with lines through the contact points, along the forces.
-    states: a network (k, 2) or networks (…, k, 2), also of several chains, whose mean is drawn,
-    force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
-    there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
-    "force", "spread" (standard deviation of f_n over states), "interval" (length
-    of the exact interval of f_n, computed here), or numbers (k,). label: their quantity and unit,
+    states: a network (k, 2), or networks (…, k, 2), also of several chains, whose mean is drawn, in
+    the packing's unit of force; by default the packing's own. contacts (k,): their numbers in the
+    packing, needed if there are fewer than in the packing (`Ensemble.index`). colour:
+    "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation of f_n over states),
+    "interval" (length of the exact interval of f_n, computed here), or numbers (k,). label: their
+    quantity and unit,
     for the colour bar; by default the name of a pandas or xarray object. Walls are drawn as given,
     or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
     .html with the first, and .pdf, .png, .svg with the second.

@@ -273,9 +273,9 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
     """Write a figure to a path.
 
     The suffix selects the format: a self-contained web page (.html), or a picture (.png, .svg,
-    .pdf). Pages need the backend "bokeh", pictures "matplotlib"; no browser is needed. caption: a
-    description stored in the file: the title of a page, the Description of a PNG, <desc> in an SVG,
-    the Subject of a PDF.
+    .pdf). Figures look best if drawn for the backend that writes the file: "bokeh" for pages,
+    "matplotlib" for pictures; no browser is needed. caption: a description stored in the file: the
+    title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
     """
     path = Path(path)
     if path.suffix == ".html":

@@ -23,7 +23,7 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
     if as_json:
         print(json_text(lines))
         return
-    width = max(len(name) for name in lines)
+    width = max(len(spaced(name)) for name in lines)
     for name, value in lines.items():
         sentences = isinstance(value, list) and any(" " in str(part) for part in value)
         name = spaced(name)
