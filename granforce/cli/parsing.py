@@ -80,9 +80,21 @@ def refused(reason: str) -> int:
     return 2
 
 
+# Options and commands that other names are often given for.
+_MEANT = {
+    "--friction": "--mu",
+    "rest": "pack (its report says whether the packing is at rest; gf.rest in Python)",
+    "critical-load": "load-factor (with --critical)",
+    "critical-force": "perturb",
+}
+
+
 def _closest(word: str, names: Iterable[str]) -> str:
     """A question for the name that resembles a mistyped word; empty if none does."""
-    near = difflib.get_close_matches(word, [str(name) for name in names], n=1, cutoff=0.7)
+    known = [str(name) for name in names]
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.7)
+    if word in _MEANT and _MEANT[word].split()[0] in known:
+        near = [_MEANT[word]]
     return f"; did you mean {near[0]}?" if near else ""
 
 

@@ -33,7 +33,7 @@ MEANINGS = {
     "reduction": "fraction by which the mean interval of f_n of all contacts, including this one, "
     "shortens, by exact bounds; undefined beyond --check",
     "mean_interval_after": "mean length of the intervals of f_n once this one is known (its own is "
-    "then 0), in units of ⟨f_n⟩",
+    "then 0)",
     "twins": "other contacts whose f_n is determined by that of this contact; the file of --out "
     "gives how many there are (number_of_twins)",
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
@@ -133,6 +133,18 @@ MEANINGS = {
     "is steady",
     "measured_components": "number of measured f_n and f_t",
     "measured_where_nothing_can_carry": "measured f_n and f_t outside the backbone, ignored",
+    # of a photoelastic frame
+    "contacts_listed": "pairs of grains in the file, each counted once",
+    "candidates": "pairs of grains close enough to touch but not in the file, added as unmeasured "
+    "contacts",
+    "unbalanced_on_listed_contacts": "inner grains that listed contacts cannot balance",
+    "unbalanced": "grains that remain unbalanced with candidates",
+    "left_open": "ids of these grains; their equilibrium is not required",
+    "candidates_that_carry": "candidates that carry force in the likeliest network",
+    "unbalance_saved_if_tangential_forces_were_reversed": "fraction by which the unbalance would "
+    "decrease with the other sign of f_t (--reverse)",
+    "error": "median standard error of a measured f_n, in units of the mean measured f_n; without "
+    "--error, chosen so that χ² equals its degrees of freedom",
     "chi_square": "χ² of the likeliest network",
     "freedom": "degrees of freedom of χ²",
     "mean_change_of_f_n": "mean |inferred − measured| f_n",
@@ -140,8 +152,7 @@ MEANINGS = {
     "mean_standard_error": "mean standard error of a force",
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "unmeasured contacts that carry force in every network within 3 σ",
-    "mean_interval_now": "mean length of the interval of f_n before a measurement, in units of "
-    "⟨f_n⟩",
+    "mean_interval_now": "mean length of the interval of f_n before a measurement",
 }
 _STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
 _CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
@@ -152,6 +163,11 @@ PACKING = (
     "least_other_gap",
 )
 PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "at_rest", "cached")
+PEGS = (
+    *("contacts_listed", "candidates", "unbalanced_on_listed_contacts", "unbalanced"),
+    *("left_open", "candidates_that_carry", "unbalance_saved_if_tangential_forces_were_reversed"),
+    *("error", "chi_square", "freedom"),
+)
 IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
 WALK = (
     *("entry", *_STATES, "acceptance", "accepted", "rejected", "unconverged", "skipped"),

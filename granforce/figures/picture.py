@@ -13,7 +13,15 @@ from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
-from granforce.records import InputError, Packing, brief, float_array, real_array, takes
+from granforce.records import (
+    InputError,
+    Packing,
+    brief,
+    float_array,
+    real_array,
+    takes,
+    with_article,
+)
 from granforce.system.plain import counted
 from granforce.tolerances import ADMISSIBLE
 from granforce.types import Floats
@@ -49,21 +57,21 @@ def plot(
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
     Bodies of other shapes are drawn with lines through the contact points, along the forces.
-    states: a network (k, 2), or networks (…, k, 2), also of several chains, whose mean is drawn, in
-    the packing's unit of force; by default the packing's own. contacts (k,): their numbers in the
-    packing, needed if there are fewer than in the packing (`Ensemble.index`). colour:
-    "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation of f_n over states),
-    "interval" (length of the exact interval of f_n, computed here), or numbers (k,). label: their
-    quantity and unit,
-    for the colour bar; by default the name of a pandas or xarray object. Walls are drawn as given,
-    or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
-    .html with the first, and .pdf, .png, .svg with the second.
+    states: a network (k, 2), networks (…, k, 2), also of several chains, a Walk or a UniformSample;
+    their mean is drawn, in the packing's unit of force; by default the packing's own network.
+    contacts (k,): their numbers in the packing, needed if there are fewer than in the packing
+    (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation
+    of f_n over states), "interval" (length of the exact interval of f_n, computed here), or numbers
+    (k,). label: their quantity and unit, for the colour bar; by default the name of a pandas or
+    xarray object. Walls are drawn as given, or where they are touched. backend: "bokeh" or
+    "matplotlib"; `figures.save` writes .html with the first, and .pdf, .png, .svg with the second.
 
     Raises InputError for states that do not match these contacts, and for an unknown colour.
     """
     style.ready(backend)
     count = len(packing.contacts.i)
     numbers = np.arange(count) if contacts is None else np.asarray(contacts)
+    states = _states(states)
     drawn = packing.forces[numbers] if states is None else real_array(states, "states")
     if drawn.shape[-2:] != (len(numbers), 2):
         raise InputError(
@@ -90,6 +98,18 @@ def plot(
     kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     title = f"{counted(count, *kind)}, μ = {packing.mu:g}{scale}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
+
+
+def _states(given: Any) -> Any:
+    """Networks, also those of a Walk or a UniformSample; InputError for a record without any."""
+    if not isinstance(given, tuple) or not hasattr(given, "_fields"):
+        return given
+    if "states" in given._fields:
+        return given.states
+    raise InputError(
+        f"{with_article(type(given).__name__)} has no states to draw; for exact intervals give "
+        'colour="interval" without states, or numbers as colour'
+    )
 
 
 def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:

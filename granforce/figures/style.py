@@ -207,6 +207,9 @@ def inset(
             False  # otherwise Matplotlib would close the unfinished outer frame
         )
         artists.initialize_plot()
+        artists.handles["axis"].tick_params(
+            which="both", labelsize=artists.handles["axis"].xaxis.label.get_size()
+        )
 
     hooks = [_legend_of(outer.values()), draw]
     return [outer.opts(backend=backend, clone=True, hooks=hooks)]

@@ -96,7 +96,10 @@ class Bar:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: Any) -> None:
+        if kind is None and self.bar.total and id(self) in self._drawn:
+            self.bar.n = self.bar.total  # work that turned out not to be needed is done too
+            self.bar.refresh()
         self.bar.close()
         self._drawn.discard(id(self))
 

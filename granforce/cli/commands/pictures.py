@@ -14,6 +14,11 @@ def figures(arguments: argparse.Namespace) -> None:
     """Draw Figure 1 from the store of a scan."""
     from granforce.figures import indeterminacy, save
 
+    if arguments.scan is not None and arguments.scan.endswith(".csv"):
+        raise InputError(
+            f"{arguments.scan} is a table; Figure 1 is drawn from the store of results: give the "
+            "folder of granforce scan --cache, or leave it out for the default store"
+        )
     store = open_store(arguments.scan, readonly=True)
     save(indeterminacy(store, backend=_backend(arguments.out)), arguments.out)
 
