@@ -24,6 +24,7 @@ from granforce.cli.words import make_parser
 from granforce.figures import picture
 from granforce.glossary import TERMS
 from granforce.packing.scenes import SCENES
+from granforce.perturb import grain_loads
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
 from granforce.system import terminal
@@ -940,8 +941,10 @@ def test_only_disks_without_support_are_named():
         gf.from_disks([(1, 0.3), (4, 1)], [0.3, 0.3], 0.3, walls=floor, gravity=1)
 
 
-def test_the_press_carries_no_horizontal_load():
-    assert gf.load_factor(gf.ensemble(gf.scene("press"))).factor == 0.0
+def test_a_load_factor_of_rounding_errors_is_0(monkeypatch):
+    S, solve = gf.ensemble(gf.scene("press")), grain_loads.most_under
+    monkeypatch.setattr(grain_loads, "most_under", lambda system: (-2.5e-32, *solve(system)[1:]))
+    assert gf.load_factor(S).factor == 0.0
 
 
 def test_bars_end_at_their_total_unless_interrupted(capsys):

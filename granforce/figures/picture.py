@@ -102,9 +102,10 @@ def plot(
 
 def _states(given: Any) -> Any:
     """Networks, also those of a Walk or a UniformSample; InputError for a record without any."""
-    if not isinstance(given, tuple) or not hasattr(given, "_fields"):
+    fields = getattr(given, "_fields", None)  # of a named tuple
+    if fields is None:
         return given
-    if "states" in given._fields:
+    if "states" in fields:
         return given.states
     raise InputError(
         f"{with_article(type(given).__name__)} has no states to draw; for exact intervals give "

@@ -271,14 +271,6 @@ def read_csv(source: Source) -> Table:
     return make_table(name, [column.lower() for column in header], rows, numbers[1:])
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def _from_the_header(lines: list[str]) -> list[str]:
     """The lines, with comments (# or %) above the header left blank.
 
