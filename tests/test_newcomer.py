@@ -961,3 +961,14 @@ def test_friction_0_is_named_where_a_logarithmic_axis_has_no_place_for_it():
     rows = [{"mu": mu, "coordination": 4 - mu, "eta1": 0.1} for mu in (0.0, 0.1, 1.0)]
     titles = [title(frame) for frame in gf.figures.indeterminacy(rows, backend="matplotlib")]
     assert any(name.startswith("Coordination; z = 4 at") for name in titles)
+
+
+def test_the_list_of_the_store_names_packings_in_words(cache, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    gf.save_packing(gf.scene("groove"), "p.npz")
+    assert main("intervals p.npz".split()) == main("walk -n 12 --mu 0.3 --states 4".split()) == 0
+    capsys.readouterr()
+    assert main(["cache", "list"]) == 0
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    assert "  12 disks, μ = 0.3, seed 1" in told and "  imported " in told
