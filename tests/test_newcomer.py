@@ -972,3 +972,14 @@ def test_the_list_of_the_store_names_packings_in_words(cache, capsys, monkeypatc
     told = capsys.readouterr().out
     assert max(map(len, told.splitlines())) <= 80
     assert "  12 disks, μ = 0.3, seed 1" in told and "  imported " in told
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_pictures_show_the_numbers_of_contacts(backend):
+    packing = gf.scene("groove")
+    kinds = {"numbers": True, "backend": backend}
+    (labels,) = gf.plot(packing, **kinds).traverse(lambda x: x, [hv.Labels])
+    assert labels.dimension_values(2).tolist() == ["0", "1"]
+    assert labels.array([0, 1]).astype(float) == pytest.approx(packing.contact_points)
+    assert not gf.plot(packing, backend=backend).traverse(lambda x: x, [hv.Labels])
+    assert hv.render(gf.plot(packing, **kinds), backend=backend)

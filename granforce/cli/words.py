@@ -357,6 +357,7 @@ def add_plot(commands: Commands) -> None:
     command.add_argument(
         "--state", type=int, metavar="K", help="draw only network number K, counted from 0"
     )
+    command.add_argument("--numbers", action="store_true", help="write its number at each contact")
     command.add_argument(
         "--colour",
         choices=["mobilisation", "force", "spread", "interval"],

@@ -52,6 +52,7 @@ def plot(
     *,
     contacts: npt.ArrayLike | None = None,
     label: str | None = None,
+    numbers: bool = False,
     backend: str = "bokeh",
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
@@ -63,34 +64,37 @@ def plot(
     (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation
     of f_n over states), "interval" (length of the exact interval of f_n, computed here), or numbers
     (k,). label: their quantity and unit, for the colour bar; by default the name of a pandas or
-    xarray object. Walls are drawn as given, or where they are touched. backend: "bokeh" or
-    "matplotlib"; `figures.save` writes .html with the first, and .pdf, .png, .svg with the second.
+    xarray object. numbers: write its number at each contact. Walls are drawn as given, or where
+    they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the first,
+    and .pdf, .png, .svg with the second.
 
     Raises InputError for states that do not match these contacts, and for an unknown colour.
     """
     style.ready(backend)
     count = len(packing.contacts.i)
-    numbers = np.arange(count) if contacts is None else np.asarray(contacts)
+    shown = np.arange(count) if contacts is None else np.asarray(contacts)
     states = _states(states)
-    drawn = packing.forces[numbers] if states is None else real_array(states, "states")
-    if drawn.shape[-2:] != (len(numbers), 2):
+    drawn = packing.forces[shown] if states is None else real_array(states, "states")
+    if drawn.shape[-2:] != (len(shown), 2):
         raise InputError(
-            f"states have shape {drawn.shape}, for {len(numbers)} contacts of the packing; give "
+            f"states have shape {drawn.shape}, for {len(shown)} contacts of the packing; give "
             "contacts=S.index with the networks of an ensemble S"
         )
-    several = drawn.reshape(-1, len(numbers), 2)
+    several = drawn.reshape(-1, len(shown), 2)
     mean = several.mean(axis=0)
     if isinstance(colour, str) and colour in COLOURS[1:]:
         unit, scale = _unit(packing, mean)
     else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
         unit, scale = mean[:, 0].mean() or 1.0, ""
-    values, name, look = _coloured(packing, numbers, several, mean, colour, unit)
+    values, name, look = _coloured(packing, shown, several, mean, colour, unit)
     if name and label is not None:
         raise InputError(f"label is for numbers as colour; with {brief(colour)} leave it out")
     label = name or label or str(getattr(colour, "name", None) or "value")
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
-    elements += _walls(packing, numbers, backend)
-    elements.append(_lines(packing, numbers, mean / unit, values, label, look, backend))
+    elements += _walls(packing, shown, backend)
+    elements.append(_lines(packing, shown, mean / unit, values, label, look, backend))
+    if numbers:
+        elements.append(_numbers(packing, shown, backend))
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
@@ -197,6 +201,13 @@ def _lines(
         **wide,
         **look,
     )
+
+
+def _numbers(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> hv.Labels:
+    """The numbers of contacts at their points of contact."""
+    x, y = packing.contact_points[numbers].T
+    size = {"text_font_size": "8pt"} if backend == "bokeh" else {"size": 7}
+    return hv.Labels((x, y, numbers.astype(str))).opts(backend=backend, **size)
 
 
 def _ends(packing: Packing, numbers: npt.NDArray[Any], forces: Floats) -> tuple[Floats, Floats]:

@@ -38,7 +38,11 @@ def plot(arguments: argparse.Namespace) -> None:
     if arguments.colour == "spread" and networks.get("states", packing.forces).ndim < 3:
         raise InputError("--colour spread needs several networks: give --states without --state")
     drawn = picture.plot(
-        packing, colour=arguments.colour, backend=_backend(arguments.out), **networks
+        packing,
+        colour=arguments.colour,
+        numbers=arguments.numbers,
+        backend=_backend(arguments.out),
+        **networks,
     )
     save(drawn, arguments.out)
 
