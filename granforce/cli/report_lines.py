@@ -26,7 +26,7 @@ MEANINGS = {
     "undetermined_clusters": "connected groups of undetermined contacts",
     "position_of_f_n_in_tenths": "number of undetermined contacts whose original f_n is in the "
     "first, …, last tenth of its interval",
-    "programs": "number of linear programs solved",
+    "programs": "linear programs solved",
     "again": "of these, solved a second time, with refined steps or by HiGHS",
     "expected_reduction": "estimated fraction by which the mean standard error of f_n decreases "
     "once this f_n is known, from covariances",
