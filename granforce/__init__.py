@@ -25,6 +25,7 @@ _HOME = {
     "Packing": "records",
     "Relaxation": "records",
     "Shapes": "records",
+    "UnboundedError": "records",
     "UndecidedError": "records",
     "make_contacts": "records",
     "make_contacts_at": "records",

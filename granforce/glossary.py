@@ -89,9 +89,10 @@ TERMS = {
     ),
     "mean_force": Term(
         "mean normal force",
-        "The mean of fₙ over the contacts that can carry force, weighted by the distance of their "
-        "centres. The pressure fixes it: it is the same in all networks, and the unit of force on "
-        "the page and in the figures.",
+        "The mean of fₙ over the contacts that can carry force; the unit of force on the page and "
+        "in the figures. If the pressure is prescribed, the mean is weighted by the distance "
+        "between centres, which makes it the same in all networks. Otherwise it is the plain mean "
+        "of the original network.",
         "⟨fₙ⟩",
     ),
     "extent": Term(

@@ -12,7 +12,7 @@ import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, brief, with_article
 from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
@@ -102,9 +102,9 @@ _RENAMED = {
 # Units of variables; forces are in the packing's unit.
 _VARIABLE_UNITS = {
     **dict.fromkeys(("states", "forces", "low", "high", "load", "limit_load", "origin"), "force"),
-    **dict.fromkeys(("mean", "error"), "force"),
+    **dict.fromkeys(("mean", "error", "mean_interval_after"), "force"),
     **dict.fromkeys(("f_n_least", "critical_low", "critical_high"), "force"),
-    **dict.fromkeys(("residual", "violation", "gap", "mean_interval_after"), UNITS["mean"]),
+    **dict.fromkeys(("residual", "violation", "gap"), UNITS["mean"]),
     **dict.fromkeys(("centre", "radius"), "length"),
     "deviation": "sigma",
 }
@@ -178,15 +178,18 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         arrays = _arrays(result, list(dimensions))
     if not dimensions:
         known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))
-        raise InputError(
-            f"a {type(result).__name__} cannot be labelled; labels exist for: {known}, networks"
-        )
+        kind = with_article(type(result).__name__)
+        raise InputError(f"{kind} cannot be labelled; labels exist for: {known}, networks")
+    if type(result).__name__ == "Informative" and isinstance(ensemble, Ensemble):
+        arrays["after"] = result.after * ensemble.force_scale
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
         variable = _RENAMED.get(type(result).__name__, {}).get(name, name)
         units = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
         variables[variable] = (words.split(), arrays[name], units)
+    if used & {"contact", "grain"} and not isinstance(result, Packing):
+        _check_ensemble(ensemble, result)
     try:
         labels = _labels(result)
         if used & {"contact", "grain"}:
@@ -197,17 +200,27 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         raise InputError(f"the result belongs to another ensemble: {error}") from None
 
 
-def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
+def to_dataframe(
+    result: Any, ensemble: Ensemble | None = None, *, unit: str = "packing"
+) -> pd.DataFrame:
     """The same as a pandas table: a row for each contact, or for each contact in each state.
 
     Columns have the names of the tables of the command line: contact, i, j, x, y, then component,
     variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
     `read_known` and ``--known`` read the file that the table's `to_csv` writes. Of intervals,
     ``backbone`` is True where the largest f_n is above 0. A Volume has a row for each ladder, an
-    Outline for each corner, a Body for each contact along each direction. Arguments and errors as
-    for `to_dataset`.
+    Outline for each corner, a Body for each contact along each direction. unit: of forces,
+    "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of the
+    command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are
+    always in [mean]. Other arguments and errors as for `to_dataset`.
     """
+    if unit not in UNITS:
+        raise InputError(f"unit must be packing or mean, got {brief(unit)}")
     dataset = to_dataset(result, ensemble)
+    if unit == "mean":
+        if not isinstance(ensemble, Ensemble):
+            raise InputError('unit="mean" needs S: gf.to_dataframe(result, S, unit="mean")')
+        dataset = _in_mean_forces(dataset, ensemble.force_scale)
     if "contact" not in dataset.sizes:
         return _corners(dataset) if "corner" in dataset.sizes else dataset.to_dataframe()
     words = {units: word for word, units in UNITS.items()} | {"sigma": "sigma"}
@@ -234,17 +247,42 @@ def to_dataframe(result: Any, ensemble: Ensemble | None = None) -> pd.DataFrame:
     return table[[*first, *(name for name in columns if name not in first)]]
 
 
+def _in_mean_forces(dataset: xr.Dataset, scale: float) -> xr.Dataset:
+    """The same with all forces divided by ⟨f_n⟩."""
+    units = {"units": UNITS["mean"]}
+    return dataset.assign(
+        {
+            name: (values / scale).assign_attrs(units)
+            for name, values in dataset.data_vars.items()
+            if values.attrs.get("units") == UNITS["packing"]
+        }
+    )
+
+
 def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers]:
     """The packing of a result, and the numbers of its contacts."""
     if isinstance(result, Packing):
         return result, np.arange(len(result.contacts.i))
+    assert ensemble is not None  # checked
+    _refuse_foreign(result, ensemble)
+    return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
+
+
+def _check_ensemble(ensemble: Any, result: Any) -> None:
+    """InputError without an ensemble, or for an array for other than all of its contacts."""
     if not isinstance(ensemble, Ensemble):
         raise InputError(
             "contacts are labelled by the ensemble S of the result: give it too, as in "
             "gf.to_dataframe(result, S) or gf.to_dataset(result, S)"
         )
-    _refuse_foreign(result, ensemble)
-    return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
+    if isinstance(result, np.ndarray):
+        count = result.shape[0 if result.ndim == 1 else -2]
+        if count != len(ensemble.index):
+            raise InputError(
+                f"an array of {count} contacts has no contact numbers, and S has "
+                f"{len(ensemble.index)} contacts: give values for all of them, or the record that "
+                "has the numbers, such as gf.limit_load_bounds(S, contacts)"
+            )
 
 
 def _refuse_foreign(result: Any, ensemble: Ensemble) -> None:

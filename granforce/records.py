@@ -251,13 +251,18 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
     return checked
 
 
+def with_article(noun: str) -> str:
+    """A noun with its indefinite article: a Packing, an Ensemble, a UniformSample."""
+    return f"{'an' if noun[0] in 'AEIOaeio' else 'a'} {noun}"
+
+
 def _check_kind(function: str, given: Any, kind: type) -> None:
     if isinstance(given, kind):
         return
     plain = isinstance(given, (str, int, float))
     raise InputError(
-        f"{function} takes a record of type {kind.__name__}, not "
-        f"{brief(given) if plain else type(given).__name__}; make one first: "
+        f"{function} takes {with_article(kind.__name__)}, not "
+        f"{brief(given) if plain else with_article(type(given).__name__)}; make one first: "
         f"{_MAKERS[kind.__name__]}"
     )
 

@@ -20,11 +20,15 @@ from packings import packed, reference
 import granforce as gf
 from granforce.cli import report_lines
 from granforce.cli.parser import main
+from granforce.cli.results import with_units
 from granforce.cli.words import make_parser
 from granforce.figures import picture
 from granforce.glossary import TERMS
+from granforce.packing.scenes import SCENES
+from granforce.perturb import grain_loads
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
+from granforce.system import terminal
 from granforce.system.plain import spaced
 
 
@@ -698,7 +702,7 @@ def test_what_to_measure_next(cache, capsys):
     assert told["reduction"][0] == pytest.approx(1 - best.after[0] / best.before)
     assert {"expected_reduction", "reduction"} <= set(gf.to_dataframe(best, S).columns) & set(told)
     assert told["twins"] == [list(others) for others in best.twins]
-    assert told["mean_interval_after [mean]"][0] < told["mean_interval_now [mean]"]
+    assert told["mean_interval_after [packing]"][0] < told["mean_interval_now [packing]"]
     assert main(words.split()) == 0
     *_, heads, first, _, _, _ = capsys.readouterr().out.splitlines()
     assert heads.split()[:5] == ["contact", "i", "j", "x", "y"]
@@ -920,3 +924,151 @@ def test_conditions_of_a_periodic_box_are_refused_in_an_open_one(pile, cache, ca
             assert main(words.split()) == 2
         told = capsys.readouterr().err
         assert said in told and told.count("\n") == 1, words
+
+
+def test_lines_of_reports_have_names_in_words_and_no_stray_underscore(capsys):
+    words = {spaced(name) for name in report_lines.MEANINGS}
+    assert not words & {"again", "programs", "turns", "held", "grains left open"}
+    assert spaced("unbalance_saved_if_tangential_forces") == "unbalance saved if tangential forces"
+    assert spaced("mean_change_of_f_n") == "mean change of f_n"
+    terminal.print_report({"again": 1, "programs": 2}, False)
+    assert len({line.rindex(" ") for line in capsys.readouterr().out.splitlines()}) == 1
+
+
+def test_help_and_pages_agree_with_what_is_done():
+    assert gf.Volume.__doc__.count("log_volume:") == 1
+    assert "plain mean" in report_lines.MEANINGS["mean_normal_force"]
+    assert "plain mean" in TERMS["mean_force"].sentence
+    howto = Path(gf.__file__).parent / "docs/pages/howto/own-packings.md"
+    assert all(f"`{name}`" in howto.read_text() for name in SCENES)
+    with pytest.raises(gf.InputError, match=r"^an Ensemble cannot be labelled"):
+        gf.to_dataset(gf.ensemble(gf.scene("groove")))
+
+
+def test_a_record_of_the_wrong_type_is_named_in_plain_words():
+    message = r"^intervals takes an Ensemble, not a Packing; make one first: S = gf\.ensemble"
+    with pytest.raises(gf.InputError, match=message):
+        gf.intervals(gf.scene("groove"))
+
+
+def test_the_report_of_a_photoelastic_frame_is_explained(capsys):
+    with suppress(SystemExit):
+        main(["import", "pegs", "--help"])
+    told = capsys.readouterr().out
+    assert "Lines of the report:" in told and "  candidates that carry" in told
+    assert "chosen so that χ² equals its degrees of freedom" in " ".join(told.split())
+    assert list(with_units({"error": 1.0})) == ["error [mean measured]"]
+
+
+def test_tables_are_in_either_unit():
+    S = gf.ensemble(gf.scene("groove"))
+    bounds = gf.intervals(S)
+    table, mean = gf.to_dataframe(bounds, S), gf.to_dataframe(bounds, S, unit="mean")
+    high = table["f_n_high [packing]"].to_numpy()
+    assert mean["f_n_high [mean]"].to_numpy() == pytest.approx(high / S.force_scale)
+    assert "f_n_high [packing]" not in mean and S.force_scale != 1
+    for name, options in {"unit must be": {"unit": "N"}, "needs S": {"unit": "mean"}}.items():
+        with pytest.raises(gf.InputError, match=name):
+            gf.to_dataframe(S.packing, **options)
+
+
+def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
+    assert issubclass(gf.UnboundedError, gf.InputError)
+    S = gf.ensemble(gf.scene("groove"))
+    with pytest.raises(gf.InputError, match=r"open_store"):
+        gf.figures.indeterminacy("scan.zarr")
+    with pytest.raises(gf.InputError, match=r"to_dict"):
+        gf.figures.indeterminacy(pd.DataFrame({"mu": [0.1]}))
+    with pytest.raises(TypeError, match=r"^walk has no option 'start'; its options are chains, "):
+        gf.walk(S, 5, start=3)
+    with pytest.raises(gf.InputError, match=r"labelled by the ensemble"):
+        gf.to_dataframe(gf.informative(S, states=8, check=0))
+    with pytest.raises(gf.InputError, match=r"array of 1 contacts .* S has 2 .*limit_load_bounds"):
+        gf.to_dataframe(gf.limit_loads(S, S.index[:1]), S)
+
+
+def test_samples_are_drawn_and_intervals_named_as_a_colour():
+    S = gf.ensemble(gf.scene("groove"))
+    options = {"contacts": S.index, "backend": "matplotlib"}
+    for sample in (gf.walk(S, 4), gf.sample_uniform(S, 8)):
+        assert gf.plot(S.packing, sample, "spread", **options)
+    with pytest.raises(gf.InputError, match=r"^an Intervals has no states .*colour=\"interval\""):
+        gf.plot(S.packing, gf.intervals(S))
+
+
+@pytest.mark.parametrize(
+    "line, said",
+    [
+        ("pack --friction 0.1", "there is no option --friction; did you mean --mu?"),
+        ("critical-load", "command 'critical-load' is unknown; did you mean load-factor --"),
+        ("import table bare.csv --mu 0.5", "bare.csv: the first line contains only numbers; "),
+        ("import table other.csv --mu 0.5", "other.csv: no column x, y, r; "),
+        ("figures rows.csv --out f.png", "rows.csv is a table; "),
+        ("plot p.npz --states bounds.zarr --out p.png", "bounds.zarr: contains no states; "),
+    ],
+)
+def test_slips_of_a_newcomer_are_answered_with_what_to_do(line, said, cache, capsys):
+    Path("bare.csv").write_text("0,0,1\n2,0,1\n")
+    Path("other.csv").write_text("pos_x,pos_y,rad\n0,0,1\n2,0,1\n")
+    Path("rows.csv").write_text("mu\n0.1\n")
+    if line.startswith("plot"):
+        gf.save_packing(gf.scene("groove"), "p.npz")
+        assert main("intervals p.npz --out bounds.zarr".split()) == 0
+        capsys.readouterr()
+    try:
+        code = main(line.split())
+    except SystemExit as stop:
+        code = stop.code
+    told = capsys.readouterr().err
+    assert code == 2 and told.count("\n") == 1 and told.startswith(f"granforce: {said}")
+    assert "other" not in line or "--columns x=NAME" in told
+
+
+def test_only_disks_without_support_are_named():
+    floor = [[0, 0, 12, 0]]
+    with pytest.raises(gf.NotJammedError, match=r"at grains 1 \(counted from 0\)"):
+        gf.from_disks([(1, 0.3), (4, 1)], [0.3, 0.3], 0.3, walls=floor, gravity=1)
+
+
+def test_a_load_factor_of_rounding_errors_is_0(monkeypatch):
+    S, solve = gf.ensemble(gf.scene("press")), grain_loads.most_under
+    monkeypatch.setattr(grain_loads, "most_under", lambda system: (-2.5e-32, *solve(system)[1:]))
+    assert gf.load_factor(S).factor == 0.0
+
+
+def test_bars_end_at_their_total_unless_interrupted(capsys):
+    with terminal.Bar("bounds", "bound") as progress:
+        progress(3, 8)
+    assert "8/8" in capsys.readouterr().err.rsplit("\r", 1)[-1]
+    with suppress(KeyboardInterrupt), terminal.Bar("bounds", "bound") as progress:
+        progress(3, 8)
+        raise KeyboardInterrupt
+    assert "3/8" in capsys.readouterr().err.rsplit("\r", 1)[-1]
+
+
+def test_friction_0_is_named_where_a_logarithmic_axis_has_no_place_for_it():
+    rows = [{"mu": mu, "coordination": 4 - mu, "eta1": 0.1} for mu in (0.0, 0.1, 1.0)]
+    titles = [title(frame) for frame in gf.figures.indeterminacy(rows, backend="matplotlib")]
+    assert any(name.startswith("Coordination; z = 4 at") for name in titles)
+
+
+def test_the_list_of_the_store_names_packings_in_words(cache, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    gf.save_packing(gf.scene("groove"), "p.npz")
+    assert main("intervals p.npz".split()) == main("walk -n 12 --mu 0.3 --states 4".split()) == 0
+    capsys.readouterr()
+    assert main(["cache", "list"]) == 0
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    assert "  12 disks, μ = 0.3, seed 1" in told and "  imported " in told
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_pictures_show_the_numbers_of_contacts(backend):
+    packing = gf.scene("groove")
+    kinds = {"numbers": True, "backend": backend}
+    (labels,) = gf.plot(packing, **kinds).traverse(lambda x: x, [hv.Labels])
+    assert labels.dimension_values(2).tolist() == ["0", "1"]
+    assert labels.array([0, 1]).astype(float) == pytest.approx(packing.contact_points)
+    assert not gf.plot(packing, backend=backend).traverse(lambda x: x, [hv.Labels])
+    assert hv.render(gf.plot(packing, **kinds), backend=backend)

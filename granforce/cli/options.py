@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from granforce.cli.parsing import Input, Output, Parser, StorePath
-from granforce.cli.report_lines import FEW, IMPORT, explained
+from granforce.cli.report_lines import FEW, IMPORT, PEGS, explained
 from granforce.glossary import RELAXATIONS
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
@@ -66,7 +66,7 @@ def import_format(
     command = subcommand(
         *(formats, name, summary),
         f"granforce import {name} {example} --mu 0.3 --out packing.npz",
-        lines=() if name == "pegs" else IMPORT,  # pegs reports on the frame, in sentences
+        lines=PEGS if name == "pegs" else IMPORT,
     )
     command.set_defaults(run="import_")
     command.add_argument("grains", type=Input, help=grains)

@@ -119,7 +119,8 @@ def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
 
 
 def _report_interrupt(saved: str = "") -> int:
-    print(f"granforce: interrupted{saved and f'; {saved}'}", file=sys.stderr)
+    saved = saved and f"; {saved}; run the same command again to continue"
+    print(f"granforce: interrupted{saved}", file=sys.stderr)
     return 130
 
 

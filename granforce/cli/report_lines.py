@@ -29,13 +29,13 @@ MEANINGS = {
     "position_of_f_n_in_tenths": "number of undetermined contacts whose original f_n is in the "
     "first, …, last tenth of its interval",
     "programs": "linear programs solved",
-    "again": "programs solved a second time, with refined steps or by HiGHS",
+    "again": "of these, solved a second time, with refined steps or by HiGHS",
     "expected_reduction": "estimated fraction by which the mean standard error of f_n decreases "
     "once this f_n is known, from covariances",
     "reduction": "fraction by which the mean interval of f_n of all contacts, including this one, "
     "shortens, by exact bounds; undefined beyond --check",
     "mean_interval_after": "mean length of the intervals of f_n once this one is known (its own is "
-    "then 0), in units of ⟨f_n⟩",
+    "then 0)",
     "twins": "other contacts whose f_n is determined by that of this contact; the file of --out "
     "gives how many there are (number_of_twins)",
     "normal_difference_from_to": "range of (σ_xx − σ_yy)/2P that the contacts can carry",
@@ -43,7 +43,7 @@ MEANINGS = {
     "admissible_stress": "a stress well inside these ranges, to copy into --stress",
     # of a packing
     "grains": "disks or bodies required to be in equilibrium (backbone and rattlers)",
-    "grains_left_open": "all other grains, such as walls and fixed bodies",
+    "grains_left_open": "all grains whose equilibrium is not required",
     "bodies": "bodies required to be in equilibrium",
     "contacts": "number of contacts",
     "backbone_grains": "grains that can carry force",
@@ -53,7 +53,8 @@ MEANINGS = {
     "pressure": "pressure P0; undefined in an open packing",
     "packing_fraction": "packing fraction φ, rattlers included",
     "coordination": "mean coordination number z of the backbone",
-    "mean_normal_force": "mean normal force ⟨f_n⟩, weighted by the distance between centres",
+    "mean_normal_force": "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
+    "the pressure is prescribed, otherwise the plain mean of the original network",
     "residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
     "violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
     "largest_overlap": "largest overlap of two bodies, in units of the largest radius",
@@ -150,6 +151,18 @@ MEANINGS = {
     "is steady",
     "measured_components": "number of measured f_n and f_t",
     "measured_where_nothing_can_carry": "measured f_n and f_t outside the backbone, ignored",
+    # of a photoelastic frame
+    "contacts_listed": "pairs of grains in the file, each counted once",
+    "candidates": "pairs of grains close enough to touch but not in the file, added as unmeasured "
+    "contacts",
+    "unbalanced_on_listed_contacts": "inner grains that listed contacts cannot balance",
+    "unbalanced": "grains that remain unbalanced with candidates",
+    "left_open": "ids of these grains; their equilibrium is not required",
+    "candidates_that_carry": "candidates that carry force in the likeliest network",
+    "unbalance_saved_if_tangential_forces_were_reversed": "fraction by which the unbalance would "
+    "decrease with the other sign of f_t (--reverse)",
+    "error": "median standard error of a measured f_n, in units of the mean measured f_n; without "
+    "--error, chosen so that χ² equals its degrees of freedom",
     "chi_square": "χ² of the likeliest network",
     "freedom": "degrees of freedom of χ²",
     "mean_change_of_f_n": "mean |inferred − measured| f_n",
@@ -159,8 +172,7 @@ MEANINGS = {
     "⟨f_n⟩; if S is unbounded, error bars of forces without measured bounds depend on it",
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "unmeasured contacts that carry force in every network within 3 σ",
-    "mean_interval_now": "mean length of the interval of f_n before a measurement, in units of "
-    "⟨f_n⟩",
+    "mean_interval_now": "mean length of the interval of f_n before a measurement",
 }
 _STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
 _CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
@@ -171,6 +183,11 @@ PACKING = (
     "least_other_gap",
 )
 PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "at_rest", "cached")
+PEGS = (
+    *("contacts_listed", "candidates", "unbalanced_on_listed_contacts", "unbalanced"),
+    *("left_open", "candidates_that_carry", "unbalance_saved_if_tangential_forces_were_reversed"),
+    *("error", "chi_square", "freedom"),
+)
 IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
 WALK = (
     *("entry", *_STATES, "acceptance", "accepted", "rejected", "unconverged", "skipped"),

@@ -233,6 +233,7 @@ PACKING_UNIT = Unit("packing", 1.0)
 _REPORTED = {
     "mean_normal_force": "packing",
     "mean_measured_normal_force": "packing",
+    "error": "mean measured",
     "mean_change_of_f_n": "mean measured",
     "mean_change_of_f_t": "mean measured",
 }

@@ -168,6 +168,8 @@ def _states_of_dataset(path: str) -> _States:
 
 def _picked(path: str, arrays: Mapping[Any, Any], states: str, there: Any) -> _States:
     names = ("contact", "i", "j", states)
+    if not any(str(name).startswith("states") for name in arrays):
+        raise InputError(f"{path}: contains no states; granforce walk or uniform --out writes them")
     if states not in there or any(name not in arrays for name in names):
         raise InputError(
             f"{path}: no states in the packing's unit; write them with granforce walk or uniform "

@@ -267,6 +267,7 @@ def add_informative(commands: Commands) -> None:
     add_ensemble_mu(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     add_out(group, "the result per contact")
+    add_unit(group)
     add_conditions(command)
     add_store(command)
 
@@ -325,7 +326,12 @@ def add_figures(commands: Commands) -> None:
         reports=False,
     )
     command.add_argument(
-        "scan", type=Input, metavar="STORE", help="store written by granforce scan"
+        "scan",
+        type=Input,
+        nargs="?",
+        metavar="STORE",
+        help="store written by granforce scan (default: $GRANFORCE_CACHE, else the user's cache "
+        "folder)",
     )
     add_picture(command)
 
@@ -351,6 +357,7 @@ def add_plot(commands: Commands) -> None:
     command.add_argument(
         "--state", type=int, metavar="K", help="draw only network number K, counted from 0"
     )
+    command.add_argument("--numbers", action="store_true", help="write its number at each contact")
     command.add_argument(
         "--colour",
         choices=["mobilisation", "force", "spread", "interval"],

@@ -122,7 +122,7 @@ def intervals(
     all others are certified as usual; rounding then allows a gap of up to 10⁻¹² of the largest sum
     of the bounded forces.
 
-    Raises InputError for a contact that carries nothing, NotJammedError if S is empty,
+    Raises InputError for a contact that cannot carry force, NotJammedError if S is empty,
     UndecidedError and UnboundedError if it cannot be proved which forces are bounded, Cancelled if
     cancelled before the first program.
     """

@@ -8,6 +8,7 @@ the page on results).
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -91,6 +92,21 @@ def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
     return "accepted" if admitted else "rejected"
 
 
+def _check_options(relax: Relax, options: dict[str, Any]) -> None:
+    """TypeError for an option of neither `walk` nor the relaxation, naming those they have."""
+    if not options:
+        return
+    own = inspect.signature(walk).parameters.values()
+    _, _, *relaxing = inspect.signature(relax).parameters.values()
+    unknown = sorted(options.keys() - {one.name for one in relaxing})
+    if unknown and not any(one.kind is one.VAR_KEYWORD for one in relaxing):
+        names = [one.name for one in own if one.kind is one.KEYWORD_ONLY]
+        raise TypeError(
+            f"walk has no option {unknown[0]!r}; its options are {', '.join(names)}, and those of "
+            f"relax: {', '.join(one.name for one in relaxing)}"
+        )
+
+
 @takes(Ensemble, begun=Walk)
 @cancelling.cancellable
 def walk(
@@ -139,6 +155,7 @@ def walk(
         raise InputError(f"there must be at least as many states as chains, got {states}")
     if not callable(relax):
         raise InputError(f"relax must be a function, such as granforce.nearest, got {brief(relax)}")
+    _check_options(relax, options)
     check_memory(16 * states * len(ensemble.index), f"{states} states")
     if chains > 1 and not (begun is None and enough is None):
         raise InputError("begun and enough require a single chain")

@@ -57,7 +57,6 @@ AGREE = 4.0
 
 
 @notebook.brief
-@notebook.brief
 class Volume(NamedTuple):
     """The volume of S in its affine hull, forces f_n and f_t of every contact in ⟨f_n⟩."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import holoviews as hv
@@ -10,6 +11,7 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.measures import statistics
+from granforce.records import InputError, brief
 from granforce.study.cells import scan_rows
 from granforce.study.store import Store
 from granforce.types import Floats, Rows
@@ -35,7 +37,7 @@ def indeterminacy(
     are outside S, so that their spread is not η: grey crosses.
     """
     style.ready(backend)
-    rows = scan_rows(rows) if isinstance(rows, Store) else rows
+    rows = scan_rows(rows) if isinstance(rows, Store) else _checked(rows)
     curves = []
     for k, (name, label, factor) in enumerate(_MEASURES):
         points = statistics.means(rows, name, factor=factor)
@@ -62,11 +64,29 @@ def indeterminacy(
     words["marks"] = _crosses(outside, backend, logarithmic=True)
     log = style.graph(curves, backend, **words, logx=True, logy=True)
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
-    contacts = style.graph(z, backend, title="Coordination", x="μ", y="z", logx=True)
+    # A logarithmic axis has no place for μ = 0.
+    zero = "".join(f"; z = {y:.3g} at μ = 0" for mu, y, _ in z[0][0] if mu == 0)
+    contacts = style.graph(z, backend, title=f"Coordination{zero}", x="μ", y="z", logx=True)
     both = style.inset(linear, log, (0.25, 0.56, 0.72, 0.42), backend)
     # In pictures the legend is next to the last frame.
     frames = [*both, contacts] if backend == "bokeh" else [contacts, *both]
     return style.page(frames, backend)
+
+
+def _checked(rows: Any) -> Rows:
+    """The rows themselves; InputError with what to give for tables, paths and other values."""
+    give = 'dicts, or the store of a scan: gf.open_store("scan.zarr")'
+    if isinstance(rows, (str, Path)):
+        raise InputError(f"rows must be {give}; got {brief(str(rows))}")
+    if hasattr(rows, "to_dict"):
+        raise InputError(f"rows must be {give}; a pandas table gives them by .to_dict('records')")
+    try:
+        rows = list(rows)
+    except TypeError:
+        raise InputError(f"rows must be {give}; got {brief(rows)}") from None
+    if not all(isinstance(row, Mapping) for row in rows):
+        raise InputError(f"rows must be {give}")
+    return rows
 
 
 def _crosses(rows: Rows, backend: str, *, logarithmic: bool = False) -> list[Any]:

@@ -13,7 +13,15 @@ from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
-from granforce.records import InputError, Packing, brief, float_array, real_array, takes
+from granforce.records import (
+    InputError,
+    Packing,
+    brief,
+    float_array,
+    real_array,
+    takes,
+    with_article,
+)
 from granforce.system.plain import counted
 from granforce.tolerances import ADMISSIBLE
 from granforce.types import Floats
@@ -44,44 +52,49 @@ def plot(
     *,
     contacts: npt.ArrayLike | None = None,
     label: str | None = None,
+    numbers: bool = False,
     backend: str = "bokeh",
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
     Bodies of other shapes are drawn with lines through the contact points, along the forces.
-    states: a network (k, 2) or networks (…, k, 2), also of several chains, whose mean is drawn,
-    force; by default the packing's own. contacts (k,): their numbers in the packing, needed if
-    there are fewer than in the packing (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n),
-    "force", "spread" (standard deviation of f_n over states), "interval" (length
-    of the exact interval of f_n, computed here), or numbers (k,). label: their quantity and unit,
-    for the colour bar; by default the name of a pandas or xarray object. Walls are drawn as given,
-    or where they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes
-    .html with the first, and .pdf, .png, .svg with the second.
+    states: a network (k, 2), networks (…, k, 2), also of several chains, a Walk or a UniformSample;
+    their mean is drawn, in the packing's unit of force; by default the packing's own network.
+    contacts (k,): their numbers in the packing, needed if there are fewer than in the packing
+    (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation
+    of f_n over states), "interval" (length of the exact interval of f_n, computed here), or numbers
+    (k,). label: their quantity and unit, for the colour bar; by default the name of a pandas or
+    xarray object. numbers: write its number at each contact. Walls are drawn as given, or where
+    they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the first,
+    and .pdf, .png, .svg with the second.
 
     Raises InputError for states that do not match these contacts, and for an unknown colour.
     """
     style.ready(backend)
     count = len(packing.contacts.i)
-    numbers = np.arange(count) if contacts is None else np.asarray(contacts)
-    drawn = packing.forces[numbers] if states is None else real_array(states, "states")
-    if drawn.shape[-2:] != (len(numbers), 2):
+    shown = np.arange(count) if contacts is None else np.asarray(contacts)
+    states = _states(states)
+    drawn = packing.forces[shown] if states is None else real_array(states, "states")
+    if drawn.shape[-2:] != (len(shown), 2):
         raise InputError(
-            f"states have shape {drawn.shape}, for {len(numbers)} contacts of the packing; give "
+            f"states have shape {drawn.shape}, for {len(shown)} contacts of the packing; give "
             "contacts=S.index with the networks of an ensemble S"
         )
-    several = drawn.reshape(-1, len(numbers), 2)
+    several = drawn.reshape(-1, len(shown), 2)
     mean = several.mean(axis=0)
     if isinstance(colour, str) and colour in COLOURS[1:]:
         unit, scale = _unit(packing, mean)
     else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
         unit, scale = mean[:, 0].mean() or 1.0, ""
-    values, name, look = _coloured(packing, numbers, several, mean, colour, unit)
+    values, name, look = _coloured(packing, shown, several, mean, colour, unit)
     if name and label is not None:
         raise InputError(f"label is for numbers as colour; with {brief(colour)} leave it out")
     label = name or label or str(getattr(colour, "name", None) or "value")
     elements = [*_bodies(packing, backend), *outline(packing, backend)]
-    elements += _walls(packing, numbers, backend)
-    elements.append(_lines(packing, numbers, mean / unit, values, label, look, backend))
+    elements += _walls(packing, shown, backend)
+    elements.append(_lines(packing, shown, mean / unit, values, label, look, backend))
+    if numbers:
+        elements.append(_numbers(packing, shown, backend))
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
@@ -89,6 +102,19 @@ def plot(
     kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     title = f"{counted(count, *kind)}, μ = {packing.mu:g}{scale}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
+
+
+def _states(given: Any) -> Any:
+    """Networks, also those of a Walk or a UniformSample; InputError for a record without any."""
+    fields = getattr(given, "_fields", None)  # of a named tuple
+    if fields is None:
+        return given
+    if "states" in fields:
+        return given.states
+    raise InputError(
+        f"{with_article(type(given).__name__)} has no states to draw; for exact intervals give "
+        'colour="interval" without states, or numbers as colour'
+    )
 
 
 def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:
@@ -178,6 +204,13 @@ def _lines(
         **wide,
         **look,
     )
+
+
+def _numbers(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> hv.Labels:
+    """The numbers of contacts at their points of contact."""
+    x, y = packing.contact_points[numbers].T
+    size = {"text_font_size": "8pt"} if backend == "bokeh" else {"size": 7}
+    return hv.Labels((x, y, numbers.astype(str))).opts(backend=backend, **size)
 
 
 def _ends(packing: Packing, numbers: npt.NDArray[Any], forces: Floats) -> tuple[Floats, Floats]:

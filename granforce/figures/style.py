@@ -207,6 +207,9 @@ def inset(
             False  # otherwise Matplotlib would close the unfinished outer frame
         )
         artists.initialize_plot()
+        artists.handles["axis"].tick_params(
+            which="both", labelsize=artists.handles["axis"].xaxis.label.get_size()
+        )
 
     hooks = [_legend_of(outer.values()), draw]
     return [outer.opts(backend=backend, clone=True, hooks=hooks)]
@@ -273,9 +276,9 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
     """Write a figure to a path.
 
     The suffix selects the format: a self-contained web page (.html), or a picture (.png, .svg,
-    .pdf). Pages need the backend "bokeh", pictures "matplotlib"; no browser is needed. caption: a
-    description stored in the file: the title of a page, the Description of a PNG, <desc> in an SVG,
-    the Subject of a PDF.
+    .pdf). Figures look best if drawn for the backend that writes the file: "bokeh" for pages,
+    "matplotlib" for pictures; no browser is needed. caption: a description stored in the file: the
+    title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
     """
     path = Path(path)
     if path.suffix == ".html":

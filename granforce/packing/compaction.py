@@ -125,7 +125,7 @@ def pack(
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
     farther than STRIDE. accuracy: largest violation of the laws of Signorini and Coulomb after a
-    step, as a velocity relative to the fastest carrying grain; sweeps: most sweeps per step. For
+    step, as a velocity relative to the fastest carrying grain; sweeps: maximum per step. For
     the defaults of dt and sweeps see `default_steps`. box: "square", or "isotropic", whose sides
     and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear too.
     progress(steps done, None) is called repeatedly, as the total is unknown, and watch(Glimpse) at

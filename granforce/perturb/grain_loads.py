@@ -45,7 +45,7 @@ from granforce.records import (
     takes,
 )
 from granforce.system import cancelling
-from granforce.tolerances import INTERVAL_GAP
+from granforce.tolerances import INTERVAL_GAP, ROUNDING
 from granforce.types import Cancel, Floats
 
 # Precision of a critical load by default, and the coarsest, as fractions of the load factor.
@@ -116,7 +116,8 @@ def _limit(S: Ensemble, load: npt.ArrayLike | str) -> LoadFactor:
     if not abs(value - bound) <= system.accuracy:
         raise UndecidedError("the limit of this load could not be certified")
     # Differences of two rounded numbers; λ is 0 if nothing but the weights can be balanced.
-    return LoadFactor(max(0.0, -value) / unit, abs(value - bound) / unit, load, S.expand(forces))
+    factor = 0.0 if -value <= ROUNDING else -value
+    return LoadFactor(factor / unit, abs(value - bound) / unit, load, S.expand(forces))
 
 
 @takes(Ensemble)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from typing import Any
 
 
@@ -23,6 +24,19 @@ def counted(count: int, one: str, several: str) -> str:
     return f"{count} {one if count == 1 else several}"
 
 
+# Lines of reports whose names in JSON say too little to a reader.
+_LABELS = {
+    "again": "linear programs solved twice",
+    "programs": "linear programs",
+    "turns": "reflections",
+    "held": "coordinates always zero",
+    "refused": "paths discarded",
+    "dropped": "warm-up states",
+    "grains_left_open": "walls and fixed grains",
+}
+
+
 def spaced(name: str) -> str:
-    """A name in words; symbols such as f_n keep their form."""
-    return name.replace("_", " ").replace("f n", "f_n").replace("f t", "f_t")
+    """A name in words, as reports show it; symbols such as f_n keep their form."""
+    words = _LABELS.get(name, name.replace("_", " "))
+    return re.sub(r"\bf ([nt])\b", r"f_\1", words)

@@ -23,7 +23,7 @@ def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
     if as_json:
         print(json_text(lines))
         return
-    width = max(len(name) for name in lines)
+    width = max(len(spaced(name)) for name in lines)
     for name, value in lines.items():
         sentences = isinstance(value, list) and any(" " in str(part) for part in value)
         name = spaced(name)
@@ -121,7 +121,10 @@ class Bar:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: Any) -> None:
+        if kind is None and self.bar.total and id(self) in self._drawn:
+            self.bar.n = self.bar.total  # work that turned out not to be needed is done too
+            self.bar.refresh()
         self.bar.close()
         self._drawn.discard(id(self))
 

@@ -400,7 +400,8 @@ def test_an_interrupt_does_not_wait_for_the_compiler_and_says_what_is_saved(tmp_
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
     assert running.returncode == 130
-    assert err.splitlines()[-1] == "granforce: interrupted; saved 0 of 3 cells"
+    last = "granforce: interrupted; saved 0 of 3 cells; run the same command again to continue"
+    assert err.splitlines()[-1] == last
 
 
 def swallowed(arguments):

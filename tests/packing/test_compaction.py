@@ -60,7 +60,7 @@ def test_frictionless_packings_are_isostatic(seed):
 
 @pytest.mark.parametrize("mu, seed", [(1e-5, 12), (1e-6, 13)])
 def test_forces_on_their_cones_are_at_rest_at_once(mu, seed):
-    """Most contacts slide there, to rounding; steps of the test of rest ended without a solution."""
+    """Most contacts slide there, to rounding, which steps of the test of rest never solved."""
     packing = pack(100, mu, seed, max_steps=1000)
     assert rest(packing).at_rest and packing.info["linear_programs"] < 20
 

@@ -42,7 +42,9 @@ def interrupted(running):
     assert running.returncode == 130
     assert out == ""
     assert "Traceback" not in err
-    assert re.search(r"interrupted; saved [1-9]\d* of \d+ cells\n$", err)
+    assert re.search(
+        r"interrupted; saved [1-9]\d* of \d+ cells; run the same command again to continue\n$", err
+    )
 
 
 def until_it_computes(running, seconds=0.3, patience=300):

@@ -30,7 +30,7 @@ INFERENCE_LINES = (
 
 
 def informative(arguments: argparse.Namespace) -> None:
-    """Rank contacts worth measuring, or load the ranking, and report them; intervals in ⟨f_n⟩."""
+    """Rank contacts worth measuring, or load the ranking, and report them."""
     entry, parameters, dataset, ends = found(
         *(arguments, kinds.INFORMATIVE, arguments.out),
         k=arguments.best,
@@ -40,14 +40,15 @@ def informative(arguments: argparse.Namespace) -> None:
         **conditions(arguments),
     )
     now, after = dataset["mean_before"].item(), dataset["mean_after"].values
+    forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
     twins = [[int(c) for c in others] for others in json.loads(dataset.attrs["twins"])]
     columns = contact_labels(arguments, parameters, dataset) | {
         "expected_reduction": dataset["part_expected"].values,
         "reduction": 1 - after / now,
-        "mean_interval_after [mean]": after,
+        **forces.named({"mean_interval_after": scale * after}),
         "number_of_twins": np.array([len(others) for others in twins]),
     }
-    lines = {"entry": entry, "mean_interval_now [mean]": now, **ends}
+    lines = {"entry": entry, **forces.reported({"mean_interval_now": scale * now}), **ends}
     ranked = {name: values.tolist() for name, values in columns.items()} | {"twins": twins}
     del ranked["number_of_twins"]
     worded = [" ".join(map(str, others)) or "none" for others in twins]

@@ -14,6 +14,11 @@ def figures(arguments: argparse.Namespace) -> None:
     """Draw Figure 1 from the store of a scan."""
     from granforce.figures import indeterminacy, save
 
+    if arguments.scan is not None and arguments.scan.endswith(".csv"):
+        raise InputError(
+            f"{arguments.scan} is a table; Figure 1 is drawn from the store of results: give the "
+            "folder of granforce scan --cache, or leave it out for the default store"
+        )
     store = open_store(arguments.scan, readonly=True)
     save(indeterminacy(store, backend=_backend(arguments.out)), arguments.out)
 
@@ -33,7 +38,11 @@ def plot(arguments: argparse.Namespace) -> None:
     if arguments.colour == "spread" and networks.get("states", packing.forces).ndim < 3:
         raise InputError("--colour spread needs several networks: give --states without --state")
     drawn = picture.plot(
-        packing, colour=arguments.colour, backend=_backend(arguments.out), **networks
+        packing,
+        colour=arguments.colour,
+        numbers=arguments.numbers,
+        backend=_backend(arguments.out),
+        **networks,
     )
     save(drawn, arguments.out)
 

@@ -8,24 +8,26 @@ import json
 import os
 import re
 import runpy
+import shutil
 import socket
 import subprocess
 import sys
 import webbrowser
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import platformdirs
 
-from granforce.cli.parsing import ROLES, Input, Output
+from granforce.cli.parsing import LONGEST, ROLES, Input, Output
 from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.records import InputError, whole
 from granforce.study import kinds
 from granforce.study.keys import Parameters
-from granforce.study.store import Store, open_store, refuse_newer
+from granforce.study.store import Entry, Store, open_store, refuse_newer
 from granforce.system.files import make_folder
-from granforce.system.plain import json_text
+from granforce.system.plain import json_text, spaced
 from granforce.system.terminal import print_list, print_report
 
 
@@ -182,12 +184,44 @@ def cache(arguments: argparse.Namespace) -> int:
         print_list(verdicts, ("name", "ok", "reason"), arguments.json)
         return 0 if all(verdict["ok"] for verdict in verdicts) else 1
     else:
-        entries = [
-            {**entry._asdict(), "params": json.dumps(_typed(entry.params))}
-            for entry in store.find(arguments.kind)
-        ]
-        print_list(entries, ("name", "bytes", "created", "params"), arguments.json)
+        entries = store.find(arguments.kind)
+        if arguments.json:
+            params = [{"params": json.dumps(_typed(entry.params))} for entry in entries]
+            print(json_text([e._asdict() | own for e, own in zip(entries, params, strict=True)]))
+        else:
+            _print_entries(entries)
     return 0
+
+
+def _print_entries(entries: Sequence[Entry]) -> None:
+    """A line for each entry, at most as long as the terminal is wide."""
+    width, _ = shutil.get_terminal_size((LONGEST, 0))
+    size = max((len(str(entry.bytes)) for entry in entries), default=0)
+    size = max(size, len("bytes"))
+    print(f"{'name':<28}  {'bytes':>{size}}  {'created':<10}  contents")
+    for entry in entries:
+        line = f"{entry.name:<28}  {entry.bytes:>{size}}  {entry.created[:10]}  "
+        line += _contents(_typed(entry.params))
+        print(line if len(line) <= width else f"{line[: width - 1]}…")
+
+
+def _contents(parameters: Parameters) -> str:
+    """The packing of an entry and its other parameters, in words."""
+    packing = parameters.get("packing", parameters)
+    mu = f"μ = {packing['mu']:g}" if "mu" in packing else ""
+    if "imported" in packing:
+        words = [f"imported {packing['imported'][:8]}", mu]
+    elif "scene" in packing:
+        words = [f"scene {packing['scene']}", mu]
+    else:
+        words = [f"{packing['n']} disks", mu, f"seed {packing['seed']}"] if "n" in packing else [mu]
+    others = parameters if packing is not parameters else {}
+    words += [
+        f"{spaced(name)} {value}"
+        for name, value in others.items()
+        if isinstance(value, (int, float, str)) and name not in ("version", "mu")
+    ]
+    return ", ".join(word for word in words if word)
 
 
 def _typed(parameters: Parameters) -> Parameters:

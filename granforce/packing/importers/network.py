@@ -265,7 +265,9 @@ def _settled(packing: Packing) -> Packing:
     rest = rest.reshape(len(whole.grains), -1)
     unbalanced = np.abs(rest).max(axis=1)
     if unbalanced.max() > LOAD_MISFIT:
-        named = ", ".join(str(whole.grains[k]) for k in np.argsort(-unbalanced, kind="stable")[:5])
+        worst = np.argsort(-unbalanced, kind="stable")[:5]
+        worst = worst[unbalanced[worst] > LOAD_MISFIT]
+        named = ", ".join(str(whole.grains[k]) for k in worst)
         total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
         walls = (
             ""

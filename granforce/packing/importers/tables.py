@@ -78,6 +78,9 @@ def read_table(
     found = [read_csv(source) for source in (grains, contacts) if source is not None]
     table, *pairs = renamed(_full(columns or {}), NAMES, *found)
     pairs = [_with_full_names(one) for one in pairs]
+    _check_columns(table, "x", "y", "r")
+    for one in pairs:
+        _check_columns(one, "i", "j")
     check_grains(len(table.rows), most_grains, table.name)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
@@ -205,3 +208,14 @@ def _given_branches(table: Table) -> Floats | None:
             f"got {norm[c]:.4g} and {length[c]:.4g}"
         )
     return normal * (length / norm)[:, None]
+
+
+def _check_columns(table: Table, *names: str) -> None:
+    """InputError with what to do unless a table has all these columns."""
+    try:
+        table.require(*names)
+    except InputError as error:
+        missing = next(name for name in names if name not in table.header)
+        raise InputError(
+            f"{error}; if it has another name, give --columns {missing}=NAME (columns= in Python)"
+        ) from None

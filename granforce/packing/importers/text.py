@@ -263,6 +263,11 @@ def read_csv(source: Source) -> Table:
     if len(rows) < 2:
         raise InputError(f"{name}: a header line and at least one row are needed")
     header, *rows = _trimmed(rows)
+    if all(_is_number(column) for column in header):
+        raise InputError(
+            f"{name}: the first line contains only numbers; add a line with the names of the "
+            "columns, such as x,y,r for grains (other names: --columns, or columns= in Python)"
+        )
     return make_table(name, [column.lower() for column in header], rows, numbers[1:])
 
 
