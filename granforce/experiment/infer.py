@@ -69,7 +69,9 @@ class Inference(NamedTuple):
 
     forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
-    freedom: int  # degrees of freedom: measured components less adjustable dimensions
+    # degrees of freedom: measured components less the directions in which the network can follow
+    # the measurement; fewer than S has dimensions if forces lie on their cones, as at f_n = 0
+    freedom: int
     deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN if not measured
     suspects: Integers  # (s,) contacts, as numbers in the packing, beyond 3 σ, largest first
     residual: float  # in ⟨f_n⟩, by Ensemble.residual

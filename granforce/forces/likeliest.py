@@ -48,7 +48,7 @@ class Likeliest(NamedTuple):
 
     forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
-    freedom: int  # degrees of freedom: measured components minus those the network can fit exactly
+    freedom: int  # degrees of freedom: measured components less directions of S it can follow
     deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
 
 

@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 import warnings
@@ -246,6 +247,8 @@ def _over_processes(
     advanced: Callable[[float], object],
     enough: Callable[[], bool],
 ) -> None:
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        sys.exit(1)  # in a worker that imports a script without a guard: its parent says so
     with cancelling.watched():  # the compiler cannot be interrupted
         cancelling.apart(warm_up, {cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
@@ -273,7 +276,7 @@ def _one_pool(
 ) -> Tasks:
     """Run tasks in processes, `before` of which have ended; return those left by a dead worker."""
     context = multiprocessing.get_context("spawn")
-    counter = context.Value("d", 0.0)
+    counter = context.Value("d", _NONE_BEGAN)
     left, todo, broken = dict(tasks), list(tasks), False
     waiting: dict[Future[bool], int] = {}
     workers = min(workers, len(tasks))
@@ -304,7 +307,12 @@ def _one_pool(
                 else:
                     finished(k, future.result)
                     del left[k]
-            advanced(before + counter.value)
+            advanced(before + max(0.0, counter.value))
+        if broken and counter.value == _NONE_BEGAN:
+            raise InputError(
+                "worker processes ended before they began: in a script, call this under "
+                'if __name__ == "__main__":'
+            )
     except BaseException:
         # Workers would continue the current cell, whose result is lost anyway.
         for process in list(pool._processes.values()):
@@ -331,11 +339,14 @@ def _single_threaded() -> Iterator[None]:
 
 
 _counter = None
+_NONE_BEGAN = -1.0  # value of the counter before a worker has begun
 
 
 def _share(counter: Any) -> None:
     global _counter
     _counter = counter
+    with counter.get_lock():
+        counter.value = max(0.0, counter.value)
     # Ctrl-C goes to the whole process group: the parent ends the workers silently.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -156,10 +156,14 @@ def test_saving_leaves_nothing_behind_when_it_fails(tmp_path):
     packing = load_packing(SMALL)
     with pytest.raises(InputError, match="plain numbers"):
         save_packing(packing._replace(info={"a": object()}), tmp_path / "p.npz")
-    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken.npz").mkdir()
     with pytest.raises(InputError, match="cannot write"):
-        save_packing(packing, tmp_path / "taken")
-    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+        save_packing(packing, tmp_path / "taken.npz")
+    for name in ("a.csv", "b"):
+        with pytest.raises(InputError, match=rf"{name}: the name must end with \.npz"):
+            save_packing(packing, tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.npz"]
+    save_packing(packing, "/dev/null")
 
 
 def archive(**changes):

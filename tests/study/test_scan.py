@@ -372,3 +372,14 @@ def test_what_is_no_scheduler_is_one_line(tmp_path):
         with pytest.raises(InputError, match="no dask scheduler at") as told:
             scan.run(tmp_path / "s", small_cells()[:1], scheduler=f"tcp://127.0.0.1:{port}")
         assert "\n" not in str(told.value)
+
+
+def test_a_script_without_a_guard_is_told_of_it(tmp_path):
+    """Workers import the script, which begins the scan again."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import granforce as gf\ngf.scan({str(tmp_path / 'store')!r}, 0.3, n=12, states=2)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    last = done.stderr.rstrip().splitlines()[-1]
+    assert done.returncode == 1 and last.endswith('under if __name__ == "__main__":')

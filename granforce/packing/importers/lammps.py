@@ -10,7 +10,12 @@ import numpy as np
 
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed, once
-from granforce.packing.importers.network import LOAD_MISFIT, adopt, refuse_idle_reverse
+from granforce.packing.importers.network import (
+    LOAD_MISFIT,
+    adopt,
+    refuse_idle_reverse,
+    with_edge,
+)
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -161,7 +166,9 @@ def open_lammps(
             tilt=box.cell.tilt,
         )
         info = {"timestep": step, "contacts_skipped": skipped}
-        return Snapshot(adopt(packing, reverse=reverse, **info), np.sort(atoms.numbers("id")))
+        found = adopt(packing, reverse=reverse, **info)
+        found = found if np.isfinite(found.volume) else with_edge(found)
+        return Snapshot(found, np.sort(atoms.numbers("id")))
 
     whole = steps[:-1] if cut else steps
     lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""

@@ -60,6 +60,19 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
+def with_edge(packing: Packing, advice: str = "") -> Packing:
+    """The open packing with a note on grains that their contacts do not balance."""
+    off = np.abs(packing.load).max(axis=1) > LOAD_MISFIT * packing.forces[:, 0].mean()
+    if not off.any():
+        return packing
+    note = (
+        f"contacts do not balance {off.sum()} of {len(off)} grains: what is left over counts as a "
+        f"load on them, which makes the residual 0{advice}"
+    )
+    notes = [*packing.info.get("notes", []), note]
+    return packing._replace(info=packing.info | {"notes": notes})
+
+
 def refuse_idle_reverse(forces: Floats, reverse: bool) -> None:
     """InputError if reversing the sign of f_t is requested and no f_t of forces (k, 2) has one."""
     if reverse and not np.nan_to_num(forces[:, 1]).any():

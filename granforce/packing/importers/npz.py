@@ -23,7 +23,7 @@ from granforce.records import (
     make_packing,
     takes,
 )
-from granforce.system.files import written
+from granforce.system.files import expanded, written
 from granforce.types import Floats
 
 _GRAINS = ("x", "r", "P", "mu")
@@ -65,8 +65,14 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
 
     target: a path, which is written completely or not at all, or an open binary file.
 
-    Raises InputError if info has other values than numbers and strings, or on a write error.
+    Raises InputError if info has other values than numbers and strings, for a path that does not
+    end with .npz, or on a write error.
     """
+    if not hasattr(target, "write"):
+        path = expanded(target)
+        device = path.exists() and not path.is_file() and not path.is_dir()
+        if path.suffix != ".npz" and not device:
+            raise InputError(f"{target}: the name must end with .npz")
     try:
         info = json.dumps(packing.info, default=lambda value: value.item())
     except (TypeError, ValueError, AttributeError):

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
-from granforce.packing.importers.network import LOAD_MISFIT, adopt, find, refuse_idle_reverse
+from granforce.packing.importers.network import adopt, find, refuse_idle_reverse, with_edge
 from granforce.packing.importers.text import (
     Source,
     Table,
@@ -119,21 +119,13 @@ def read_table(
         )
     refuse_idle_reverse(packing.forces, reverse)
     found = adopt(packing, reverse=reverse, forces="given")
-    return found if closed or load.any() else _with_edge(found)
-
-
-def _with_edge(packing: Packing) -> Packing:
-    """The open packing with a note on grains that their contacts do not balance."""
-    off = np.abs(packing.load).max(axis=1) > LOAD_MISFIT * packing.forces[:, 0].mean()
-    if not off.any():
-        return packing
-    note = (
-        f"contacts do not balance {off.sum()} of {len(off)} grains: what is left over counts as a "
-        "load on them; for walls and weights instead, leave out the forces and give --walls and "
-        "--gravity (walls=, gravity=)"
+    if closed or load.any():
+        return found
+    return with_edge(
+        found,
+        "; for walls and weights instead, leave out the forces and give --walls and --gravity "
+        "(walls=, gravity=)",
     )
-    notes = [*packing.info.get("notes", []), note]
-    return packing._replace(info=packing.info | {"notes": notes})
 
 
 def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
