@@ -268,7 +268,8 @@ class Job:
                 self.cancel()
             return
         except Cancelled:
-            if not self.cancelled():
+            # Otherwise a visitor no longer needs it, or the server is ending.
+            if time.monotonic() > self._until and not self.cancelled():
                 self.error = (
                     f"this took longer than the {self._pool.seconds:g} s allowed per computation "
                     "on this server: choose smaller values, or run it on your computer (Copy CLI "

@@ -1014,6 +1014,17 @@ def test_what_takes_too_long_is_ended_with_a_line():
     assert "longer than the 0.01 s allowed per computation on this server" in job.error
 
 
+def test_a_job_of_a_server_that_ends_is_ended_without_a_line(monkeypatch):
+    monkeypatch.setattr(cancelling, "_ending", threading.Event())
+
+    def work(job):
+        cancelling.end_everything()
+        cancelling.check("work")
+
+    job = Job(work, Pool(1, "test"))  # without a time limit
+    assert job.wait(60) and job.result is None and job.error == ""
+
+
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
     begun = threading.Event()
 
