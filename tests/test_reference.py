@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 import granforce
+from granforce.cli.commands import service
 from granforce.cli.parser import main
+from granforce.study.store import open_store
 
 HOUSE = granforce.__path__[0]
 EXAMPLES = f"{HOUSE}/docs/examples.md"
@@ -105,3 +107,13 @@ def test_the_site_builds_without_a_warning(tmp_path):
 def test_a_folder_that_is_not_there_is_refused(tmp_path, capsys):
     assert main(["docs", "--out", str(tmp_path / "missing" / "site")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_built_pages_leave_the_default_store_alone(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("GRANFORCE_CACHE", raising=False)
+    monkeypatch.setattr(service, "_build_docs", lambda folder: folder.mkdir())
+    monkeypatch.setattr("webbrowser.open", lambda address: None)
+    monkeypatch.setattr("http.server.ThreadingHTTPServer.serve_forever", lambda server: None)
+    assert main(["docs"]) == 0
+    open_store().make()

@@ -96,7 +96,8 @@ def docs(arguments: argparse.Namespace) -> None:
         _build_docs(folder)
         print(folder / "index.html")
         return
-    folder = make_folder(platformdirs.user_cache_path("granforce")) / "docs"
+    # Not in the folder of the default store, which would be refused with foreign contents.
+    folder = make_folder(platformdirs.user_cache_path("granforce-docs")) / "site"
     _build_docs(folder)
     # Over HTTP, because browsers do not run the search in pages opened from files.
     handler = partial(_QuietHandler, directory=str(folder))
