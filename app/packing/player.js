@@ -301,8 +301,9 @@ class Player {
     const at = order.indexOf(model.contact ?? -1), { length } = order
     model.contact = order[at < 0 ? (sign > 0 ? 0 : length - 1) : (at + sign + length) % length]
     const row = this.scene.geometry.contact.indexOf(model.contact)
-    const told = this.look.contact(row, this.replay).map((pair) => pair.join(" "))
-    this.say(told.join("; "))
+    const [[, contact], [, n], [, t], ...others] = this.look.contact(row, this.replay)
+    const intervals = others.filter(([name]) => name.startsWith("interval")).map(([name, ends]) => `; ${name.split(", ")[1]} ${ends}`)
+    this.say(`contact ${contact}: fₙ ${n}, fₜ ${t}${intervals.join("")}`)
   }
 
   /** One line next to the number of the network; refused: shown until the next action. */

@@ -140,17 +140,17 @@ WALK = {
 
 
 def test_between_two_states_the_straight_line_is_shown(run):
-    """Forces and range so far, at 1.3 of the track and back at 1."""
+    """Forces, and the number of networks passed, at 1.3 of the track and back at 1."""
     there, back = run(
         "packing/replay/replay",
         """({ Replay }, { walk }) => {
             const replay = new Replay(walk, null)
             return [3, 1.3, 1].map((to) => {
                 replay.go(to)
-                const { mixed, residual, low, high, place } = replay
+                const { mixed, residual, seen, place } = replay
                 return {
                     normal: [...mixed.normal], tangential: [...mixed.tangential],
-                    low: [...low], high: [...high], residual, place,
+                    seen, residual, place,
                 }
             }).slice(1)
         }""",
@@ -160,7 +160,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
     np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
     np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
     assert (there["residual"], there["place"]) == (0.2, "of 3")
-    assert back["low"] == back["high"] == NORMAL[1].tolist()  # the original is no state
+    assert back["seen"] == 1  # the original is no state
     assert back["normal"] == NORMAL[1].tolist()
 
 
