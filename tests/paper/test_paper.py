@@ -1,7 +1,10 @@
 """The study: its plan, its reduced table, its verdicts, and the command that runs it."""
 
+import contextlib
+import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -315,20 +318,22 @@ def test_every_figure_of_the_table_is_made(table):
     assert "lie outside of S" in drawings.captions(table)["figure1"]
 
 
-def linked(done, folder):
-    """A folder for the command that has the cells already."""
-    os.makedirs(folder)
-    os.symlink(done / "cells.zarr", folder / "cells.zarr")
-    return str(folder)
+@pytest.fixture(scope="module")
+def commanded(done, tmp_path_factory):
+    """The folder of a study by the command, which had most cells already, and what it printed."""
+    folder = tmp_path_factory.mktemp("command")
+    shutil.copytree(done / "cells.zarr", folder / "cells.zarr")
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert main([*WORDS, "--out", str(folder), "--formats", "", "--json"]) == 0
+    return folder, out.getvalue()
 
 
-def test_the_command_computes_and_judges(done, tmp_path, capsys):
-    folder = linked(done, tmp_path / "out")
-    assert main([*WORDS, "--out", folder, "--formats", "", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+def test_the_command_computes_and_judges(commanded, tmp_path, capsys):
+    folder, printed = commanded
+    told = json.loads(printed, parse_constant=pytest.fail)
     assert told["skipped"]["missing_cells"] == 0
     assert [claim["statement"] for claim in told["claims"]]
-    assert json.loads((tmp_path / "out" / "claims.json").read_text()) == told
+    assert json.loads((folder / "claims.json").read_text()) == told
     # The store alone, reduced, tells the same, and so does the reduced study.
     words = [*WORDS, "--reduce", f"{folder}/cells.zarr", "--out", str(tmp_path / "beside")]
     assert main([*words, "--table", f"{folder}/study.zarr", "--formats", "", "--json"]) == 0
@@ -341,15 +346,15 @@ def test_the_command_computes_and_judges(done, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_command_draws(done, tmp_path):
-    folder = linked(done, tmp_path / "out")
-    assert main([*WORDS, "--out", folder]) == 0
-    names = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
+def test_the_command_draws(commanded, tmp_path):
+    words = ["study", "--table", f"{commanded[0]}/study.zarr", "--out", str(tmp_path)]
+    assert main(words) == 0
+    names = {path.name for path in (tmp_path / "figures").iterdir()}
     assert {"figure1.html", "figure1.png", "figure1.svg", "distances.png"} <= names
 
 
-def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
-    folder = linked(done, tmp_path / "out")
+def test_a_study_tells_what_is_left_and_ends_in_time(commanded, tmp_path, capsys):
+    folder = str(commanded[0])
     assert main([*WORDS, "--out", folder, "--status", "--json"]) == 0
     rows = {row["part"]: row for row in json.loads(capsys.readouterr().out)}
     assert all(row["cells"] == row["done"] > 0 for row in rows.values())
