@@ -11,7 +11,7 @@ from granforce import notebook
 from granforce.explore.intervals import Bounds, Key, SmallestForces, solved
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import checked, likeliest
+from granforce.forces.likeliest import checked, likeliest, spread_of
 from granforce.numerics.certified_values import Solver
 from granforce.records import positive, takes
 from granforce.system import cancelling
@@ -68,7 +68,7 @@ def carrying(
     """
     within = positive(within, "within")
     m, s = checked(ensemble, measured, sigma)
-    best = likeliest(ensemble, m, s, unmeasured)
+    best = likeliest(ensemble, m, s, spread_of(ensemble, unmeasured))
     width = np.fmax(within, _BEYOND * np.abs(best.deviation)) * s
     most = _MOST * np.nanmax(np.abs(m), initial=np.abs(best.forces).max())
     bounds = ensemble.bounds

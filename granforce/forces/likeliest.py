@@ -66,18 +66,16 @@ def likeliest(
     ensemble: Ensemble,
     measured: npt.ArrayLike,
     sigma: npt.ArrayLike,
-    unmeasured: float | None = None,
+    unmeasured: float = UNMEASURED,
 ) -> Likeliest:
     """The network of S with the least Σ ((f − m)/σ)²; a Likeliest.
 
     measured, sigma: m and σ as `checked` takes them. unmeasured: standard error, in ⟨f_n⟩, with
-    which components that were not measured count as 0, by default that of `spread_of`; they are not
-    part of χ².
+    which components that were not measured count as 0; they are not part of χ².
 
     Raises InputError as `checked` does, NotJammedError where S is empty.
     """
     m, s = checked(ensemble, measured, sigma)
-    unmeasured = spread_of(ensemble, unmeasured)
     if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
         raise InputError(f"unmeasured must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}")
     forces = fitted(ensemble, m, s, unmeasured)

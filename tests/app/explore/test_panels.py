@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import re
 import warnings
 from types import SimpleNamespace
 
@@ -469,8 +470,10 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
 def test_what_is_said_of_friction_is_made_from_the_study(state):
     view = friction_tab(state)
     points = statistics.means(study_data.rows("walk"), "eta2")
-    mu, value, _ = max(points, key=lambda point: point[1])
-    assert f"nearest-network walks, η₂ is largest at μ = {mu:g}: {value:.3f}" in view.first.object
+    mu, *largest = max(points, key=lambda point: point[1])
+    words = rf"nearest-network walks, η₂ is largest at μ = {mu:g}: ([\d.]+) ± ([\d.]+)\."
+    shown = re.search(words, view.first.object)
+    assert [float(number) for number in shown.groups()] == pytest.approx(largest, abs=6e-5)
     told = view.details.object
     assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
