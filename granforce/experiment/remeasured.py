@@ -72,8 +72,8 @@ def remeasured(
     """The network with the least Σ ((f − m)/σ)², with error bars from repeated measurement.
 
     A Remeasured, with the arguments of `infer`; `unmeasured` is 2 by default, and 1 in an unbounded
-    S. Its draws are independent of each other (their
-    mixing is not diagnosed: NaN) and need no set-up: one contact program each, eight at a time.
+    S. Its draws are independent of each other (their mixing is not diagnosed: NaN) and need no
+    set-up: one contact program each, eight at a time.
     workers: threads, which do not change the result.
 
     Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.

@@ -143,9 +143,8 @@ def walk(
     is False: sweeps end at a small residual, not exactly at that point. A warning says if S is
     unbounded: forces then grow with the number of states.
 
-    Raises InputError for sizes
-    below 1, for several chains with `begun` or `enough`, and if `begun` has other arguments;
-    NotJammedError if max_attempts yield too few states of a whole walk.
+    Raises InputError for sizes below 1, for several chains with `begun` or `enough`, and if `begun`
+    has other arguments; NotJammedError if max_attempts yield too few states of a whole walk.
     """
     states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)
