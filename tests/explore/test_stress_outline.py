@@ -93,7 +93,7 @@ def test_what_is_known_makes_the_outline_smaller(S, found):
 def test_conditions_without_outline_are_told(S):
     with pytest.raises(gf.InputError, match="whole stress is prescribed"):
         gf.stress_outline(gf.ensemble(S.packing, prescribed="stress"))
-    with pytest.raises(gf.InputError, match="needs a prescribed pressure"):
+    with pytest.raises(gf.InputError, match="at a prescribed pressure"):
         gf.stress_outline(gf.ensemble(S.packing, frozen=np.arange(0, 164, 4)))
     with pytest.raises(gf.InputError, match="number of angles"):
         gf.stress_outline(S, 0)

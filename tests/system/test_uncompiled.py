@@ -13,7 +13,8 @@ import granforce as gf
 
 def results(box):
     """Arrays of a small packing and of what is computed of its S, in one lane and in eight."""
-    packing = gf.pack(6, 0.5 if box == "isotropic" else 0.3, 2, accuracy=0.1, box=box)
+    mu, seed = (0.5, 4) if box == "isotropic" else (0.3, 2)
+    packing = gf.pack(6, mu, seed, accuracy=0.1, box=box)
     S = gf.ensemble(packing)
     starts = S.original * np.linspace(0.8, 1.2, 4)[:, None, None]
     found = {
