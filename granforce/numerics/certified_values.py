@@ -299,7 +299,7 @@ def _certify(
     bound = np.array([system.b @ one for one in multiplier.T.copy()]) - system.total * short - far
     # w·y may grow with the load: −F ≥ bound − short · gain · F.
     bound = np.where(short * gain < 1, bound / (1 - short * gain), -np.inf)
-    admitted = (np.abs(unbalance).max(axis=0) <= BALANCED) & (y.min(axis=0) >= 0)
+    admitted = (np.abs(unbalance).max(axis=0, initial=0.0) <= BALANCED) & (y.min(axis=0) >= 0)
     return np.where(admitted, value, np.inf), np.where(np.isfinite(bound), bound, -np.inf)
 
 

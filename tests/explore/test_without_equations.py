@@ -71,14 +71,21 @@ def test_what_is_measured_is_inferred_contact_by_contact(S):
     assert np.all(gf.carrying(S, measured, 0.1 * unit).least == 0)
 
 
+def test_without_bounds_forces_have_no_limit(S):
+    """All of each cone is in S, and any pair of forces on open grains."""
+    found = gf.intervals(S)
+    side = np.inf if S.mu else 0.0
+    assert found.converged and np.all(found.low == [0.0, -side])
+    assert np.all(found.high == [np.inf, side])
+    assert np.all(np.isposinf(gf.limit_loads(S)))
+
+
 def test_without_bounds_that_is_said(S):
     contact, axes = S.index[0], np.eye(2 * len(S.index))[[0, 2]].reshape(2, -1, 2)
     for call in (
-        gf.intervals,
         gf.sample_uniform,
         gf.volume,
         gf.informative,
-        gf.limit_loads,
         lambda S: gf.reach(S, contact),
         lambda S: gf.outline(S, axes),
     ):
@@ -86,7 +93,7 @@ def test_without_bounds_that_is_said(S):
             call(S)
     for call, words in (
         (gf.body, "dimensions"),
-        (gf.stress_outline, "needs a prescribed pressure"),
+        (gf.stress_outline, "at a prescribed pressure"),
     ):
         with pytest.raises(InputError, match=words):
             call(S)
@@ -112,7 +119,7 @@ def test_no_load_on_open_grains_has_a_limit(bounded):
     S, *_ = bounded
     loads = gf.limit_load_bounds(S)
     assert np.all(np.isposinf(loads.load)) and loads.converged and loads.max_gap == 0
-    with pytest.raises(InputError, match=f"contact {S.index[1]} is not required"):
+    with pytest.raises(InputError, match=f"moves the grains of contact {S.index[1]}:"):
         gf.critical_force(S, S.index[1])
 
 

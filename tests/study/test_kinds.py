@@ -22,7 +22,7 @@ NAMES = {
     "packing": ((20, 0.1, 1), {}, "packing-e92faea7640195223d3c"),
     "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-1d62362ee85d8524a995"),
     "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-50d4941ac9f07fe279e3"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-29479591e9f587d3b80d"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-75597dd2cb17663205e9"),
     "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-c54698df5db99cfb720a"),
     "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-2130d78dc07681ab080e"),
     "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-348a39809923bad22be4"),
