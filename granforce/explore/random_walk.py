@@ -169,7 +169,7 @@ def walk(
 
     point = ensemble.dimension == 0 and skip
     if not ensemble.bounded:
-        warnings.warn(f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined", stacklevel=2)
+        warnings.warn(f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined", stacklevel=4)
     if begun is not None:
         ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
     if begun is not None and len(begun.states) and not point:
