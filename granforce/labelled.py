@@ -13,6 +13,7 @@ import xarray as xr
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.records import InputError, Packing, brief, with_article
+from granforce.study.schema import VARIABLES
 from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
@@ -24,6 +25,8 @@ _SAMPLE = {
     "flat": "state contact component",
     "chain": "state",
 }
+# Results whose forces are on all contacts of the packing.
+_ON_ALL = ("Rest", "LoadFactor", "CriticalLoad")
 # Dimensions of the arrays of each kind of result, by the name of its type. Arrays over only the
 # contacts of a result are labelled with their numbers.
 _DIMENSIONS = {
@@ -40,6 +43,7 @@ _DIMENSIONS = {
     "UniformSample": _SAMPLE,
     "Draws": _SAMPLE,
     "Relaxation": {"forces": "contact component"},
+    **{name: {"forces": "contact component"} for name in _ON_ALL},
     "Intervals": {
         "low": "contact component",
         "high": "contact component",
@@ -186,8 +190,10 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
     variables = {}
     for name, words in dimensions.items():
         variable = _RENAMED.get(type(result).__name__, {}).get(name, name)
-        units = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
-        variables[variable] = (words.split(), arrays[name], units)
+        attributes = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
+        if variable in VARIABLES:
+            attributes["long_name"] = VARIABLES[variable].long_name
+        variables[variable] = (words.split(), arrays[name], attributes)
     if used & {"contact", "grain"} and not isinstance(result, Packing):
         _check_ensemble(ensemble, result)
     try:
@@ -264,6 +270,8 @@ def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers
     if isinstance(result, Packing):
         return result, np.arange(len(result.contacts.i))
     assert ensemble is not None  # checked
+    if type(result).__name__ in _ON_ALL:
+        return ensemble.packing, np.arange(len(ensemble.packing.contacts.i))
     _refuse_foreign(result, ensemble)
     return ensemble.packing, np.asarray(getattr(result, "contacts", ensemble.index))
 

@@ -259,11 +259,12 @@ def with_article(noun: str) -> str:
 def _check_kind(function: str, given: Any, kind: type) -> None:
     if isinstance(given, kind):
         return
-    plain = isinstance(given, (str, int, float))
+    plain, maker = isinstance(given, (str, int, float)), _MAKERS[kind.__name__]
+    if isinstance(getattr(given, "packing", None), Packing):  # a Photoelastic
+        maker = maker.replace("(packing)", "(photo.packing)")
     raise InputError(
         f"{function} takes {with_article(kind.__name__)}, not "
-        f"{brief(given) if plain else with_article(type(given).__name__)}; make one first: "
-        f"{_MAKERS[kind.__name__]}"
+        f"{brief(given) if plain else with_article(type(given).__name__)}; make one first: {maker}"
     )
 
 

@@ -1,6 +1,7 @@
 """What a newcomer tries first, with nothing but the README, `help()` and the TAB key."""
 
 import inspect
+import io
 import json
 import os
 import pydoc
@@ -26,6 +27,7 @@ from granforce.figures import picture
 from granforce.glossary import TERMS
 from granforce.packing.scenes import SCENES
 from granforce.perturb import grain_loads
+from granforce.study import scan
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
 from granforce.system import terminal
@@ -212,8 +214,8 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "measure P --states 4": set(),
     "uniform P --states 8": {"reached"},
     "volume P --accuracy 0.5": set(),
-    "intervals P --contacts 0,1": set(),
-    "limit-loads P --contacts 0": set(),
+    "intervals P --contacts 0,1": {"contacts_with_unbounded_f_n", "contacts_with_unbounded_f_t"},
+    "limit-loads P --contacts 0": {"contacts_without_a_limit"},
     "stress P --angles 4": set(),
     "perturb P --random 1": {"critical_force_deciles"},
     "informative P --states 40 --best 2 --check 1": set(),
@@ -602,7 +604,7 @@ def test_help_explains_the_fields_of_records_with_their_units():
         for name in record._fields:
             assert not getattr(record, name).__doc__.startswith("Alias"), (record, name)
     told = pydoc.render_doc(gf.Intervals, renderer=pydoc.plaintext)
-    assert "(k, 2) least value, force; NaN if cancelled or not certified" in told
+    assert "(k, 2) least value, force; −inf without a limit; NaN: cancelled" in told
     assert told.index("low: (k, 2) least value") < told.index("Method resolution order")
     above = pydoc.render_doc(gf.Packing, renderer=pydoc.plaintext)
     assert "of bodies other than disks; x are then centres of mass" in above
@@ -1072,3 +1074,53 @@ def test_pictures_show_the_numbers_of_contacts(backend):
     assert labels.array([0, 1]).astype(float) == pytest.approx(packing.contact_points)
     assert not gf.plot(packing, backend=backend).traverse(lambda x: x, [hv.Labels])
     assert hv.render(gf.plot(packing, **kinds), backend=backend)
+
+
+def test_results_on_all_contacts_are_labelled(pile):
+    S = gf.ensemble(pile)
+    for result in (gf.load_factor(S), gf.critical_load(S), gf.rest(S)):
+        table = gf.to_dataframe(result, S)
+        assert table["f_n [packing]"].tolist() == result.forces[:, 0].tolist()
+        assert table["j"].tolist() == pile.contacts.j.tolist()
+    low = gf.to_dataset(gf.intervals(S), S)["low"]
+    assert low.long_name == VARIABLES["low"].long_name
+
+
+def test_a_photoelastic_frame_is_answered_with_its_packing():
+    frame = gf.synthetic_frame(packed(30, 0.5), noise=0.05, seed=1)
+    photo = gf.read_pegs(frame, mu=0.5)
+    with pytest.raises(gf.InputError, match=r"gf\.ensemble\(photo\.packing\)"):
+        gf.infer(photo, photo.measured, photo.sigma)
+
+
+def test_a_load_without_limit_keeps_its_load_factor(cache, capsys):
+    assert main("pack --scene ladder --mu 0.6 --out ladder.npz".split()) == 0
+    capsys.readouterr()
+    assert main("load-factor ladder.npz --load horizontal --critical".split()) == 0
+    told = capsys.readouterr()
+    assert re.search(r"^load factor +inf$", told.out, re.M) and "critical" not in told.out
+    assert told.err.startswith("granforce: contact forces can balance every multiple of this load")
+    with pytest.raises(gf.InputError, match="every multiple of this load"):
+        gf.critical_load(gf.ensemble(gf.load_packing("ladder.npz")))
+
+
+def test_contacts_that_pull_are_named_where_nothing_balances():
+    box = "ITEM: BOX BOUNDS ff ff pp\n" + 3 * "-5 5\n"
+    head = "ITEM: TIMESTEP\n1\nITEM: NUMBER OF {}\n3\n" + box + "ITEM: {}\n"
+    disks = "1 0 0 1\n2 1.98 0 1\n3 0.99 1.71473 1\n"
+    pairs = "1 2 1.98 1 0 0 0\n1 3 1.98 -0.5 -0.866025 0 0\n2 3 1.98 0.5 -0.866025 0 0\n"
+    particles = head.format("ATOMS", "ATOMS id x y radius") + disks
+    contacts = head.format("ENTRIES", "ENTRIES atom1 atom2 distance fx fy px py") + pairs
+    packing = gf.read_lammps(io.StringIO(particles), io.StringIO(contacts), mu=0.5)
+    with pytest.raises(gf.NotJammedError, match="forces pull on contact 0, and contacts can only"):
+        gf.ensemble(packing)
+
+
+def test_failed_cells_of_a_scan_have_the_relaxation_as_typed(tmp_path, monkeypatch):
+    def all_fail(path, cells, **options):
+        assert [cell["relax"] for cell in cells] == ["accelerated"]  # as stored
+        return [], [(cell, "lost") for cell in cells]
+
+    monkeypatch.setattr(scan, "walks", all_fail)
+    _, [(cell, _)] = gf.scan(tmp_path / "s.zarr", [0.3], n=12, states=3)
+    assert cell["relax"] == "nearest"

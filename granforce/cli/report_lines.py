@@ -33,7 +33,7 @@ MEANINGS = {
     "expected_reduction": "estimated fraction by which the mean standard error of f_n decreases "
     "once this f_n is known, from covariances",
     "reduction": "fraction by which the mean interval of f_n of all contacts, including this one, "
-    "shortens, by exact bounds; undefined beyond --check",
+    "shortens if its value is the mean of the samples, by exact bounds; undefined beyond --check",
     "mean_interval_after": "mean length of the intervals of f_n once this one is known (its own is "
     "then 0)",
     "twins": "other contacts whose f_n is determined by that of this contact; the file of --out "

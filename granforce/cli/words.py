@@ -513,7 +513,8 @@ def add_load_factor(commands: Commands) -> None:
         "--load",
         choices=["horizontal"],
         required=True,
-        help="horizontal: a force equal to the weight of every body, along +x",
+        help="horizontal: a force equal to the weight of every body, along +x; for other loads use "
+        "gf.load_factor in Python",
     )
     command.add_argument(
         "--critical",
@@ -847,7 +848,7 @@ def add_cache(commands: Commands) -> None:
     command = subcommand(
         commands,
         "cache",
-        "list, measure, clear or verify the store of results, or print its path",
+        "list, clear or verify the store of results, or print its size or its path",
         "granforce cache verify --cache scan.zarr",
     )
     command.add_argument("action", choices=["list", "size", "clear", "verify", "path"])

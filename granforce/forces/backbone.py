@@ -23,8 +23,8 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import NotJammedError, Packing
-from granforce.tolerances import CARRYING, SEEN_CARRYING
+from granforce.records import NotJammedError, Packing, brief_list
+from granforce.tolerances import ADMISSIBLE, CARRYING, SEEN_CARRYING
 from granforce.types import Floats, Integers, Mask
 
 
@@ -190,6 +190,12 @@ def _unbalanced_message(full: Ensemble) -> str:
             "gf.admissible_stress say which they can), or "
         )
     named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
+    pulling = np.flatnonzero(full.original[:, 0] < -ADMISSIBLE * full.force_scale)
+    if len(pulling):
+        carries += (
+            f"forces pull on contact{'s' if len(pulling) > 1 else ''} "
+            f"{brief_list(full.index[pulling])}, and contacts can only press, or "
+        )
     return (
         f"no admissible force network exists: {carries}the packing is not jammed, friction is "
         "too small, or contacts are missing; grains with the largest unbalanced load: "

@@ -50,6 +50,7 @@ from granforce.types import Cancel, Floats
 
 # Precision of a critical load by default, and the coarsest, as fractions of the load factor.
 LOAD_PRECISION, MOST_LOAD_PRECISION = 1e-4, 0.1
+NO_LIMIT = "contact forces can balance every multiple of this load, so it has no critical factor"
 
 
 @notebook.brief
@@ -143,7 +144,7 @@ def critical_load(
     precision = positive(precision, "precision", most=MOST_LOAD_PRECISION)
     limit = _limit(S, load)
     if not np.isfinite(limit.factor):
-        raise InputError("this load has no limit: no multiple of it moves the bodies")
+        raise InputError(NO_LIMIT)
     direction, unit = _direction(S, limit.load)
     unit /= S.force_scale
     asked = asked._replace(precision=_bracket(limit, precision, unit))

@@ -98,9 +98,10 @@ def scan(
         for one in mus
         for seed in range(1, seeds + 1)
     ]
-    return walks(
+    rows, failed = walks(
         path, cells, workers=workers, scheduler=scheduler, dtypes=dtypes, progress=progress
     )
+    return rows, [(kinds.typed(parameters), message) for parameters, message in failed]
 
 
 def walks(

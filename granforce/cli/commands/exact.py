@@ -33,7 +33,7 @@ from granforce.perturb import grain_loads
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
-from granforce.system.terminal import print_report, report_after
+from granforce.system.terminal import print_notes, print_report, report_after
 
 # Of COUNTS, which also has the work done.
 LOADS = ("loads_at_rest", "loads_moving", "loads_undecided")
@@ -185,7 +185,8 @@ def load_factor(arguments: argparse.Namespace) -> None:
     bodies = int((~left_open_in(S.packing)).sum())
     lines: dict[str, Any] = {"bodies": bodies, "contacts": len(S.packing.contacts.i)}
     lines |= {"load_factor": limit.factor, "certified_error": limit.gap}
-    if arguments.critical:
+    bounded = np.isfinite(limit.factor)
+    if arguments.critical and bounded:
         critical = grain_loads.critical_load(S, arguments.load, precision=arguments.precision)
         lines |= {
             "critical_factor_low": critical.low,
@@ -196,6 +197,8 @@ def load_factor(arguments: argparse.Namespace) -> None:
             "converged": critical.converged,
         }
     print_report(lines, arguments.json)
+    if arguments.critical and not bounded:
+        print_notes([grain_loads.NO_LIMIT])
 
 
 def rest(arguments: argparse.Namespace) -> None:

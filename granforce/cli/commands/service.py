@@ -21,7 +21,6 @@ from typing import Any
 import platformdirs
 
 from granforce.cli.parsing import LONGEST, ROLES, Input, Output
-from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.records import InputError, whole
 from granforce.study import kinds
 from granforce.study.keys import Parameters
@@ -187,7 +186,7 @@ def cache(arguments: argparse.Namespace) -> int:
     else:
         entries = store.find(arguments.kind)
         if arguments.json:
-            params = [{"params": json.dumps(_typed(entry.params))} for entry in entries]
+            params = [{"params": json.dumps(kinds.typed(entry.params))} for entry in entries]
             print(json_text([e._asdict() | own for e, own in zip(entries, params, strict=True)]))
         else:
             _print_entries(entries)
@@ -202,7 +201,7 @@ def _print_entries(entries: Sequence[Entry]) -> None:
     print(f"{'name':<28}  {'bytes':>{size}}  {'created':<10}  contents")
     for entry in entries:
         line = f"{entry.name:<28}  {entry.bytes:>{size}}  {entry.created[:10]}  "
-        line += _contents(_typed(entry.params))
+        line += _contents(kinds.typed(entry.params))
         print(line if len(line) <= width else f"{line[: width - 1]}…")
 
 
@@ -223,13 +222,6 @@ def _contents(parameters: Parameters) -> str:
         if isinstance(value, (int, float, str)) and name not in ("version", "mu")
     ]
     return ", ".join(word for word in words if word)
-
-
-def _typed(parameters: Parameters) -> Parameters:
-    """Parameters with the name of their relaxation as typed."""
-    if parameters.get("relax") not in RELAXATIONS.values():
-        return parameters
-    return parameters | {"relax": typed_relaxation(parameters["relax"])}
 
 
 def _check_kind(store: Store, kind: str) -> None:

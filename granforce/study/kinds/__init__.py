@@ -7,7 +7,15 @@ line and the app take it from `KINDS`.
 from granforce.study.kinds.bounds import INTERVALS, LIMIT_LOADS, OUTLINE, STRESS
 from granforce.study.kinds.packings import PACKING, get_packing, imported_parameters, keep_packing
 from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
-from granforce.study.kinds.states import INFERENCE, INFORMATIVE, RELAXATIONS, UNIFORM, VOLUME, WALK
+from granforce.study.kinds.states import (
+    INFERENCE,
+    INFORMATIVE,
+    RELAXATIONS,
+    UNIFORM,
+    VOLUME,
+    WALK,
+    typed,
+)
 
 __all__ = [
     "INFERENCE",
@@ -27,6 +35,7 @@ __all__ = [
     "get_packing",
     "imported_parameters",
     "keep_packing",
+    "typed",
 ]
 
 KINDS = {

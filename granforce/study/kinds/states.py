@@ -18,6 +18,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, spread_of
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.glossary import typed_relaxation
 from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.records import InputError, brief, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
@@ -90,6 +91,13 @@ def _walk_parameters(
     if not skip:
         named["skip"] = False
     return named
+
+
+def typed(parameters: Parameters) -> Parameters:
+    """Parameters with the name of their relaxation as typed."""
+    if parameters.get("relax") not in RELAXATIONS:
+        return parameters
+    return parameters | {"relax": typed_relaxation(parameters["relax"])}
 
 
 def _size(
