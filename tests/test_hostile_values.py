@@ -100,11 +100,11 @@ def test_walks_of_one_point_and_of_no_states_are_continued(S):
 def test_records_of_another_kind_are_named(S, tmp_path):
     walk, sample, c = gf.walk(S, 3, 0), gf.sample_uniform(S, 8, 2, 0), S.index[0]
     for call, kind in (
-        (lambda: gf.walk(S, 4, 0, begun=sample), "Walk, not UniformSample"),
-        (lambda: gf.sample_uniform(S, 9, 2, 0, previous=walk), "UniformSample, not Walk"),
-        (lambda: gf.informative(S, sample=walk), "UniformSample, not Walk"),
-        (lambda: gf.response(S, c, critical=walk), "CriticalForce, not Walk"),
-        (lambda: gf.evolution(tmp_path / "s.zarr", [1, 2]), "Snapshots, not list"),
+        (lambda: gf.walk(S, 4, 0, begun=sample), "a Walk, not a UniformSample"),
+        (lambda: gf.sample_uniform(S, 9, 2, 0, previous=walk), "UniformSample, not a Walk"),
+        (lambda: gf.informative(S, sample=walk), "UniformSample, not a Walk"),
+        (lambda: gf.response(S, c, critical=walk), "CriticalForce, not a Walk"),
+        (lambda: gf.evolution(tmp_path / "s.zarr", [1, 2]), "Snapshots, not a list"),
         (lambda: gf.infer_series(tmp_path / "s.zarr", ["a.txt"], mu=0.3), "frames_of"),
     ):
         with pytest.raises(InputError, match=kind):
