@@ -6,7 +6,7 @@ import param
 
 # Quantities for colour, width and order: name in links → words on screen.
 COLOURS = {
-    "change": "change from the forces as packed",
+    "change": "change since packed",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
     "extent": "interval ΔFₙ",
     "sign": "sign of fₙ − pinned fₙ",

@@ -690,7 +690,7 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
     view = PackingView(state)
-    assert "change from the forces as packed</option>" in view.player.legend
+    assert "change since packed</option>" in view.player.legend
     view.player.pulled = True
     assert "change by the pull" in view.player.legend
 
