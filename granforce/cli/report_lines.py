@@ -248,16 +248,8 @@ CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
-    *(
-        "unmeasured_contacts",
-        "carry_for_certain",
-        "states",
-        "mean_standard_error",
-        *_MIXING,
-        "held",
-        "setup_seconds",
-    ),
-    *("sampling_seconds", "seconds", "cached"),
+    *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error", *_MIXING),
+    *("held", "setup_seconds", "sampling_seconds", "seconds", "cached"),
 )
 
 
