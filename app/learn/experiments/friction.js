@@ -15,16 +15,17 @@ export class Friction extends PackingExperiment {
     Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
-    const fetched = this.packed.map((one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing)))
-    await fetched[this.stops.indexOf(this.value)]
+    const fetch = (one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing))
+    const fetched = new Map([...new Set(this.packed)].map((one) => [one, fetch(one)]))
+    await fetched.get(this.packed[this.stops.indexOf(this.value)])
     this.go()
-    for (const one of fetched) one.then(() => this.go(), () => {}) // packings that are missing are not shown
+    for (const one of fetched.values()) one.then(() => this.go(), () => {}) // packings that are missing are not shown
     this.frame = requestAnimationFrame((time) => this.play(time))
   }
 
   /** Show the packing of the present stop, once it is there. */
   go() {
-    const { packings, packed, stops, spreads, value, visited } = this, packing = packings.get(packed[stops.indexOf(value)])
+    const { packings, packed, stops, value, visited } = this, packing = packings.get(packed[stops.indexOf(value)])
     if (packing && packing !== this.packing) {
       this.packing = packing
       this.network = Float32Array.from(this.asPacked(packing))
@@ -32,7 +33,7 @@ export class Friction extends PackingExperiment {
       this.canvas.show(packing, packing.typical)
       this.say(`picture: a packing made at μ = ${packing.mu}`)
     }
-    const k = spreads.indexOf(Math.max(...spreads))
+    const k = stops.indexOf(this.answer)
     this.found ||= packings.has(packed[k]) && [k - 1, k, k + 1].every((at) => !(at in stops) || visited.has(stops[at]))
     this.changed()
   }
