@@ -286,10 +286,7 @@ def _search(step, flows, lanes):
         undecided += flows.going[lane]
     settled = ~flows.going
     for _ in range(HALVINGS):
-        length = load(flows.length, 0, lanes)
-        step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
-        step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
-        answer(step, flows, lanes)
+        _go_along(step, flows, lanes)
         for lane in range(len(lanes)):
             if settled[lane]:
                 continue
@@ -309,6 +306,15 @@ def _search(step, flows, lanes):
 
 
 @within
+def _go_along(step, flows, lanes):
+    """The velocities at the length of each lane's Newton step, and the answer to them."""
+    length = load(flows.length, 0, lanes)
+    step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
+    step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
+    answer(step, flows, lanes)
+
+
+@within
 def _keep_solved(step, flows, settled, lanes):
     """Return lanes whose Newton step did not help to its base: SOLVED if the base was.
 
@@ -318,10 +324,7 @@ def _keep_solved(step, flows, settled, lanes):
     for lane in range(len(lanes)):
         if not settled[lane]:
             flows.length[0, lane] = 0.0
-    length = load(flows.length, 0, lanes)
-    step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
-    step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
-    answer(step, flows, lanes)
+    _go_along(step, flows, lanes)
     for lane in range(len(lanes)):
         if not settled[lane] and _is_solved(step, flows, lane):
             flows.found[lane] = SOLVED
