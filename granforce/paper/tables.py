@@ -16,11 +16,11 @@ from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
 from granforce.forces.balance import stress_of
 from granforce.measures import statistics
-from granforce.packing.compaction import NEARLY_FRICTIONLESS
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, Packing, friction
 from granforce.study import cells, kinds
+from granforce.study.cells import packing_version
 from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
 from granforce.types import Floats, Integers
@@ -335,9 +335,9 @@ def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
     """
     first: dict[Any, Any] = {}
     for row in rows:
-        finished = 0 < row.get("packing_mu", row["mu"]) <= NEARLY_FRICTIONLESS
-        packings = "packings of small friction" if finished else "packings"
-        for group, version in zip((row["part"], packings), _versions(row), strict=True):
+        # Packings of small friction are made by another algorithm, which has its own version.
+        made_by = packing_version(row.get("packing_mu", row["mu"]))
+        for group, version in zip((row["part"], made_by), _versions(row), strict=True):
             other = first.setdefault(group, (row, version))
             if other[1] != version:
                 raise InputError(
