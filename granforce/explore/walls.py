@@ -95,7 +95,7 @@ def walls(
             "no centre of the measurement was found: its errors are too small, or too different "
             "from each other; use larger errors"
         )
-    if centre is None and certificates.recession(ensemble.scaled_form[0]) is not None:
+    if centre is None and not ensemble.bounded:
         raise UnboundedError(certificates.UNBOUNDED)
     if centre is None or not np.all(centre >= 0):
         raise UndecidedError(
