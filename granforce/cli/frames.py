@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
@@ -18,7 +17,7 @@ from granforce.records import InputError, whole, worker_count
 from granforce.study import series
 from granforce.study.evolution import SCALARS, evolution
 from granforce.study.store import open_store
-from granforce.system.terminal import Bar, print_list
+from granforce.system.terminal import Bar, print_list, print_notes
 
 Number = TypeVar("Number", int, float)
 
@@ -48,11 +47,9 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
             progress=progress,
             **options,
         )
-    for frame, message in failed:
-        print(f"granforce: frame {frame.number:g}: {message}", file=sys.stderr)
+    print_notes(f"frame {frame.number:g}: {message}" for frame, message in failed)
     if dataset is not None:
-        for note in dataset.attrs["notes"]:
-            print(f"granforce: {note}", file=sys.stderr)
+        print_notes(dataset.attrs["notes"])
         rows = _rows(dataset, arguments.unit)
         print_list(rows, tuple(rows[0]), arguments.json)
         if arguments.out is not None:
@@ -69,7 +66,7 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     check_outputs(arguments.csv)
     store = open_store(arguments.cache)
     if snapshots.lost:
-        print(f"granforce: {snapshots.lost}", file=sys.stderr)
+        print_notes([snapshots.lost])
     with Bar("snapshots", "cell") as progress:
         dataset, failed = evolution(
             store.path,
@@ -81,12 +78,10 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
             scheduler=arguments.scheduler,
             progress=progress,
         )
-    for number, message in failed:
-        print(f"granforce: {snapshots.word} {number}: {message}", file=sys.stderr)
+    print_notes(f"{snapshots.word} {number}: {message}" for number, message in failed)
     if dataset is not None:
         last, notes = list(json.loads(dataset.attrs["notes"]).items())[-1]
-        for note in notes:
-            print(f"granforce: {snapshots.word} {last}: {note}", file=sys.stderr)
+        print_notes(f"{snapshots.word} {last}: {note}" for note in notes)
         columns = with_units({name: dataset[name].values for name in ("frame", *SCALARS)})
         lists = {name: values.tolist() for name, values in columns.items()}
         rows = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 
 import numpy as np
 
@@ -112,11 +111,11 @@ def infer(arguments: argparse.Namespace) -> int | None:
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
         columns |= forces.named({"f_n_least": least})
     if states and "bounded" in dataset and not dataset["bounded"].item():
-        print(
-            "granforce: S is unbounded: error bars of forces that the measurements do not bound "
-            f"depend on --unmeasured, which is {lines['unmeasured_spread']:g} ⟨f_n⟩",
-            file=sys.stderr,
+        note = (
+            "S is unbounded: error bars of forces that the measurements do not bound depend on "
+            f"--unmeasured, which is {lines['unmeasured_spread']:g} ⟨f_n⟩"
         )
+        print_notes([note])
     if states:
         error = dataset["standard_error"].values
         lines |= {"states": dataset.sizes["state"]}

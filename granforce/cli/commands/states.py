@@ -40,7 +40,7 @@ def walk(arguments: argparse.Namespace) -> None:
     """Make or load a random walk, and report its course."""
     entry, parameters, dataset, ends = walked(arguments, arguments.out)
     if np.isnan(dataset["eta1"].item()):
-        print(f"granforce: {UNBOUNDED_WALK}: η1, η2 and η3 are undefined", file=sys.stderr)
+        print_notes([f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined"])
     write_states(arguments, parameters, dataset)
     lines = {
         "entry": entry,
