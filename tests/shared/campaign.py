@@ -246,7 +246,7 @@ def _told(error):
 
 
 def _balanced_or_told(S, states, reached):
-    """Beside frozen or known forces S may be so thin that 10⁻⁹ is all, which is told."""
+    """With frozen or known forces S may be so thin that samples miss balance, and report it."""
     if (len(S.frozen) or S.known is not None) and not reached:
         assert np.max(S.residual(states)) <= 1e-7
     else:
