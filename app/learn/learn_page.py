@@ -33,9 +33,10 @@ def learn_page(document: Document, query: str) -> Any:
         view: Any = Lesson(packings, wake, visitor, dark=request.dark, alone=alone)
         visit.at_end(view.close)
     else:
-        task = Task(computing, wake, visitor)
-        view = Workbench(request, task, dark=request.dark)
+        task, saving = (Task(computing, wake, visitor) for _ in range(2))
+        view = Workbench(request, task, saving, dark=request.dark)
         visit.at_end(task.close)
+        visit.at_end(saving.close)
     if header is not None:
         header.link(view, dark="dark")
     return framed(header, [view], dark=request.dark)

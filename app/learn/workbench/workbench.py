@@ -24,12 +24,18 @@ class Workbench(Scripted):
     note = param.String(doc="error in the link")
     dark = param.Boolean()
 
-    def __init__(self, request: scene_links.Request, task: Task, **params: Any) -> None:
-        """request: the request in the link. task: a task of the page, for longer work."""
+    def __init__(
+        self, request: scene_links.Request, task: Task, saving: Task, **params: Any
+    ) -> None:
+        """request: the request in the link. task, saving: for longer work, and for files.
+
+        A file is delivered even if other results are requested meanwhile.
+        """
         super().__init__(titles=scene_links.titles(), **params)
-        self._task = task
+        self._task, self._saving = task, saving
         self._made = True  # the scene requested last
-        task.param.watch(self._failed, "message")
+        for one in (task, saving):
+            one.param.watch(self._failed, "message")
         self._show(request.scene, request.mu, request.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
@@ -49,7 +55,8 @@ class Workbench(Scripted):
                 self._show(name)
 
     def _put(self, scene: dict[str, Any]) -> None:
-        self._task.cancel()  # drop pending results for the previous scene
+        for task in (self._task, self._saving):  # drop pending results for the previous scene
+            task.cancel()
         self._made = True
         self.scene = scene
 
@@ -104,4 +111,5 @@ class Workbench(Scripted):
                     values = {"scene": scene, "mu": mu, "plane": plane}
                     return {"measured": small_scenes.measured(packing, load, plane), **values}
 
-        self._task.start(found, self.tell)
+        task = self._saving if what == "file" else self._task
+        task.start(found, self.tell)

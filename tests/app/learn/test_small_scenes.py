@@ -213,7 +213,7 @@ def test_what_cannot_be_built_is_refused(text):
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Workbench(scene_links.request_of("?scene=column"), Task())
+    view = Workbench(scene_links.request_of("?scene=column"), Task(), Task())
     told = []
     view.tell = told.append
     _at_rest(view)
@@ -221,15 +221,24 @@ def page():
 
 
 def _at_rest(view):
-    while view._task.running:
-        view._task.job and view._task.job.wait(240)
-        view._task.poll()
+    for task in (view._task, view._saving):
+        while task.running:
+            task.job and task.job.wait(240)
+            task.poll()
 
 
 def _measure(scene):
     """What a page asks of a scene once friction has rested."""
     of = {"built": scene["built"], "mu": scene["mu"], "load": [*scene["load"]]}
     return {"find": "measured", "scene": scene["name"], "plane": [0, 2], **of}
+
+
+def test_a_file_is_not_lost_to_a_later_request(page):
+    view, told = page
+    view.hear(_measure(view.scene) | {"find": "file"})
+    view.hear(_measure(view.scene))
+    _at_rest(view)
+    assert {"file", "measured"} <= {name for news in told for name in news}
 
 
 def test_what_is_asked_of_a_scene_does_not_end_the_making_of_the_next(page):
