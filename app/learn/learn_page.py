@@ -35,8 +35,7 @@ def learn_page(document: Document, query: str) -> Any:
     else:
         task, saving = (Task(computing, wake, visitor) for _ in range(2))
         view = Workbench(request, task, saving, dark=request.dark)
-        visit.at_end(task.close)
-        visit.at_end(saving.close)
+        visit.at_end(task.close, saving.close)
     if header is not None:
         header.link(view, dark="dark")
     return framed(header, [view], dark=request.dark)

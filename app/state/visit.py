@@ -29,12 +29,13 @@ def _open_library() -> Library:
     return Library()
 
 
-def at_end(close: Callable[[], object]) -> None:
-    """Count the page as open, and call this function when it is closed."""
+def at_end(*closes: Callable[[], object]) -> None:
+    """Count the page as open, and call these functions when it is closed; once for a page."""
     closed = gc_pauses.opened()
 
     def end(context: object) -> None:
-        close()
+        for close in closes:
+            close()
         closed()
 
     pn.state.on_session_destroyed(end)
