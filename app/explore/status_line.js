@@ -27,7 +27,7 @@ export function render({ model, view }) {
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
     facts.replaceChildren(...model.facts.map((fact) => createElement("span", { innerHTML: fact })))
     task.hidden = !said
-    facts.style.visibility = task.hidden ? "" : "hidden"
+    facts.style.visibility = task.hidden && !model.failed ? "" : "hidden"
     view.el.classList.toggle("urgent", !task.hidden || Boolean(model.failed)) // visible at any scroll position
     if (task.hidden) return
     bar.classList.toggle("unknown", !known)

@@ -24,14 +24,14 @@ from granforce.study.store import Store, open_store
 
 from .entry_labels import names
 from .replays import Replay, make_replay
-from .selection import Selection, selected, series
+from .selection import KINDS, Selection, selected, series
 
 # Environment variable naming a store of precomputed results to use instead of data/start.zarr.
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parents[2] / "data" / "start.zarr"
 
-# Sources of states.
-SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
+# Sources of states. An inference holds states, too, and is shown with its frame.
+SOURCES = {name: kinds.KINDS[name] for name in KINDS}
 
 OPENING_MU = 0.1  # where forces are least determined, and most interesting to see
 CELLS_IN_MEMORY = 16  # cells in memory, for all visitors

@@ -56,6 +56,7 @@ from app.state.view_settings import SORTS, Looks
 from app.state.visit import turns
 from granforce import measures
 from granforce.cli import parser
+from granforce.experiment.measurements import Measurement
 from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -85,6 +86,18 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     assert {cell.series for cell in cells} == {
         f"N = {DISKS}, seed 1, {STATES} states, nearest-network walk, by PIQP"
     }
+
+
+def test_an_inference_in_the_cache_is_no_source_of_states(shipped, tmp_path):
+    """As `granforce infer` leaves it: the page opens."""
+    library = Library(shipped, tmp_path / "cache")
+    before = library.cells()
+    packing = before[1].params["packing"]
+    measured = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
+    parameters = kinds.INFERENCE.parameters(packing, measured, 40)
+    study.get(library.cache, kinds.INFERENCE, parameters, measured=measured)
+    assert library.cache.find(kind="inference")
+    assert library.cells() == before
 
 
 def test_missing_stores_leave_a_note_not_an_error(tmp_path, visited):
