@@ -29,7 +29,7 @@ _LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-5
 # A gap this far below the target no longer improves the balance (large μ, degenerate vertices).
 _HOPELESS = 1e-3
-_MOST_STEPS = 60
+_MOST_STEPS = 100
 _MOST_BALANCING = 4
 # Unbalance, relative to BALANCED, at which the balance is restored; the smaller value with external
 # forces, where rows left out may follow from hundreds of others.
