@@ -293,8 +293,8 @@ def test_tables_of_the_benchmark_say_where_granforce_is_slower(tmp_path):
     ways = {"one at a time": 1.0, "8 lanes": 0.5, "4 lanes": 2.0}
     rows = [{"n": 60, "mu": 1, "way": way, "ratio": ratio} for way, ratio in ways.items()]
     benchmarks.renew([path], {"pushes": rows})
-    said = "Slower than the baseline (ratio below 1): 8 lanes n = 60, μ = 1 (0.5)."
-    assert said in path.read_text() and "| n | mu | method | ratio |" in path.read_text()
+    said = "Slower than the baseline (speed-up below 1): 8 lanes n = 60, μ = 1 (0.5)."
+    assert said in path.read_text() and "| n | μ | method | speed-up |" in path.read_text()
 
 
 @pytest.mark.parametrize("document", RESULTS)

@@ -100,7 +100,8 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
         intervals(system, system.index[:1])  # compiles
         rows = {"plain loop": _timed(plain_loop, system, data)}
         for workers in (1, 2):
-            rows[f"granforce, {workers} threads"] = _ours(system, data, workers)
+            threads = f"{workers} thread{'s' if workers > 1 else ''}"
+            rows[f"granforce, {threads}"] = _ours(system, data, workers)
         if name.startswith("n100"):
             rows["scipy linprog"] = _timed(linprog_loop, system, data)
             if importlib.util.find_spec("cobra"):

@@ -163,7 +163,8 @@ def pushes(
             row = {"n": n, "mu": mu, "way": name, "seconds_per_contact": seconds[name] / len(some)}
             row |= {"ms_per_system": 1e3 * seconds[name] / systems}
             row |= {"ratio": seconds["one at a time"] / seconds[name]}
-            rows.append(row | {"differ": float(np.abs(np.subtract(alone, in_lanes)).max())})
+            apart = np.abs(np.subtract(alone, in_lanes)).max() / S.force_scale
+            rows.append(row | {"differ": float(apart)})
     return rows
 
 

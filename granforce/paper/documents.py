@@ -183,18 +183,19 @@ def _decay(claims: Rows, findings: Rows) -> str:
     if not verdicts or not np.isfinite(verdicts[0]["value"]):
         return ""
     (law,) = verdicts
-    why = f" ({law['why']})" if law["why"] else ""
     sentences = [
-        "α is the exponent of the best power law for the decay |u| ~ r^−α of the first motion, "
-        "whatever the law is. Whether a power law fits better than an exponential: "
-        f"{law['verdict']}{why}."
+        "α is the exponent of the best fit |u| ~ r^−α to the first motion, whether or not a power "
+        "law fits best. The verdict on whether it fits better than an exponential is "
+        f"*{law['verdict']}*."
     ]
     steps = "α with load steps of 0.4"
-    ratios = [row for row in findings if row["statement"].startswith(steps)]
+    ratios = [
+        row for row in findings if row["statement"].startswith(steps) and row["verdict"] != FEW
+    ]
     values = [f"{_number(row)} at {row['statement'].rpartition(', ')[2]}" for row in ratios]
     if values:
         sentences.append(
-            f"Ratio of α with load steps four times as long to that in the table: {listed(values)}."
+            f"With load steps four times as long, α changes by a factor of {listed(values)}."
         )
     return "\n" + " ".join(sentences) + "\n"
 
@@ -247,8 +248,7 @@ def _swept(table: StudyTable) -> str:
     words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
     if not words:
         return "No walk by sweeps is part of this study.\n"
-    alone = "only " if len(words) < len(plans.SWEEPS) else ""
-    text = f"Here the sweeps end {alone}at {listed(words)} ⟨f_n⟩. "
+    text = f"In this study, sweeps end at {listed(words)} ⟨f_n⟩. "
     rows = table.part(*plans.SWEEPS)
     least = min(row["reached_part"] for row in rows)
     if least >= 1:
@@ -344,9 +344,10 @@ def _tested(differences: Sequence[_Apart]) -> str:
         text += f"; {same} left out, as all pairs differ by the same amount"
     together = int((p < level / max(1, len(p))).sum())
     last = (
-        f"Significant even among so many (Bonferroni): {together}."
+        f"Significant after Bonferroni's correction for their number: {together}."
         if together
-        else "None is significant among so many (Bonferroni): a dependence on options is not shown."
+        else "None is significant after Bonferroni's correction for their number: no dependence on "
+        "options is shown."
     )
     return f"{text}. {last}"
 
@@ -371,7 +372,7 @@ def _widest(table: StudyTable, variants: Sequence[str]) -> str:
     tested = listed([f"{mu:g}" for mu in spans])
     return (
         f" The mean h varies most at μ = {mu:g}: from {spans[mu][0]:.2g} to {spans[mu][1]:.2g}. "
-        f"Other options were tried at μ = {tested} only.\n"
+        f"Options were varied only at μ = {tested}.\n"
     )
 
 
@@ -391,13 +392,19 @@ def _apart(rows: Rows, others: Rows, name: str) -> _Apart | None:
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """The first highlights as a list."""
     chosen = highlights(table, claims, findings)[:HEADLINES]
-    return "".join(f"- {one.sentence}\n" for one in chosen)
+    return "".join(f"- {_led(one.sentence)}\n" for one in chosen)
+
+
+def _led(sentence: str) -> str:
+    """A highlight with its message, the words before the first colon, in bold."""
+    message, colon, numbers = sentence.partition(": ")
+    return f"**{message}**{colon}{numbers}" if colon else sentence
 
 
 def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """All highlights as a numbered list, each with its figure and a link to its method."""
     return "".join(
-        f"{k}. {one.sentence} ([figure]({FIGURES}/{one.figure}.png), "
+        f"{k}. {_led(one.sentence)} ([figure]({FIGURES}/{one.figure}.png), "
         f"[method](method.md#{one.method}))\n"
         for k, one in enumerate(highlights(table, claims, findings), 1)
     )
@@ -486,8 +493,9 @@ def certificates(table: StudyTable) -> str:
     if not bounded:
         return ""
     text = (
-        f"The largest duality gap of all exact intervals, in {len(bounded)} computations for all "
-        f"contacts of a packing, is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
+        f"The largest duality gap of all exact intervals is "
+        f"{max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩, in {len(bounded)} computations of "
+        "all contacts of a packing."
     )
     uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
     if uniform:

@@ -23,7 +23,7 @@ def between(value: float, low: float, high: float, ends: str = "({} to {})") -> 
     if not np.isfinite([low, high]).all():
         return f"{value:.2g}"
     for digits in (2, 3, 4):
-        texts = [f"{number:.{digits}g}" for number in (value, low, high)]
+        texts = [f"{number:#.{digits}g}".rstrip(".") for number in (value, low, high)]
         if len(set(texts)) == 3 or low == high:
             break
     return f"{texts[0]} {ends.format(*texts[1:])}"

@@ -133,9 +133,12 @@ def _others_turn(of: _Numbers) -> str:
 
 def _free_forces(of: _Numbers) -> Highlight:
     most = of.frictions[-1]
+    dimensions = statistics.grouped(of.table.part(SAMPLERS["exact"]), "dimension")
+    if 2 * dimensions[most].mean() > dimensions[USUAL].mean():
+        raise KeyError("dimension")
     return Highlight(
-        f"Force balance leaves a {of.table.plan['n']}-disk packing with "
-        f"{of.mean('exact', 'dimension', USUAL)} free dimensions at μ = {USUAL:g}, and "
+        f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks it has "
+        f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g} and "
         f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.{_prepared(of, most)}",
         "figure1_exact",
         "ensemble",
@@ -151,8 +154,8 @@ def _prepared(of: _Numbers, mu: float) -> str:
         return ""
     few = min(len(group[mu]) for group in groups if mu in group)
     return (
-        f" With other options of the compaction, means over {few} packings at μ = {mu:g} are "
-        f"between {min(means):.2g} and {max(means):.2g}."
+        f" With other compaction options, the mean over {few} packings at μ = {mu:g} ranges from "
+        f"{min(means):.2g} to {max(means):.2g}."
     )
 
 
@@ -165,8 +168,8 @@ def _coverage(of: _Numbers) -> Highlight:
         raise KeyError("coverage")
     quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
     return Highlight(
-        f"{of.table.plan['states']} networks cover only part of S: at intermediate μ, their η3 "
-        f"relative to the exact one is {quoted}.",
+        f"{of.table.plan['states']} networks show only part of each interval: at intermediate μ, "
+        f"the ratio of their η3 to the exact one is {quoted}.",
         "samplers",
         "exact-intervals",
     )
@@ -268,9 +271,9 @@ def _critical(of: _Numbers) -> Highlight:
         for row in longer.values()
     )
     return Highlight(
-        "Where friction matters, a contact gives way below its limit load: F_crit over the limit "
-        f"load, means over {max(pushed):g} contacts of each packing, is {_quoted(small)} at small, "
-        f"{_quoted(middle)} at intermediate and {_quoted(large)} at large μ.{steps}",
+        "At intermediate friction, contacts give way below their limit loads: F_crit over the "
+        f"limit load, averaged over {max(pushed):g} contacts of each packing, is {_quoted(small)} "
+        f"at small, {_quoted(middle)} at intermediate and {_quoted(large)} at large μ.{steps}",
         "figure2_limit",
         "local-perturbation",
     )
@@ -289,9 +292,7 @@ def _stability(of: _Numbers) -> Highlight:
     elif verdicts <= {DIFFERS, FAILED}:
         first = "The critical force does not follow indeterminacy closely"
     else:
-        first = (
-            "How closely the critical force follows indeterminacy is not decided for all measures"
-        )
+        first = "The critical force is not shown to rise with every measure of indeterminacy"
     return Highlight(
         f"{first}: over all μ, its rank correlation is {texts}.", "figure2", "local-perturbation"
     )
@@ -303,9 +304,9 @@ def _shear(of: _Numbers) -> Highlight:
     if part["high"] >= 1:
         raise KeyError(base)
     return Highlight(
-        "A packing compressed in a square box can carry more shear than the compression left in "
-        f"it: at intermediate μ, the ratio of shear stress to pressure is "
-        f"{of.judged(f'{base} of the original network, {MID}')} as made, and can reach "
+        "A packing can carry more shear stress than compaction leaves in it: at intermediate μ, "
+        f"the ratio of shear stress to pressure is "
+        f"{of.judged(f'{base} of the original network, {MID}')} after compaction, and can reach "
         f"{of.judged(f'largest {base}, {MID}')}.",
         "stresses",
         "stresses",

@@ -490,7 +490,7 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     assert "(**+" in cells["far"]
     summary = text.splitlines()[-1]
     assert "1 of 2 differences are significant" in summary and "1 left out" in summary
-    assert "from 10 to 20" in summary and "at μ = 1 only" in summary
+    assert "from 10 to 20" in summary and "varied only at μ = 1." in summary
 
 
 def test_a_claim_has_one_verdict_and_one_for_each_sampler():

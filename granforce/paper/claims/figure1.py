@@ -130,7 +130,7 @@ def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
         possible=POSITIVE,
     )
     if 0 in outside(table, SAMPLERS[sampler]):
-        why = "S is one point there, and sweeps end beside it"
+        why = "S is one point there, and sweeps do not reach it"
         return [claim._replace(verdict=UNMEASURED, why=why)]
     if at_rest and not measured:
         why = "S is one point there: no state was relaxed or drawn"
