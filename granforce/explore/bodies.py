@@ -189,8 +189,9 @@ def _shape(slopes: Floats, inner: Floats) -> _Shape:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Vectors (…, h) scaled to length 1."""
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    """Vectors (…, h) scaled to length 1; those of length 0 as they are."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1.0)
 
 
 def _along(walls: Floats, w: Floats) -> Floats:
