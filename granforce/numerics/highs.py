@@ -95,12 +95,18 @@ def solve(model: highspy.Highs) -> tuple[highspy.HighsModelStatus, Floats]:
 
 
 def solutions(model: highspy.Highs) -> Iterator[tuple[highspy.HighsModelStatus, Floats]]:
-    """Yield status and point y (n,) of the model as set up, then of other methods in turn."""
+    """Yield status and point y (n,) of the model as set up, then of other methods in turn.
+
+    The simplex method first continues from the vertex that an interior-point method reached.
+    """
     yield solve(model)
     options_before = {
         name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options
     }
     try:
+        if options_before["solver"] == "ipm":
+            model.setOptionValue("solver", "simplex")
+            yield solve(model)
         for options in _OTHER_WAYS:
             model.clearSolver()
             for name, value in (options_before | options).items():
