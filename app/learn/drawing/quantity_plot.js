@@ -3,6 +3,7 @@
 
 const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
+const GAP = 5 // px between a line and words next to it
 const GRAB = 26 // px from the dot within which dragging does not move it
 const STEPS = 60 // keyboard steps along an axis
 
@@ -50,10 +51,13 @@ export class QuantityPlot {
   constructor(host, { x, y = null }, hears) {
     Object.assign(this, { host, axes: { x, y }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
+    this.inside = element(element(svg, "clipPath", { id: "inside" }), "path")
     this.frame = element(svg, "g")
     this.exact = element(svg, "path", { class: "exact" })
     this.seen = element(svg, "path", { class: "visited" })
+    this.seen.style.strokeLinecap = y ? "round" : "butt"
     this.dots = element(svg, "path", { class: "dots" })
+    this.lines = element(svg, "g", { class: "lines" })
     this.answer = this.flag("answer")
     this.marker = this.flag("marker")
     const slider = { role: "slider", tabindex: -1, "aria-orientation": y?.dragged ? "vertical" : "horizontal" }
@@ -108,18 +112,22 @@ export class QuantityPlot {
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
    * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact
-   * is an area; thin: it is a curve.
+   * is an area; thin: it is a curve. clip: corners of the area in which seen is drawn. lines: [{value, words}], named
+   * values; bound: another one.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10 } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10, clip = null, lines = [], bound = null } = state
     const path = (lines, end = "") => lines.map((points) => `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}`).join("")
     this.exact.setAttribute("d", path(exact, exact[0]?.length > 2 && filled ? "Z" : ""))
     this.exact.classList.toggle("filled", filled)
     this.exact.classList.toggle("thin", thin)
     this.seen.setAttribute("d", path(seen))
     this.seen.style.strokeWidth = brush
+    this.inside.setAttribute("d", clip ? path([clip], "Z") : "")
+    this.seen.style.clipPath = clip ? "url(#inside)" : ""
+    this.drawLines(lines, bound)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
     this.show(this.marker, marker, this.bottom - PILL.high - 8)
     this.show(this.answer, answer, this.top - 40)
@@ -127,10 +135,8 @@ export class QuantityPlot {
     if (now) {
       const [px, py] = this.place(now)
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
-      const half = (words.length * PILL.letter) / 2
-      this.reading.setAttribute("x", Math.min(0, this.wide - 4 - half - px) + Math.max(0, 4 + half - px))
-      const covered = answer && Math.abs(this.x.px(answer.value) - px) < half // by the line of the answer
-      this.reading.textContent = covered ? "" : words
+      this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer]))
+      this.reading.textContent = answer && this.x.px(answer.value) === px ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
     }
@@ -138,6 +144,27 @@ export class QuantityPlot {
       this.marker.group.setAttribute("aria-valuenow", marker.value)
       this.marker.group.setAttribute("aria-valuetext", marker.words)
     }
+  }
+
+  /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
+  beside(px, half, flags) {
+    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), fits = (x) => x - half > 4 && x + half < this.wide - 4
+    const free = (x) => fits(x) && lines.every((line) => Math.abs(line - x) > half + GAP)
+    const places = [px, ...lines.flatMap((line) => [line - half - 2 * GAP, line + half + 2 * GAP])].sort((a, b) => Math.abs(a - px) - Math.abs(b - px))
+    return (places.find(free) ?? places.find(fits) ?? px) - px
+  }
+
+  /** Named values: lines with their names on the left, one below the other, and that of the bound on the right. */
+  drawLines(lines, bound) {
+    const { level, top, wide, lines: group } = this, from = Math.min(top + 14, level)
+    group.replaceChildren()
+    const add = ({ value, words }, y, className, right) => {
+      const px = this.x.px(value), most = wide - 4 - words.length * PILL.letter
+      element(group, "line", { x1: px, x2: px, y1: y - 12, y2: this.bottom, class: className })
+      element(group, "text", { x: right ? Math.min(px + 6, most) : px - 6, y, "text-anchor": right ? "start" : "end" }).textContent = words
+    }
+    if (bound) add(bound, from, "bound", true)
+    lines.forEach((each, k) => add(each, from + 16 * k, "", false))
   }
 
   /** A vertical line with a label. */
@@ -178,7 +205,8 @@ export class QuantityPlot {
       if (!this.movable || event.button !== 0) return
       const [px, py] = at(event), [nx, ny] = this.state.now ? this.place(this.state.now) : [px, py]
       const near = this.movable === "dot" && Math.hypot(px - nx, py - ny) < GRAB
-      held = near ? [nx - px, ny - py] : [0, 0]
+      const flag = this.movable === "marker" && this.marker.group.contains(event.target)
+      held = near ? [nx - px, ny - py] : flag ? [this.x.px(this.state.marker.value) - px, 0] : [0, 0]
       svg.setPointerCapture(event.pointerId)
       ;(this.movable === "dot" ? this.dot : this.marker.group).focus({ preventScroll: true })
       this.move(px + held[0], py + held[1])
