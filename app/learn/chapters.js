@@ -103,7 +103,7 @@ export const CHAPTERS = [
       `And that is one force alone. A part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S: a value that chance never finds may still be possible.`,
     ],
     count: null,
-    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks (every 20th drawn)", dragged: true },
+    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks", dragged: true },
     experiment: Chance, options: {},
   },
   {

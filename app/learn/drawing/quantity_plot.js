@@ -113,12 +113,12 @@ export class QuantityPlot {
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
    * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact
    * is an area; thin: it is a curve. clip: corners of the area in which seen is drawn. lines: [{value, words}], named
-   * values; bound: another one.
+   * values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10, clip = null, lines = [], bound = null } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10, clip = null, lines = [] } = state
     const path = (lines, end = "") => lines.map((points) => `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}`).join("")
     this.exact.setAttribute("d", path(exact, exact[0]?.length > 2 && filled ? "Z" : ""))
     this.exact.classList.toggle("filled", filled)
@@ -127,7 +127,7 @@ export class QuantityPlot {
     this.seen.style.strokeWidth = brush
     this.inside.setAttribute("d", clip ? path([clip], "Z") : "")
     this.seen.style.clipPath = clip ? "url(#inside)" : ""
-    this.drawLines(lines, bound)
+    this.drawLines(lines)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
     this.show(this.marker, marker, this.bottom - PILL.high - 8)
     this.show(this.answer, answer, this.top - 40)
@@ -135,7 +135,7 @@ export class QuantityPlot {
     if (now) {
       const [px, py] = this.place(now)
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
-      this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer]))
+      this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer, ...lines]))
       this.reading.textContent = answer && this.x.px(answer.value) === px ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
@@ -154,17 +154,15 @@ export class QuantityPlot {
     return (places.find(free) ?? places.find(fits) ?? px) - px
   }
 
-  /** Named values: lines with their names on the left, one below the other, and that of the bound on the right. */
-  drawLines(lines, bound) {
-    const { level, top, wide, lines: group } = this, from = Math.min(top + 14, level)
+  /** Named values: lines up to their names, which are one below the other on the right. */
+  drawLines(lines) {
+    const { top, bottom, lines: group } = this, right = Math.max(...lines.map(({ value }) => this.x.px(value)))
     group.replaceChildren()
-    const add = ({ value, words }, y, className, right) => {
-      const px = this.x.px(value), most = wide - 4 - words.length * PILL.letter
-      element(group, "line", { x1: px, x2: px, y1: y - 12, y2: this.bottom, class: className })
-      element(group, "text", { x: right ? Math.min(px + 6, most) : px - 6, y, "text-anchor": right ? "start" : "end" }).textContent = words
-    }
-    if (bound) add(bound, from, "bound", true)
-    lines.forEach((each, k) => add(each, from + 16 * k, "", false))
+    lines.forEach(({ value, words }, k) => {
+      const y = top + 10 + 16 * k
+      element(group, "path", { d: `M${this.x.px(value)} ${bottom}V${y - 4}H${right + 2 * GAP}`, class: k ? "" : "bound" })
+      element(group, "text", { x: right + 3 * GAP, y }).textContent = words
+    })
   }
 
   /** A vertical line with a label. */

@@ -78,10 +78,8 @@ export class Push extends PackingExperiment {
 
   get picture() {
     const { value, found, limits, path } = this
-    return {
-      now: [value, 0], seen: [[[0, 0], [value, 0]]], exact: [],
-      lines: limits.slice(1), bound: found ? { value: path.limit, words: `S allows ${path.limit.toFixed(2)}` } : null,
-    }
+    const bound = { value: path.limit, words: `S allows ${path.limit.toFixed(2)}` }
+    return { now: [value, 0], seen: [[[0, 0], [value, 0]]], lines: found ? [bound, ...limits.slice(1)] : [] }
   }
 
   stop() {
