@@ -8,6 +8,7 @@ import { Push } from "./experiments/push.js"
 import { SceneExperiment } from "./experiments/scene_experiment.js"
 
 const two = (v) => v.toFixed(2)
+const listed = (words) => new Intl.ListFormat("en-GB").format(words)
 const whole = (v) => v.toFixed(0)
 const percent = (v) => `${Math.round(100 * v)}\u00a0%`
 const raised = (v) => [...String(v)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")
@@ -122,7 +123,7 @@ export const CHAPTERS = [
       head: ["friction μ (means over packings)", "contacts of a disk", "free numbers", "forces vary by"],
       rows: rows.map(({ mu, touching, free, spread }) => [mu, two(touching), whole(free), percent(spread)]),
     }),
-    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.25, label: "how much forces vary (mean force = 1)" },
+    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.25, label: "forces vary by (mean force = 1)" },
     experiment: Friction, options: {},
   },
   {
@@ -135,7 +136,7 @@ export const CHAPTERS = [
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       `Up to a push of ${two(limit)}, S, all sets of forces that hold the disks, is not empty (line). But the packing gives way earlier, as it starts from the forces it has. ${limits.length > 1
-        ? `The same disks gave way at ${limits.map(two).join(", ")}: no picture of them shows which. That is why it matters how undetermined forces are.`
+        ? `The same disks gave way at ${listed(limits.map(two))}: no picture of them shows which. That is why it matters how undetermined forces are.`
         : "Would the same disks give way at the same push with other forces?"}`,
     ],
     count: null,

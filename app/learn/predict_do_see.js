@@ -47,10 +47,11 @@ export class PredictDoSee {
   }
 
   /** The prediction is made; dragging is enabled. */
-  begin() {
+  async begin() {
     this.kept({ prediction: this.prediction, done: false })
-    this.unlock()
+    const unlocked = this.unlock()
     this.plot.dot.focus({ preventScroll: true })
+    await unlocked
     this.host.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
     this.host.scrollIntoView({ block: "nearest" })
   }

@@ -57,9 +57,9 @@ export class QuantityPlot {
     this.seen = element(svg, "path", { class: "visited" })
     this.seen.style.strokeLinecap = y ? "round" : "butt"
     this.dots = element(svg, "path", { class: "dots" })
-    this.lines = element(svg, "g", { class: "lines" })
     this.answer = this.flag("answer")
     this.marker = this.flag("marker")
+    this.lines = element(svg, "g", { class: "lines" })
     const slider = { role: "slider", tabindex: -1, "aria-orientation": y?.dragged ? "vertical" : "horizontal" }
     for (const [name, value] of Object.entries({ ...slider, "aria-label": `your prediction: ${x.label}` })) this.marker.group.setAttribute(name, value)
     this.dot = element(svg, "g", { class: "now", ...slider, "aria-label": y?.dragged ? y.label : `now: ${x.label}` })
@@ -148,10 +148,11 @@ export class QuantityPlot {
 
   /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
   beside(px, half, flags) {
-    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), fits = (x) => x - half > 4 && x + half < this.wide - 4
-    const free = (x) => fits(x) && lines.every((line) => Math.abs(line - x) > half + GAP)
-    const places = [px, ...lines.flatMap((line) => [line - half - 2 * GAP, line + half + 2 * GAP])].sort((a, b) => Math.abs(a - px) - Math.abs(b - px))
-    return (places.find(free) ?? places.find(fits) ?? px) - px
+    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), [low, high] = [half + GAP, this.wide - half - GAP]
+    const free = (x) => x >= low && x <= high && lines.every((line) => Math.abs(line - x) > half + GAP)
+    const above = Math.min(high, Math.max(low, px)), far = (x) => Math.abs(x - px)
+    const places = [above, ...lines.flatMap((line) => [line - half - 2 * GAP, line + half + 2 * GAP])].sort((a, b) => far(a) - far(b))
+    return (places.find((x) => free(x) && far(x) < 2 * half) ?? above) - px
   }
 
   /** Named values: lines up to their names, which are one below the other on the right. */
