@@ -68,7 +68,7 @@ export const CHAPTERS = [
   },
   {
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides, without gravity; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions, so the plot shows its shadow on two of the forces. The green one starts at ${two(start)}; the mean of all normal forces is ${two(mean)}.`,
+    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions, so the plot shows its shadow on two of the forces. The green one starts at ${two(start)}; the mean of all normal forces is ${two(mean)}.`,
     ask: "How large can the green force become?",
     doing: "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Orange: a contact is about to slip (wedge) or to open (ring).",
     see: ({ low, high, free, others }) => [

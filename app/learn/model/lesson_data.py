@@ -115,7 +115,7 @@ class Packings:
         return rail_of(rail, scale)
 
     def _push(self, start: int) -> dict[str, Any]:
-        """Networks under a growing push on one contact, from one of STARTS networks, and the motion."""
+        """Networks under a growing push on a contact, from one of STARTS, and the motion."""
         replay = self.shown(MU).replay
         contact, limit = self._weakened()
         scale, rows = replay.force_scale, np.linspace(0, len(replay.number) - 1, STARTS).astype(int)
@@ -135,8 +135,10 @@ class Packings:
         }
 
     def _weakened(self) -> tuple[int, float]:
-        """The contact to push, and its limit load: of the firm ones near the centre, the one that
-        gives way farthest below its limit load, relative to it.
+        """The contact to push, and its limit load.
+
+        Of the firm ones near the centre, it is the one that gives way farthest below its limit
+        load, relative to it.
         """
         replay, found = self.shown(MU).replay, self._pushed()
         position = {int(number): k for k, number in enumerate(replay.backbone)}
