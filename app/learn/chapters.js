@@ -46,7 +46,7 @@ export const CHAPTERS = [
     ask: "How large can the left wall’s normal force become?",
     doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; an arrow turns orange where its contact is about to slip.",
     see: ({ low, high, mu }) => [
-      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} it holds the disk up, as hard as it can.`,
+      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up, as hard as it can.`,
       `So each wall can press harder than the disk weighs, and a photograph would not show it. The bar is called S: each of its points is one set of forces that holds the disk.`,
     ],
     count: (facts) => counted(facts, false),
