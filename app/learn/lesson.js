@@ -10,7 +10,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push"], ["curve"]]
+const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -27,6 +27,7 @@ class Lesson {
     model.on("palettes", () => this.paint())
     model.on("remove", () => this.leave())
     this.sized = new ResizeObserver(() => this.paint())
+    window.history.replaceState(null, "", this.address(CHAPTERS[this.named].name)) // for the way back
     this.open(this.named)
   }
 
@@ -111,7 +112,7 @@ class Lesson {
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
     this.main.replaceChildren(heading, text, pictures, foot, after)
-    return { text, pictures, picture, plot, voice, row }
+    return { text, pictures, picture, plot, voice, row, foot, after }
   }
 
   /** The list of chapters, with finished ones marked. */

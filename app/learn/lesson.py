@@ -18,6 +18,9 @@ from .model.lesson_data import Packings
 # The forces used as axes of S in each small scene, across and up, as in chapters.js.
 PLANES = {"groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
 
+# The networks from which a contact is pushed, by name.
+STARTS = {str(start): start for start in range(lesson_data.STARTS)}
+
 
 class Lesson(Scripted):
     """The lesson; the data of a chapter are sent when the chapter requests them."""
@@ -67,8 +70,8 @@ class Lesson(Scripted):
                 self._send("rail", name, lambda: packings.rail_from(name, network), computing)
             case "rail":
                 self._send("rail", "", packings.rail, computing)
-            case "push":
-                self._send("push", "", packings.push, computing)
+            case "push" if name in STARTS:
+                self._send("push", name, lambda: packings.push(STARTS[name]), computing)
             case "curve":
                 self._send("curve", "", packings.curve)
 

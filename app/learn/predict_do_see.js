@@ -9,17 +9,18 @@ const STAGES = ["Predict", "Do", "See"]
 
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row}: their elements; progress: {prediction,
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row, foot, after}: their elements; progress: {prediction,
    * done} of an earlier visit; kept({prediction, done}): called to store progress; drawn(): called to repaint;
    * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, voice, row }, { prediction, done }, { kept, drawn, again }) {
-    Object.assign(this, { chapter, experiment, voice, row, kept, drawn, prediction, predicted: false, ready: true, told: done })
+  constructor(chapter, experiment, { plot, voice, row, foot, after }, { prediction, done }, { kept, drawn, again }) {
+    Object.assign(this, { chapter, experiment, host: plot, voice, row, foot, after, kept, drawn, prediction, predicted: false, ready: true, told: done })
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
     this.stages = createElement("span", { className: "stages" })
     this.again = button("Predict again", again)
-    row.prepend(this.button, this.stages, this.again)
+    this.offer = button("", () => experiment.offer.run(), { className: "primary" })
+    row.prepend(this.button, this.stages, this.offer, this.again)
     this.sized = new ResizeObserver(() => this.plot.fit())
     this.sized.observe(plot)
     if (done) this.finish()
@@ -33,19 +34,26 @@ export class PredictDoSee {
 
   get stage() { return !this.predicted ? 0 : this.experiment.found ? 2 : 1 }
 
-  /** The initial position of the marker: the low end of the axis. */
-  get waiting() { return this.chapter.x.low }
+  /** The least and the largest prediction. */
+  get possible() { return this.experiment.possible ?? [this.chapter.x.low, this.chapter.x.high] }
+
+  /** The initial position of the marker: the low end. */
+  get waiting() { return this.possible[0] }
 
   mark(value) {
-    this.prediction = value
+    const [low, high] = this.possible
+    this.prediction = Math.min(high, Math.max(low, value))
     this.show()
   }
 
   /** The prediction is made; dragging is enabled. */
-  begin() {
+  async begin() {
     this.kept({ prediction: this.prediction, done: false })
-    this.unlock()
+    const unlocked = this.unlock()
     this.plot.dot.focus({ preventScroll: true })
+    await unlocked
+    this.host.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
+    this.host.scrollIntoView({ block: "nearest" })
   }
 
   /** Enable dragging, once the data for it are there. */
@@ -65,13 +73,12 @@ export class PredictDoSee {
     this.show()
   }
 
-  /** Show a finished chapter again with its answer: the dot is dragged to the far end, and to the answer. */
+  /** Show a finished chapter again with its answer: the dot is dragged to both ends, and to the answer. */
   async finish() {
     const { chapter: { x, y }, experiment } = this
     await this.unlock()
     if (!this.ready || !this.row.isConnected) return
-    experiment.drag(x.high, y?.high ?? 0)
-    experiment.drag(experiment.answer, y?.high ?? 0)
+    for (const to of [x.low, x.high, experiment.answer]) experiment.drag(to, y?.high ?? 0)
   }
 
   /** Update everything from the experiment. */
@@ -86,7 +93,9 @@ export class PredictDoSee {
     this.plot.allow(stage ? (this.ready ? "dot" : null) : "marker")
     this.button.hidden = stage > 0
     this.button.disabled = prediction === null
-    this.again.hidden = stage < 2
+    this.again.hidden = this.after.hidden = stage < 2
+    const offer = stage === 2 ? experiment.offer : null
+    Object.assign(this.offer, { hidden: !offer, textContent: offer?.words ?? "" })
     this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
@@ -104,15 +113,22 @@ export class PredictDoSee {
 
   /** The only line of text: the instruction, or the result. */
   speak(stage) {
-    const { chapter, experiment, voice } = this
+    const { chapter, experiment } = this
     if (stage < 2) {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing : WAIT
-      if (voice.dataset.said !== words) voice.replaceChildren(createElement("p", { textContent: words }))
-      voice.dataset.said = words
-    } else if (voice.dataset.said !== `found ${experiment.finds}`) {
-      voice.dataset.said = `found ${experiment.finds}`
-      voice.replaceChildren(...this.answer(chapter.see(experiment.facts), chapter.count?.(experiment.facts)))
+      this.say([words], () => [createElement("p", { textContent: words })])
+    } else {
+      const said = chapter.see(experiment.facts)
+      this.say(said, () => this.answer(said, chapter.count?.(experiment.facts)))
     }
+  }
+
+  /** Replace the text by parts(), if its words change. */
+  say(words, parts) {
+    const { voice } = this, said = words.join(" ")
+    if (voice.dataset.said === said) return
+    voice.dataset.said = said
+    voice.replaceChildren(...parts())
   }
 
   /** The answer next to the prediction, with its reason, the surprise, and the count. */

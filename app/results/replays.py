@@ -26,7 +26,6 @@ class Replay(NamedTuple):
     unit: float  # geometry.unit, the scale of chains and marks, length
     outlines: list[list[float]]  # geometry.outlines
     inviting: int  # row of links suggested for dragging, or -1
-    typical: int  # the contact whose f_n scatters most like the average, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     friction: Floats  # (N_c,) friction coefficients
     force_scale: float  # ⟨f_n⟩, force
@@ -119,12 +118,6 @@ def first_replay(S: Any, states: int) -> Replay:
     )
 
 
-def _typical(normal: Any) -> int:
-    """The contact of frames (F, N_c) with the most typical scatter; -1 without contacts."""
-    spread = normal.std(axis=0)
-    return int(np.argmin(np.abs(spread - spread.mean()))) if len(spread) else -1
-
-
 def _replay(
     packing: Packing, backbone: Integers, scale: float, frames: Any, **numbers: Any
 ) -> Replay:
@@ -140,7 +133,6 @@ def _replay(
         unit=geometry.unit(packing),
         outlines=geometry.outlines(packing),
         inviting=geometry.inviting(links, frames[0, :, 0], window),
-        typical=_typical(frames[:, :, 0]),
         backbone=backbone,
         friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
         force_scale=scale,

@@ -6,6 +6,7 @@ Nothing is stored: a rail or a fan takes some tenths of a second for 400 disks.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from granforce.explore.outline import extremes
 from granforce.explore.pull import Pull, Reach, pull, reach
 from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
+from granforce.perturb.critical_force import CriticalForce, Response, critical_force, response
 from granforce.perturb.loaded import Loaded, loaded_networks
 from granforce.records import InputError, Packing
 from granforce.study import conditions
@@ -48,6 +50,14 @@ class Fan(NamedTuple):
     points: Floats  # (k, 2) corners, anticlockwise: (axes[0]·F, axes[1]·F)/⟨f_n⟩
     states: Floats  # (k, N_c, 2) the networks there, force
     residual: Floats  # (k,) in ⟨f_n⟩
+
+
+class GivenWay(NamedTuple):
+    """A force pair that grows on one contact until grains move."""
+
+    critical: CriticalForce
+    motion: Response
+    under: Loaded  # networks under loads from none to the critical force
 
 
 class Puller:
@@ -105,6 +115,20 @@ class Puller:
         Raises the errors of `loaded_networks`.
         """
         return loaded_networks(self._S, contact, np.linspace(0.0, load, LOADS))
+
+    def given_way(self, contact: int, state: Floats, limit: float) -> GivenWay:
+        """How a contact with this limit load (force) gives way, from the network `state` (N_c, 2).
+
+        If `state` is rounded, the nearest network of S is used. Raises the errors of
+        `critical_force`.
+        """
+        S = replace(self._S, original=state)
+        critical = critical_force(S, contact, limit_load=limit)
+        return GivenWay(
+            critical=critical,
+            motion=response(S, contact, critical=critical),
+            under=loaded_networks(S, contact, np.linspace(0.0, critical.low, LOADS)),
+        )
 
     def fan(self, axes: Floats) -> Fan:
         """The Fan of the plane of two axes (2, N_c, 2).

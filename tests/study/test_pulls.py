@@ -8,6 +8,7 @@ from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.forces.build import ensemble
 from granforce.numerics.lanes import LANES
+from granforce.perturb.critical_force import critical_force
 from granforce.records import InputError
 from granforce.study import pulls
 from granforce.study.pulls import Puller
@@ -83,6 +84,20 @@ def test_pulls_one_after_the_other_start_where_the_last_one_ended(S, puller):
     rail = puller.rail(int(S.index[3]), first)
     here = np.abs(rail.values - first[3, 0]).argmin()
     assert np.abs(rail.states[here] - first).max() < 1e-7 * S.force_scale
+
+
+def test_a_contact_gives_way_below_its_limit_load_from_any_network(S, puller):
+    contact, critical = int(S.index[7]), critical_force(S, int(S.index[7]))
+    other = puller.rail(contact, S.original).states[-1]
+    for state in (S.original, other):
+        found = puller.given_way(contact, state, critical.limit_load)
+        assert found.critical.low <= critical.limit_load * (1 + 1e-9)
+        np.testing.assert_allclose(found.under.states[0], state, atol=1e-6 * S.force_scale)
+        assert found.under.loads[-1] == found.critical.low
+        assert found.under.residual.max() <= BALANCED
+        assert found.motion.converged and np.nanmax(np.abs(found.motion.displacement)) > 0
+        if state is S.original:
+            assert found.critical.low == critical.low
 
 
 def test_a_force_that_cannot_be_is_refused_with_its_interval(S, puller):

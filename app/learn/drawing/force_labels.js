@@ -3,6 +3,7 @@
 import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
+const NAMED = 30 // px: least length of a component with a label
 export const ASIDE = 9 // px between friction and the wall that would cover it
 
 /** Values next to the forces used as axes of S, on the side of each with more room. */
@@ -63,11 +64,15 @@ function drawParts(arrows, { contact, at, inward, across }, F) {
   const { context: g, look } = arrows, [px, py] = arrows.px(...at), unit = arrows.unit * arrows.forceUnit
   const tip = (way, long) => [px + way[0] * long * unit, py - way[1] * long * unit]
   const [nx, ny] = tip(inward, F[2 * contact]), [tx, ty] = tip(across, F[2 * contact + 1]), right = inward[0] > 0
+  const write = (text, x, y, align) => {
+    g.textAlign = align
+    g.strokeText(text, x, y)
+    g.fillText(text, x, y)
+  }
   g.font = "12px sans-serif"
   g.fillStyle = look.cold
-  g.textAlign = right ? "right" : "left"
-  g.fillText("normal", nx + (right ? -3 : 3), ny - 9)
-  if (Math.abs(F[2 * contact + 1]) * unit < 12) return
-  g.textAlign = right ? "left" : "right"
-  g.fillText("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8)
+  g.strokeStyle = look.paper
+  g.lineWidth = 3
+  if (F[2 * contact] * unit > NAMED) write("normal", nx + (right ? -3 : 3), ny - 9, right ? "right" : "left")
+  if (Math.abs(F[2 * contact + 1]) * unit > NAMED) write("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8, right ? "left" : "right")
 }

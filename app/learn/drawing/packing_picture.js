@@ -3,10 +3,13 @@
 
 import { Scene } from "../../packing/drawing/scene.js"
 import { markSelected } from "../../packing/drawing/marks.js"
-import { arrow } from "../../browser/canvas_paths.js"
+import { arrow, circle } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
 const FULL = 0.5 // change in mean forces at full blue; orange is for contacts about to slip, as in the small scenes
+const WEDGE = { least: 0.3, long: 0.62 } // of a contact about to slip: angle, large enough to be seen, and length in radii
+const ARROW = { rest: 0.8, grown: 3, moved: 3 } // lengths in largest radii: of the push, and of the motion of the fastest disk
+const MOVES = 0.3 // of the largest displacement: disks that move less have no arrow
 const REACH = 14 // px from a contact within which it can be dragged
 
 export class PackingPicture {
@@ -16,8 +19,10 @@ export class PackingPicture {
     this.scene.frozen = true // nothing to point at or to select
     this.scene.palette = palettes.scene
     this.scene.onRepaint = () => {}
-    this.scene.onMarks = (marks, scene) => this.drawPush(marks, scene)
-    this.push = 0
+    this.scene.onMarks = (marks, scene) => this.mark(marks, scene)
+    this.limited = null // {opened, slid}: 1 for each contact that is open, or slips
+    this.push = null // part of the largest push, in the chapter that pushes
+    this.motion = null // displacements (2 N,) of the disks that move
     this.held = null // the contact in the hand
     host.append(this.scene.root)
     this.sized = new ResizeObserver(() => this.scene.resize())
@@ -48,23 +53,69 @@ export class PackingPicture {
     }
     style.colours = colours
     scene.palette = palettes.scene
+    this.warm = colours.at(-1)
     scene.drawChains(style)
   }
 
-  /** An outline of the contact in the hand, and arrows that push the disks of the marked one apart. */
-  drawPush(marks, scene) {
+  /** Over the lines: contacts at their limits, the contact in the hand, and arrows of the push and of the motion. */
+  mark(marks, scene) {
+    if (this.limited) this.drawLimited(marks, scene)
     if (this.held !== null) markSelected(marks, scene, this.held)
-    if (!this.push || scene.selected === null) return
-    const { palette, scale, geometry } = scene
-    marks.strokeStyle = palette.selected
+    const { scale } = scene
     marks.lineWidth = 4 / scale
+    marks.strokeStyle = scene.palette.selected
     marks.beginPath()
-    for (const { k, a, b } of scene.segments((contact) => contact === scene.selected)) {
-      const far = Math.hypot(b[0] - a[0], b[1] - a[1]), way = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
-      for (const [at, sign, grain] of [[a, -1, geometry.i[k]], [b, 1, geometry.j[k]]]) {
-        const from = at.map((v, d) => v + sign * 0.3 * geometry.radius[grain] * way[d])
-        arrow(marks, from, from.map((v, d) => v + sign * (0.4 + 1.4 * this.push) * way[d]), 12 / scale, 0.5)
+    for (const { from, to } of this.pushes()) arrow(marks, from, to, 12 / scale, 0.5)
+    marks.stroke()
+    if (this.motion) this.drawMotion(marks, scene)
+  }
+
+  /** As in the small scenes: a ring where a contact is open, a wedge on both disks where it is about to slip. */
+  drawLimited(marks, scene) {
+    const { opened, slid } = this.limited, { scale, geometry: { radius, i, j } } = scene
+    marks.strokeStyle = marks.fillStyle = this.warm
+    marks.lineWidth = 1.5 / scale
+    const wide = Math.max(WEDGE.least, this.packing.mu) / 2
+    for (const { k, contact, a, b } of scene.segments((one) => opened[one] || slid[one])) {
+      const part = radius[i[k]] / (radius[i[k]] + radius[j[k]]), at = a.map((v, d) => v + part * (b[d] - v)), along = Math.atan2(b[1] - a[1], b[0] - a[0])
+      if (opened[contact]) {
+        circle(marks, at, 4 / scale)
+        marks.stroke()
+        continue
       }
+      marks.beginPath()
+      for (const [grain, turn] of [[i[k], Math.PI], [j[k], 0]]) {
+        marks.moveTo(...at)
+        marks.arc(...at, WEDGE.long * radius[grain], along + turn - wide, along + turn + wide)
+      }
+      marks.fill()
+    }
+  }
+
+  /** The arrows that push the disks of the marked contact apart: {from, to, way: direction}. */
+  * pushes() {
+    const { scene, push } = this, { geometry } = scene
+    if (push === null || scene.selected === null) return
+    for (const { k, a, b } of scene.segments((contact) => contact === scene.selected)) {
+      const far = Math.hypot(b[0] - a[0], b[1] - a[1]), along = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
+      for (const [at, sign, grain] of [[a, -1, geometry.i[k]], [b, 1, geometry.j[k]]]) {
+        const way = along.map((v) => sign * v), from = at.map((v, d) => v + 0.3 * geometry.radius[grain] * way[d])
+        yield { from, to: from.map((v, d) => v + geometry.unit * (ARROW.rest + ARROW.grown * push) * way[d]), way }
+      }
+    }
+  }
+
+  /** An arrow on each disk that moves: where it goes. */
+  drawMotion(marks, scene) {
+    const { motion } = this, { x, y, grain, unit } = scene.geometry
+    const size = (g) => Math.hypot(motion[2 * g], motion[2 * g + 1]), most = Math.max(...Array.from(grain, size))
+    marks.strokeStyle = this.warm
+    marks.lineWidth = 2.5 / scene.scale
+    marks.beginPath()
+    for (const [k, g] of grain.entries()) {
+      if (size(g) < MOVES * most) continue
+      const long = (ARROW.moved * unit) / most
+      arrow(marks, [x[k], y[k]], [x[k] + long * motion[2 * g], y[k] + long * motion[2 * g + 1]], 8 / scene.scale, 0.5)
     }
     marks.stroke()
   }
@@ -73,9 +124,15 @@ export class PackingPicture {
     const { scene } = this
     scene.root.style.pointerEvents = "none" // otherwise the wheel would zoom
     let from = null
+    /** The arrow of the push under a pointer. */
+    const arrowAt = (event) => {
+      const [px, py] = scene.place(event)
+      return [...this.pushes()].find(({ to }) => { const [x, y] = scene.toPixel(...to); return Math.hypot(px - x, py - y) < REACH })
+    }
     /** The contact that a pointer would take: the marked one, if it is in reach, or null. */
     const near = (event) => {
       if (!this.packing) return null
+      if (arrowAt(event) && hand.takes(scene.selected)) return scene.selected
       const at = scene.place(event), link = (chosen) => scene.linkAt(...at, REACH, chosen)
       const marked = link((contact) => contact === scene.selected), k = marked < 0 ? link() : marked
       return k >= 0 && hand.takes(scene.geometry.contact[k]) ? scene.geometry.contact[k] : null
@@ -89,13 +146,17 @@ export class PackingPicture {
       if (contact === null || (event.pointerType === "touch" && contact !== scene.selected)) return
       this.held = contact
       hand.take(contact)
-      from = event.clientY
+      // An arrow follows the hand; a line is pulled upwards.
+      const held = arrowAt(event), [x, y] = held?.way ?? [0, 1]
+      from = { at: scene.place(event), way: [x, -y], far: held ? 2 * ARROW.grown * scene.geometry.unit * scene.scale : host.clientHeight }
       host.setPointerCapture(event.pointerId)
       event.preventDefault()
     })
     host.addEventListener("pointermove", (event) => {
-      if (from !== null) hand.pulled((from - event.clientY) / host.clientHeight)
-      else host.style.cursor = near(event) === null ? "default" : "ns-resize"
+      if (from !== null) {
+        const { at, way, far } = from
+        hand.pulled(scene.place(event).reduce((sum, v, d) => sum + (v - at[d]) * way[d], 0) / far)
+      } else host.style.cursor = near(event) === null ? "default" : arrowAt(event) ? "grab" : "ns-resize"
     })
     for (const end of ["pointerup", "pointercancel"]) host.addEventListener(end, () => {
       if (from === null) return

@@ -3,6 +3,7 @@
 
 const NS = "http://www.w3.org/2000/svg"
 const PILL = { high: 26, letter: 6.8, padding: 18 } // px
+const GAP = 5 // px between a line and words next to it
 const GRAB = 26 // px from the dot within which dragging does not move it
 const STEPS = 60 // keyboard steps along an axis
 
@@ -50,12 +51,15 @@ export class QuantityPlot {
   constructor(host, { x, y = null }, hears) {
     Object.assign(this, { host, axes: { x, y }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
+    this.inside = element(element(svg, "clipPath", { id: "inside" }), "path")
     this.frame = element(svg, "g")
     this.exact = element(svg, "path", { class: "exact" })
     this.seen = element(svg, "path", { class: "visited" })
+    this.seen.style.strokeLinecap = y ? "round" : "butt"
     this.dots = element(svg, "path", { class: "dots" })
     this.answer = this.flag("answer")
     this.marker = this.flag("marker")
+    this.lines = element(svg, "g", { class: "lines" })
     const slider = { role: "slider", tabindex: -1, "aria-orientation": y?.dragged ? "vertical" : "horizontal" }
     for (const [name, value] of Object.entries({ ...slider, "aria-label": `your prediction: ${x.label}` })) this.marker.group.setAttribute(name, value)
     this.dot = element(svg, "g", { class: "now", ...slider, "aria-label": y?.dragged ? y.label : `now: ${x.label}` })
@@ -108,18 +112,22 @@ export class QuantityPlot {
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
    * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact
-   * is an area; thin: it is a curve.
+   * is an area; thin: it is a curve. clip: corners of the area in which seen is drawn. lines: [{value, words}], named
+   * values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10 } = state
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10, clip = null, lines = [] } = state
     const path = (lines, end = "") => lines.map((points) => `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}`).join("")
     this.exact.setAttribute("d", path(exact, exact[0]?.length > 2 && filled ? "Z" : ""))
     this.exact.classList.toggle("filled", filled)
     this.exact.classList.toggle("thin", thin)
     this.seen.setAttribute("d", path(seen))
     this.seen.style.strokeWidth = brush
+    this.inside.setAttribute("d", clip ? path([clip], "Z") : "")
+    this.seen.style.clipPath = clip ? "url(#inside)" : ""
+    this.drawLines(lines)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
     this.show(this.marker, marker, this.bottom - PILL.high - 8)
     this.show(this.answer, answer, this.top - 40)
@@ -127,10 +135,8 @@ export class QuantityPlot {
     if (now) {
       const [px, py] = this.place(now)
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
-      const half = (words.length * PILL.letter) / 2
-      this.reading.setAttribute("x", Math.min(0, this.wide - 4 - half - px) + Math.max(0, 4 + half - px))
-      const covered = answer && Math.abs(this.x.px(answer.value) - px) < half // by the line of the answer
-      this.reading.textContent = covered ? "" : words
+      this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer, ...lines]))
+      this.reading.textContent = answer && this.x.px(answer.value) === px ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
     }
@@ -138,6 +144,26 @@ export class QuantityPlot {
       this.marker.group.setAttribute("aria-valuenow", marker.value)
       this.marker.group.setAttribute("aria-valuetext", marker.words)
     }
+  }
+
+  /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
+  beside(px, half, flags) {
+    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), [low, high] = [half + GAP, this.wide - half - GAP]
+    const free = (x) => x >= low && x <= high && lines.every((line) => Math.abs(line - x) > half + GAP)
+    const above = Math.min(high, Math.max(low, px)), far = (x) => Math.abs(x - px)
+    const places = [above, ...lines.flatMap((line) => [line - half - 2 * GAP, line + half + 2 * GAP])].sort((a, b) => far(a) - far(b))
+    return (places.find((x) => free(x) && far(x) < 2 * half) ?? above) - px
+  }
+
+  /** Named values: lines up to their names, which are one below the other on the right. */
+  drawLines(lines) {
+    const { top, bottom, lines: group } = this, right = Math.max(...lines.map(({ value }) => this.x.px(value)))
+    group.replaceChildren()
+    lines.forEach(({ value, words }, k) => {
+      const y = top + 10 + 16 * k
+      element(group, "path", { d: `M${this.x.px(value)} ${bottom}V${y - 4}H${right + 2 * GAP}`, class: k ? "" : "bound" })
+      element(group, "text", { x: right + 3 * GAP, y }).textContent = words
+    })
   }
 
   /** A vertical line with a label. */
@@ -178,7 +204,8 @@ export class QuantityPlot {
       if (!this.movable || event.button !== 0) return
       const [px, py] = at(event), [nx, ny] = this.state.now ? this.place(this.state.now) : [px, py]
       const near = this.movable === "dot" && Math.hypot(px - nx, py - ny) < GRAB
-      held = near ? [nx - px, ny - py] : [0, 0]
+      const flag = this.movable === "marker" && this.marker.group.contains(event.target)
+      held = near ? [nx - px, ny - py] : flag ? [this.x.px(this.state.marker.value) - px, 0] : [0, 0]
       svg.setPointerCapture(event.pointerId)
       ;(this.movable === "dot" ? this.dot : this.marker.group).focus({ preventScroll: true })
       this.move(px + held[0], py + held[1])

@@ -13,6 +13,9 @@ export class Chance extends PackingExperiment {
     this.now = this.drawn[0]
   }
 
+  /** Predictions cannot be outside the range that the text gives. */
+  get possible() { return [this.packing.least[this.contact], this.packing.largest[this.contact]] }
+
   get value() { return Math.max(...this.drawn.filter(({ number }) => number && number <= this.count).map(({ value }) => value)) }
   get answer() { return this.packing.high[this.contact] }
 
@@ -36,7 +39,7 @@ export class Chance extends PackingExperiment {
 
   get picture() {
     const { packing: { least, largest, low, high, states }, contact, found, count } = this
-    const rows = this.drawn.filter(({ number }) => number && number <= count)
+    const rows = this.drawn.filter(({ number }) => number <= count)
     return {
       now: [this.now.value, count], words: `network ${count}`,
       exact: [rectangle(least[contact], largest[contact], states)], filled: true,

@@ -11,8 +11,8 @@ const nearest = (list, mu) => list.reduce((one, other) => (Math.abs(Math.log(oth
 
 export class Friction extends PackingExperiment {
   async load(source) {
-    const { mu, spread, packed } = await source.get("curve")
-    Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], packings: new Map(), visited: new Set() })
+    const { mu, spread, packed, touching, free } = await source.get("curve")
+    Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], touching: [...touching], free: [...free], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     const fetch = (one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing))
@@ -30,11 +30,10 @@ export class Friction extends PackingExperiment {
       this.packing = packing
       this.network = Float32Array.from(this.asPacked(packing))
       this.before = this.asPacked(packing)
-      this.canvas.show(packing, packing.typical)
+      this.canvas.show(packing, packing.grabbed)
       this.say(`picture: a packing made at μ = ${packing.mu}`)
     }
-    const k = stops.indexOf(this.answer)
-    this.found ||= packings.has(packed[k]) && [k - 1, k, k + 1].every((at) => !(at in stops) || visited.has(stops[at]))
+    this.found ||= visited.size === stops.length
     this.changed()
   }
 
@@ -49,14 +48,12 @@ export class Friction extends PackingExperiment {
     this.canvas.draw(network, this.before, palettes)
   }
 
-  get finds() { return this.packings.size }
-
   /** The friction at which forces vary most. */
   get answer() { return this.stops[this.spreads.indexOf(Math.max(...this.spreads))] }
 
   get facts() {
-    const { packings, packing, stops, spreads } = this
-    const rows = [...packings.values()].sort((a, b) => a.mu - b.mu).map((one) => ({ ...this.counted(one), spread: spreads[stops.indexOf(one.mu)] ?? one.spread }))
+    const { packing, packed, stops, spreads, touching, free } = this
+    const rows = stops.map((mu, k) => ({ mu, touching: touching[k], free: free[k], spread: spreads[k] })).filter(({ mu }, k) => mu === packed[k])
     return { ...this.counted(packing), rows }
   }
 

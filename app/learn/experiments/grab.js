@@ -16,7 +16,7 @@ export class Grab extends PackingExperiment {
     this.tangential = packing.tangential.subarray(0, packing.contacts)
     this.start = this.value
     this.canvas.show(packing, contact)
-    this.first = source.get("rail").then((rail) => { this.rail = { ...rail, contact } })
+    this.fetched = source.get("rail").then((rail) => { this.rail = this.first = { ...rail, contact } })
   }
 
   /** The force of the marked line. */
@@ -25,19 +25,28 @@ export class Grab extends PackingExperiment {
   get answer() { return this.packing.largest[this.contact] }
 
   get facts() {
-    const { packing, contact, network, before, rail } = this, count = packing.contacts
+    const { packing, contact, first: rail } = this, count = packing.contacts
     const last = (marks) => marks.subarray(count).reduce((sum, v) => sum + v, 0)
     return {
-      ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact],
-      changed: network.reduce((sum, v, c) => sum + (Math.abs(v - before[c]) > CHANGED && c !== contact ? 1 : 0), 0),
+      ...this.counted(packing), start: this.start, low: packing.least[contact], high: packing.largest[contact], changed: this.changes,
       opened: rail ? last(rail.opened) : 0, sliding: rail ? last(rail.sliding) : 0,
     }
   }
 
   /** A promise: dragging has to wait for the first rail. */
-  ready() { return this.first }
+  ready() { return this.fetched }
 
-  drag(x) { this.pull(this.contact, () => x) }
+  /** Number of other forces that change from the first network to the end of its rail. */
+  get changes() {
+    const { first, contact } = this
+    const end = first?.normal.subarray(-this.packing.contacts) ?? []
+    return end.reduce((sum, v, c) => sum + (Math.abs(v - this.before[c]) > CHANGED && c !== contact ? 1 : 0), 0)
+  }
+
+  drag(x) {
+    this.say("")
+    this.pull(this.contact, () => x)
+  }
 
   /** Give a contact the force value(its rail), as far as possible, once its rail is there. */
   async pull(contact, value) {
@@ -60,7 +69,7 @@ export class Grab extends PackingExperiment {
     Object.assign(this, { network: normal, tangential })
     this.seen = [Math.min(this.value, seen?.[0] ?? start), Math.max(this.value, seen?.[1] ?? start)]
     if (contact === this.contact) this.found ||= high - now < FOUND * (high - low)
-    else if (this.held === contact) this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
+    else this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
     this.changed()
   }
 
@@ -69,7 +78,7 @@ export class Grab extends PackingExperiment {
   take(contact) {
     this.held = contact
     this.taken = this.network[contact]
-    if (contact !== this.contact) this.say("Finding how far this line can be pulled …")
+    this.say(contact === this.contact ? "" : `this line: ${this.taken.toFixed(2)}; finding how far it can be pulled …`)
     this.pulled(0)
   }
 
@@ -80,7 +89,6 @@ export class Grab extends PackingExperiment {
 
   release() {
     this.held = null
-    this.say("")
     this.changed()
   }
 

@@ -3,6 +3,8 @@
 import { createElement } from "../../browser/dom.js"
 import { PackingPicture } from "../drawing/packing_picture.js"
 
+const AT_LIMIT = 1e-4 // mean forces: distance from the limit of friction, or from no force
+
 export class PackingExperiment {
   constructor(host, options, changed, palettes) {
     Object.assign(this, { host, options, changed, locked: true, found: false, seen: null, palettes })
@@ -18,6 +20,14 @@ export class PackingExperiment {
 
   /** The first network of a packing, in which it came to rest. */
   asPacked(packing) { return packing.normal.subarray(0, packing.contacts) }
+
+  /** Marks of the contacts that are open, and of those that slip, on the network on screen; null if it has no friction. */
+  get limited() {
+    const { network, tangential, packing: { mu } } = this
+    if (!tangential) return null
+    const opened = Uint8Array.from(network, (v) => v < AT_LIMIT)
+    return { opened, slid: opened.map((open, c) => !open && mu * network[c] - Math.abs(tangential[c]) < AT_LIMIT) }
+  }
 
   // The hand in the picture: no effect, except in chapters that override these
 
@@ -38,11 +48,10 @@ export class PackingExperiment {
 
   draw(dark, palettes) {
     this.palettes = palettes
-    if (this.network) this.canvas.draw(this.network, this.before ?? null, palettes)
+    if (!this.network) return
+    this.canvas.limited = this.limited
+    this.canvas.draw(this.network, this.before ?? null, palettes)
   }
-
-  /** Number of results found: the text is updated when it grows. */
-  get finds() { return 1 }
 
   stop() { this.canvas.stop() }
 }

@@ -1,4 +1,5 @@
-// Two disks are pushed apart: the network follows, until disks start to move.
+// Two disks are pushed apart: the network follows, until disks start to move. Then the same disks are
+// pushed again, from other networks of the walk.
 
 import { networkAt } from "../../packing/replay/replay.js"
 import { Sway } from "../../packing/drawing/displacement.js"
@@ -7,31 +8,62 @@ import { PackingExperiment } from "./packing_experiment.js"
 export class Push extends PackingExperiment {
   async load(source) {
     this.packing = await source.get("packing", "0.1")
-    this.value = 0
-    this.network = this.before = this.asPacked(this.packing)
+    Object.assign(this, { source, limits: [], network: this.asPacked(this.packing) })
     this.canvas.show(this.packing, null)
     this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     this.sway = new Sway(this.canvas.scene)
-    this.path = await source.get("push")
-    this.canvas.show(this.packing, this.path.contact)
-    this.changed()
+    this.begin(0, await source.get("push", "0"))
+    this.answer = this.limit
   }
 
-  get answer() { return this.path.values.at(-1) }
+  /** Push from one of the networks, which its path starts from. */
+  begin(start, path) {
+    Object.assign(this, { start, path, before: networkAt(path, 0).normal })
+    this.canvas.show(this.packing, path.contact)
+    this.drag(0)
+  }
+
+  /** The next network, once disks moved from the present one. */
+  get offer() {
+    const { start, path: { starts }, limits } = this
+    return limits.length > start && start + 1 < starts ? { words: "Take other forces in S", run: () => this.next() } : null
+  }
+
+  async next() {
+    const start = this.start + 1
+    this.say("Computing how these forces follow …")
+    try {
+      this.begin(start, await this.source.get("push", String(start)))
+      this.say("")
+    } catch (error) {
+      this.say(error.message)
+    }
+  }
+
+  /** The largest push that the present forces carry. */
+  get limit() { return this.path.values.at(-1) }
+
+  get moving() { return this.canvas.motion !== null }
 
   get facts() {
-    const { limit, opened, slid, contact } = this.path
-    return { ...this.counted(this.packing), limit, opened, slid, carried: this.before[contact], high: this.answer }
+    const { path: { limit, contact, opened, slid, number }, limits, start, moving, before } = this, count = (mask) => mask.reduce((sum, v) => sum + v, 0)
+    return {
+      ...this.counted(this.packing), limit, number, moving, high: this.limit, carried: before[contact], opened: count(opened), slid: count(slid),
+      pushed: limits.length > start, limits: limits.map(({ value }) => value),
+    }
   }
 
   drag(x) {
-    this.value = Math.min(Math.max(0, x), this.answer)
-    this.most = Math.max(this.most ?? 0, this.value)
-    this.network = networkAt(this.path, this.value).normal
-    this.canvas.push = this.value / this.answer
-    const moves = x >= this.answer
-    if (moves) this.found = true
-    if (!this.still && moves !== Boolean(this.canvas.scene.offset)) this.sway.take(moves ? this.path.displacement : null)
+    const { path, limit, limits, start } = this, moves = x >= limit
+    this.value = Math.min(Math.max(0, x), limit)
+    const { normal, tangential } = networkAt(path, this.value)
+    Object.assign(this, { network: normal, tangential })
+    Object.assign(this.canvas, { push: this.value / limit, motion: moves ? path.displacement : null })
+    if (moves) {
+      this.found = true
+      limits[start] = { value: limit, words: `network ${path.number}: ${limit.toFixed(2)}` }
+    }
+    if (!this.still && moves !== Boolean(this.canvas.scene.offset)) this.sway.take(this.canvas.motion)
     this.changed()
   }
 
@@ -39,10 +71,15 @@ export class Push extends PackingExperiment {
 
   take() { this.taken = this.value }
 
-  pulled(part) { this.drag(this.taken + 2 * part * this.answer) }
+  pulled(part) { this.drag(this.taken + 2 * part * this.limit) }
+
+  /** In motion the contacts that open and slip in it, otherwise those of the network. */
+  get limited() { return this.moving ? this.path : super.limited }
 
   get picture() {
-    return { now: [this.value, 0], seen: this.most ? [[[0, 0], [this.most, 0]]] : [], exact: [] }
+    const { value, found, limits, path } = this
+    const bound = { value: path.limit, words: `S allows ${path.limit.toFixed(2)}` }
+    return { now: [value, 0], seen: [[[0, 0], [value, 0]]], lines: found ? [bound, ...limits.slice(1)] : [] }
   }
 
   stop() {

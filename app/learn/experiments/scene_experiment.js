@@ -4,11 +4,12 @@
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { Body } from "../model/polytope.js"
-import { middleOf } from "../model/middle.js"
+import { fixed, middleOf } from "../model/middle.js"
 import { palette } from "../drawing/palette.js"
 
 const FOUND = 0.01 // relative distance from the end at which it counts as found
 const WAY = 1500 // stored positions of the drag
+const STEPS = 20, SECONDS = 0.4 // to other forces behind the same dot
 
 export class SceneExperiment {
   /** options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. */
@@ -29,6 +30,7 @@ export class SceneExperiment {
       this.body.u = middleOf(this.body)
     }
     this.start = this.at
+    this.mean = this.body.sumAt(this.body.u) / this.body.count
     if (this.body.whole) this.end(this.body.interval(this.options.x), this.corners)
     else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], unflat([...outline])))
   }
@@ -61,7 +63,7 @@ export class SceneExperiment {
     const weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
     return {
       contacts: body.count, disks: scene.r.length, equations: scene.equations, free: body.h, mu: scene.mu,
-      low: this.low, high: this.high, weight, start: this.start[0],
+      low: this.low, high: this.high, weight, start: this.start[0], mean: this.mean, others: this.others,
     }
   }
 
@@ -73,7 +75,31 @@ export class SceneExperiment {
     this.moved()
   }
 
+  /** Where S is drawn as a shadow, other forces behind the same dot. */
+  get offer() { return this.body.whole ? null : { words: "Change the other forces", run: () => this.change() } }
+
+  /** Walk to another point of S with the same forces on the axes; there is none behind the edge of the shadow. */
+  change() {
+    const { body, options: { x, y } } = this, from = body.u
+    this.random ??= fixed()
+    let to = from
+    for (let k = 0; k < STEPS; k++) to = body.step(to, this.random, [x, y])
+    this.others = Math.hypot(...to.map((v, d) => v - from[d])) > FOUND * body.scaleOf()
+    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
+    this.go(from, to, still ? -Infinity : performance.now())
+  }
+
+  /** Move from one point of S to another, which began at this time. */
+  go(from, to, began) {
+    const part = Math.min(1, (performance.now() - began) / (1000 * SECONDS))
+    this.body.u = from.map((v, d) => v + part * (to[d] - v))
+    this.changed()
+    if (part < 1) this.frame = requestAnimationFrame(() => this.go(from, to, began))
+  }
+
   moved() {
+    cancelAnimationFrame(this.frame)
+    this.others = null
     const { at, way } = this, before = way.at(-1) ?? this.start
     if (!way.length) way.push(this.start)
     if (Math.hypot(at[0] - before[0], at[1] - before[1]) > 1e-3) way.push(at)
@@ -105,6 +131,7 @@ export class SceneExperiment {
       exact: !found ? [] : y === null ? [[[low, 0], [high, 0]]] : [outline],
       filled: y !== null,
       brush: y === null ? 10 : 14,
+      clip: y === null ? null : outline,
     }
   }
 
@@ -119,8 +146,5 @@ export class SceneExperiment {
     arrows.draw({ ...colours, axes, contacts: this.lit, contact: null, disk: null, fall: null })
   }
 
-  /** Number of results found: the text is updated when it grows. */
-  get finds() { return 1 }
-
-  stop() { /* nothing moves by itself */ }
+  stop() { cancelAnimationFrame(this.frame) }
 }

@@ -23,6 +23,11 @@ from . import small_scenes
 MU = 0.1  # of the packing that is pulled and pushed
 NEAR = 0.5  # largest distance of a marked contact from the centre, in half view widths
 STRONG = 1.5  # least force of the contact that is pulled, ⟨f_n⟩
+FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
+STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
+
+# Curves against friction, by the measures of which they are means.
+CURVES = {"spread": "eta1", "touching": "coordination", "free": "dimension"}
 
 
 @lru_cache
@@ -50,7 +55,7 @@ class Packings:
             if cell.series == series and cell.mu > 0:
                 self.cells[cell.mu] = cell
         self.rail = lru_cache(1)(self._rail)
-        self.push = lru_cache(1)(self._push)
+        self.push = lru_cache(STARTS)(self._push)
 
     @property
     def frictions(self) -> list[float]:
@@ -73,7 +78,6 @@ class Packings:
             **frames(replay),
             "least": bounds["low"],
             "largest": bounds["high"],
-            "typical": replay.typical,
             "grabbed": self._grabbed(mu),
             "spread": summary["eta1"],
             "disks": summary["n"] - summary["rattlers"],
@@ -110,39 +114,58 @@ class Packings:
         rail = self._puller().rail(int(replay.backbone[int(contact)]), forces * scale)
         return rail_of(rail, scale)
 
-    def _push(self) -> dict[str, Any]:
-        """Networks under a push on the most resistant contact near the centre, and the motion."""
+    def _push(self, start: int) -> dict[str, Any]:
+        """Networks under a growing push on a contact, from one of STARTS, and the motion."""
         replay = self.shown(MU).replay
-        found = self._pushed()
-        position = {int(number): k for k, number in enumerate(replay.backbone)}
-        contacts = np.array([position[int(number)] for number in found["backbone"].values])
-        scale, carried = replay.force_scale, found["critical_low"].values
-        row = int(np.argmax(np.where(_away(replay)[contacts] < NEAR, carried, -1.0)))
-        low = carried[row]
-        under = self._puller().loaded(int(replay.backbone[contacts[row]]), low)
+        contact, limit = self._weakened()
+        scale, rows = replay.force_scale, np.linspace(0, len(replay.number) - 1, STARTS).astype(int)
+        row = int(rows[start])
+        state = np.stack([replay.normal[row], replay.tangential[row]], axis=1).astype(float) * scale
+        found = self._puller().given_way(int(replay.backbone[contact]), state, limit)
+        motion = found.motion
         return {
-            "contact": int(contacts[row]),
-            **path(under, scale),
-            "limit": float(found["limit_load"].values[row] / scale),
-            "opened": int(found["opened"].values[row]),
-            "slid": int(found["slid"].values[row]),
-            "displacement": np.nan_to_num(found["displacement"].values[row]).ravel(),
+            "contact": contact,
+            "starts": STARTS,
+            "number": int(replay.number[row]),
+            **path(found.under, scale),
+            "limit": limit / scale,
+            "opened": motion.opened.astype(np.uint8),
+            "slid": motion.slid.astype(np.uint8),
+            "displacement": np.nan_to_num(motion.displacement).ravel(),
         }
 
-    def curve(self) -> dict[str, Any]:
-        """Variation of forces against friction, and the friction of the nearest packing.
+    def _weakened(self) -> tuple[int, float]:
+        """The contact to push, and its limit load.
 
-        The variation is the mean over the packings of the study or, without a study, that of each
-        packing.
+        Of the firm ones near the centre, it is the one that gives way farthest below its limit
+        load, relative to it.
+        """
+        replay, found = self.shown(MU).replay, self._pushed()
+        position = {int(number): k for k, number in enumerate(replay.backbone)}
+        contacts = np.array([position[int(number)] for number in found["backbone"].values])
+        carried, limit = found["critical_low"].values, found["limit_load"].values
+        fits = (_away(replay)[contacts] < NEAR) & (carried > FIRM * replay.force_scale)
+        row = int(np.argmax(np.where(fits, 1 - carried / limit, -1.0)))
+        return int(contacts[row]), float(limit[row])
+
+    def curve(self) -> dict[str, Any]:
+        """Forces and contacts against friction, and the friction of the nearest packing.
+
+        spread: variation of forces; touching: contacts per disk; free: free numbers. They are means
+        over the packings of the study or, without a study, those of each packing.
         """
         own = self.frictions
-        points = [
-            (mu, spread)
-            for mu, spread in study_data.against_friction("eta1")
-            if own and own[0] <= mu <= own[-1]
-        ] or [(mu, self.shown(mu).replay.summary["eta1"]) for mu in own]
-        packed = [min(own, key=lambda one: abs(np.log(one / mu))) for mu, _ in points]
-        return {"mu": [mu for mu, _ in points], "spread": [s for _, s in points], "packed": packed}
+        measured = [dict(study_data.against_friction(name)) for name in CURVES.values()]
+        stops = [mu for mu in measured[0] if own and own[0] <= mu <= own[-1]]
+        if not stops:
+            stops = own
+            summaries = [self.shown(mu).replay.summary for mu in own]
+            measured = [{one["mu"]: one[name] for one in summaries} for name in CURVES.values()]
+        packed = [min(own, key=lambda one: abs(np.log(one / mu))) for mu in stops]
+        curves = {
+            name: [float(by[mu]) for mu in stops] for name, by in zip(CURVES, measured, strict=True)
+        }
+        return {"mu": stops, "packed": packed, **curves}
 
     def _pushed(self) -> xr.Dataset:
         """The stored pushed contacts of the packing."""

@@ -15,7 +15,7 @@ export function middleOf(body) {
 }
 
 /** Pseudo-random numbers in [0, 1), always the same: a linear congruential generator. */
-function fixed() {
+export function fixed() {
   let state = 1
   return () => (state = (Math.imul(1664525, state) + 1013904223) >>> 0) / 2 ** 32
 }

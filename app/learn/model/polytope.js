@@ -339,9 +339,10 @@ export class Body {
     }
   }
 
-  /** A uniform draw by hit-and-run from u: a point of a random chord. */
-  step(u, random = Math.random) {
-    const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random()))
+  /** A uniform draw by hit-and-run from u: a point of a random chord, along which these forces do not change. */
+  step(u, random = Math.random, held = []) {
+    const any = u.map(() => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random()))
+    const direction = without(any, held.map((force) => this.axes.map((axis) => axis[force])))
     let low = -Infinity, high = Infinity
     for (const row of this.whole ? this.drawn : this.rows) { // if unbounded, up to the added bounds
       const slope = dot(row.slope, direction), room = dot(row.slope, u) + row.rest
@@ -352,6 +353,12 @@ export class Body {
     const at = low + random() * (high - low)
     return u.map((v, k) => v + at * direction[k])
   }
+}
+
+/** The part of a vector that is perpendicular to independent rows. */
+function without(vector, rows) {
+  const parts = solve(rows.map((a) => rows.map((b) => dot(a, b))), rows.map((row) => dot(row, vector)))
+  return vector.map((v, d) => v - rows.reduce((sum, row, k) => sum + parts[k] * row[d], 0))
 }
 
 const independent = (v) => (Math.hypot(...v) > 1e-6 ? v : null)

@@ -6,15 +6,16 @@ import pytest
 from serving import chain, scene, serve, until
 
 WORDS = 70  # at most, before the hand acts
-# Name of each chapter: its heading; keys that carry the dot to the answer, how often; the answer.
+# Name of each chapter: its heading; keys that carry the dot to the answer; the answer.
+RIGHT = ["ArrowRight"] * 60
 CHAPTERS = {
-    "groove": ("How hard does the wall press?", ("ArrowRight", 40), "1.41"),
-    "box": ("How much can the floor carry?", ("ArrowRight", 40), "2.86"),
-    "thirteen": ("How strong can one contact get?", ("ArrowRight", 40), "4.84"),
-    "four-hundred": ("Grab one force", ("ArrowRight", 40), None),
-    "chance": ("How far does chance go?", ("ArrowUp", 65), None),
-    "friction": ("Where are forces least determined?", ("ArrowRight", 4), "μ = 0.2"),
-    "push": ("When does something move?", ("ArrowRight", 60), None),
+    "groove": ("How hard does the wall press?", RIGHT, "1.41"),
+    "box": ("How much can the floor carry?", RIGHT, "2.86"),
+    "thirteen": ("How strong can one contact get?", RIGHT, "4.84"),
+    "four-hundred": ("Grab one force", RIGHT, None),
+    "chance": ("How far does chance go?", ["ArrowUp"] * 65, None),
+    "friction": ("Where are forces least determined?", RIGHT[:15] + ["ArrowLeft"] * 25, "μ = 0.2"),
+    "push": ("When does something move?", RIGHT, None),
 }
 COUNTS = {"groove": "4 − 3", "box": "8 − 6", "thirteen": "46 − 38"}
 
@@ -45,9 +46,29 @@ def predict(page, steps=20):
     page.get_by_role("button", name="That is my prediction").click()
 
 
+# The tip of an arrow that pushes the disks of the marked line apart, and its direction.
+ARROW = """({ scene }) => {
+    const { geometry } = scene, box = scene.root.getBoundingClientRect()
+    const [{ k, a, b }] = scene.segments((contact) => contact === scene.selected)
+    const [p, q] = [a, b].map((at) => scene.toPixel(...at))
+    const far = Math.hypot(q[0] - p[0], q[1] - p[1])
+    const along = [(q[0] - p[0]) / far, (q[1] - p[1]) / far]
+    const long = scene.scale * (0.3 * geometry.radius[geometry.j[k]] + 0.8 * geometry.unit)
+    return [box.left + q[0] + long * along[0], box.top + q[1] + long * along[1], along]
+}"""
+
+
+def press(page, keys):
+    """Press keys on the dot, once it can be dragged."""
+    page.locator(".now.movable").wait_for()
+    dot(page).focus()
+    for key in keys:
+        page.keyboard.press(key)
+
+
 def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
     page, answers = opening("?learn", 1280, 900, at=lesson), {}
-    for name, (heading, (key, times), answer) in CHAPTERS.items():
+    for name, (heading, keys, answer) in CHAPTERS.items():
         page.get_by_role("heading", name=heading).wait_for()
         question = page.locator("article strong")
         question.wait_for()
@@ -57,10 +78,15 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         assert page.get_by_role("button", name="That is my prediction").is_disabled()
         predict(page)
         page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
+        more = page.get_by_role("link", name="More with these disks")
+        assert more.filter(visible=True).count() == 0
         dot(page).focus()
-        for _ in range(times):
+        for key in keys:
             page.keyboard.press(key)
+            if (name, key) == ("friction", "ArrowRight"):
+                assert found.count() == 0  # both sides must be looked at
         found.wait_for()
+        assert more.filter(visible=True).count() == (name in COUNTS)
         told = page.locator(".voice").inner_text()
         assert answer is None or f"It is {answer}." in told, name
         assert "You predicted" in told and COUNTS.get(name, "") in told
@@ -131,6 +157,92 @@ def test_back_goes_through_chapters_and_a_frame_shows_one_alone(opening, lesson)
     assert alone.get_by_role("navigation").filter(visible=True).count() == 0
 
 
+def test_the_way_back_from_more_disks_leads_to_the_same_chapter(opening, lesson):
+    page = opening("?learn", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    predict(page)
+    press(page, RIGHT)
+    page.get_by_role("link", name="More with these disks").click()
+    page.get_by_role("button", name="Random walk").wait_for()
+    page.go_back()
+    page.get_by_text("It is 1.41.").wait_for()
+
+
+def test_a_prediction_is_not_moved_by_a_grasp_and_stays_within_the_possible(opening, lesson):
+    page = opening("?learn=chance", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    low, high = map(
+        float, re.search(r"from ([\d.]+) to ([\d.]+)", page.locator(".text").inner_text()).groups()
+    )
+    marker = page.get_by_role("slider", name="your prediction")
+    marker.focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    predicted = float(marker.get_attribute("aria-valuenow"))
+    box = marker.locator("rect").bounding_box()
+    x, y = box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 1, y)
+    assert float(marker.get_attribute("aria-valuenow")) == pytest.approx(predicted, abs=0.03)
+    page.mouse.move(x + 900, y)
+    assert float(marker.get_attribute("aria-valuenow")) == pytest.approx(high, abs=0.006)
+    page.mouse.move(x - 900, y)
+    page.mouse.up()
+    assert float(marker.get_attribute("aria-valuenow")) == pytest.approx(low, abs=0.006)
+
+
+def test_behind_one_point_of_the_shadow_lie_other_forces(opening, lesson):
+    page = opening("?learn=thirteen", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    change = page.get_by_role("button", name="Change the other forces")
+    predict(page)
+    page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
+    assert not change.is_visible()
+    press(page, RIGHT)
+    change.click()
+    page.get_by_text("only one set of forces").wait_for()  # the last point before the edge
+    press(page, ["ArrowLeft"] * 15)
+    assert page.get_by_text("only one set of forces").count() == 0
+    at = dot(page).get_attribute("aria-valuenow")
+    drawn = "(canvas) => canvas.toDataURL()"
+    before = page.locator(".picture canvas").evaluate(drawn)
+    change.click()
+    page.get_by_text("The dot stayed").wait_for()
+    assert float(dot(page).get_attribute("aria-valuenow")) == pytest.approx(float(at), abs=1e-9)
+    assert page.locator(".picture canvas").evaluate(drawn) != before
+
+
+def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(opening, lesson):
+    page = opening("?learn=push", 1280, 900, first=True, at=lesson)
+    page.locator("article strong").wait_for()
+    predict(page)
+    other = page.get_by_role("button", name="Take other forces in S")
+    assert not other.is_visible()
+    press(page, RIGHT)
+    page.get_by_text("disks start to move").wait_for()
+    allowed = page.locator("figure").get_by_text("S allows")
+    first = float(dot(page).get_attribute("aria-valuenow"))
+    assert first < float(allowed.inner_html().split()[-1])
+    page.keyboard.press("ArrowLeft")
+    page.get_by_text("Without a push").wait_for()  # the words follow the dot
+    other.click()
+    page.get_by_text("Push again").wait_for()
+    assert float(dot(page).get_attribute("aria-valuenow")) == 0
+    # An arrow follows the hand.
+    x, y, along = page.locator(".scene").evaluate(ARROW)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 10 * along[0], y + 10 * along[1], steps=3)
+    assert 0 < float(dot(page).get_attribute("aria-valuenow")) < first
+    page.mouse.up()
+    press(page, RIGHT)
+    page.get_by_text("The same disks gave way at").wait_for()
+    second = float(dot(page).get_attribute("aria-valuenow"))
+    assert abs(second - first) > 0.05
+    page.locator("figure").get_by_text(re.compile(rf"^network \d+: {second:.2f}$")).wait_for()
+
+
 def test_any_of_four_hundred_disks_lines_is_dragged_and_the_marked_one_goes_on_from_there(
     opening, lesson
 ):
@@ -150,7 +262,9 @@ def test_any_of_four_hundred_disks_lines_is_dragged_and_the_marked_one_goes_on_f
     until(page, f"{width} > {1.05 * thick}")
     page.mouse.up()
     thick = scene(page, width)
-    assert page.get_by_text("this line: ").filter(visible=True).count() == 0
+    assert (
+        page.get_by_text("possible").filter(visible=True).count() == 1
+    )  # its range stays on screen
     marked = dot(page).get_attribute("aria-valuenow")
     assert marked != before
     dot(page).focus()

@@ -86,6 +86,23 @@ def test_the_hand_steers_to_the_end_of_one_force_and_stays_in_s(run):
     assert begins == again
 
 
+def test_a_walk_that_holds_two_forces_changes_the_others(run):
+    held, moved, least = run(
+        "learn/model/polytope",
+        """({ Body }, { scene }) => {
+            const body = new Body(scene).cut(scene.mu)
+            body.goInside()
+            const before = body.forces()
+            let u = body.u
+            for (let k = 0; k < 20; k++) u = body.step(u, () => 0.3 + 0.02 * k, [6, 40])
+            const change = [...body.forces(u)].map((v, c) => Math.abs(v - before[c]))
+            return [Math.max(change[6], change[40]), Math.max(...change), body.least(u)]
+        }""",
+        scene=drawn("thirteen", None),
+    )
+    assert held < 1e-9 and moved > 0.1 and least > -1e-9
+
+
 def test_a_push_has_the_limit_load_of_the_library(run):
     """Upon the top of a pyramid, sideways."""
     limit, empty = run(
