@@ -7,7 +7,7 @@ from ..results.library import Cell
 from ..results.selection import Selection
 from ..state.app_state import AppState
 from ..state.view_settings import WIDTHS
-from .view import colour_bar, colour_words, quantities
+from .view import colour_bar, colours, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
 NAMED = 4  # known forces in a caption
@@ -15,8 +15,8 @@ NAMED = 4  # known forces in a caption
 
 def caption(state: AppState) -> dict[str, Any]:
     """The caption of a picture: background, colour bar, scale and words."""
-    pulled, looks = bool(state.hand.pulls), state.looks
-    low, stops, high = colour_bar(state, pulled)
+    looks = state.looks
+    low, stops, high = colour_bar(state)
     contrast = "#f2f5f9" if looks.dark else "#18191d"
     return {
         "background": GROUND[looks.dark],
@@ -24,7 +24,7 @@ def caption(state: AppState) -> dict[str, Any]:
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
-            f"colour: {colour_words(state, pulled)}.",
+            f"colour: {colours(state, bool(state.hand.pulls))[looks.colour]}.",
             origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",

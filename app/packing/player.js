@@ -88,7 +88,7 @@ class Player {
   /** Apply the open tab's settings to the packing. */
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
-    if (!this.pushable) this.pushed.end()
+    if (!this.pushable) this.pushed.leave()
   }
 
   /** Whether force space is in view, where the point is what can be dragged first. */
@@ -184,15 +184,23 @@ class Player {
   }
 
   select() {
-    this.buttons.tellChosen(this.scene.hand && (this.model.contact ?? null) !== null)
-    this.scene.selected = this.model.contact ?? null
+    const contact = this.model.contact ?? null
+    this.buttons.tellChosen(this.scene.hand && contact !== null, this.pins.has(contact))
+    this.scene.selected = contact
+    this.tellForce()
     this.scene.pair = (this.points || this.model.wide) ? this.plots.plane.pair ?? [] : []
   }
 
-  /** Show the selection. */
-  mark() {
+  tellForce() {
+    const { selected } = this.scene
+    if (selected !== null) this.buttons.showForce(this.replay.mixed.normal[selected], this.look.boundsOf(selected))
+  }
+
+  /** Mark the selection, or another contact. */
+  mark(contact = null) {
     if (!this.replay || this.live.moves) return
     this.select()
+    this.scene.selected = contact ?? this.scene.selected
     this.scene.drawMarks()
     this.split.paint()
   }
@@ -209,6 +217,7 @@ class Player {
     if (model.tab === "intervals") plots.show(replay, model.scale)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
+    this.tellForce()
     for (const listener of this.listeners) listener()
   }
 
@@ -243,6 +252,7 @@ class Player {
     const now = performance.now()
     if (now - this.playback.painted > PLOTS_MS) return this.paintPlots(now)
     this.buttons.read(this.replay)
+    this.tellForce()
     clearTimeout(this.late)
     this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the pointer has come to rest
   }
@@ -322,7 +332,8 @@ class Player {
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
-    this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
+    if (!known && Number.isNaN(this.buttons.force)) return this.hand.refuse()
+    this.tell({ known: known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] } })
   }
 
   /** Begin or end the motion to and fro between the pinned state and this one. */
@@ -363,8 +374,8 @@ class Player {
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       thrust: loaded(() => { this.thrust = plain(model.thrust); scene.drawMarks() }),
-      pins: loaded(() => { this.recover(); scene.drawMarks() }),
-      contact: loaded(() => { this.recover(); this.mark() }),
+      pins: loaded(() => { this.recover(); this.mark() }),
+      contact: loaded(() => { this.recover(); buttons.typed = false; this.mark() }),
     }
   }
 

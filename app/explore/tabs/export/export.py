@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 import panel as pn
 import xarray as xr
 
@@ -18,8 +17,7 @@ from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
 from ....results.saved_file import File, csv
 from ....state.app_state import AppState
-from ....state.known import MOST_KNOWN, rows
-from ....state.pulls import puller_of
+from ....state.known import MOST_KNOWN
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
 from . import files, standalone
@@ -37,8 +35,7 @@ class Snapshot:
         frame = min(state.looks.frame, len(self.replay.normal) - 1)
         held, knowledge = state.hand.held, state.knowledge
         self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
-        self._rows = rows(self.replay, knowledge.known)
-        network = files.on_screen(self.replay, frame, held, bool(self._rows))
+        network = files.on_screen(self.replay, frame, held, bool(knowledge.known))
         self._head = files.explained(
             self._columns, self.replay, self.source, network, *known_words(state, MOST_KNOWN),
             files.bounds_of(knowledge), f"This view: ?{self.link}",
@@ -57,14 +54,8 @@ class Snapshot:
         return File(f"{self.stem}.{ending}", mime, content)
 
     def csv(self, job: Job) -> File:
-        """A table of the contacts; with held forces, of the nearest network that has them."""
-        columns, scale = self._columns, self.replay.force_scale
-        if self._rows:
-            names = [f"{part} [mean]" for part in ("f_n", "f_t")]
-            shown = np.column_stack([columns[name] for name in names]).astype(np.float64)
-            forces, _ = puller_of(self.library, self.cell, self._rows).near(shown * scale)
-            columns = columns | dict(zip(names, forces.T / scale, strict=True))
-        return self.file("csv", "text/csv", csv(columns, self._head))
+        """A table of the contacts."""
+        return self.file("csv", "text/csv", csv(self._columns, self._head))
 
     def json(self, job: Job) -> File:
         """Parameters, link, command and view."""

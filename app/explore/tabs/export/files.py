@@ -91,10 +91,10 @@ COLUMNS = {
     "f_t_original": "tangential force as packed, along t = (-n_y, n_x)",
     "f_n": "normal force in the network on screen",
     "f_t": "tangential force in the network on screen",
-    "f_n_seen_low": "smallest normal force of all states",
-    "f_n_seen_high": "largest normal force of all states",
-    "f_t_seen_low": "smallest tangential force of all states",
-    "f_t_seen_high": "largest tangential force of all states",
+    "f_n_seen_low": "smallest normal force of all states, whatever is held",
+    "f_n_seen_high": "largest normal force of all states, whatever is held",
+    "f_t_seen_low": "smallest tangential force of all states, whatever is held",
+    "f_t_seen_high": "largest tangential force of all states, whatever is held",
     "f_n_low": "least possible normal force (exact)",
     "f_n_high": "largest possible normal force (exact)",
     "f_t_low": "least possible tangential force (exact)",
@@ -110,10 +110,10 @@ def _meaning(column: str) -> str:
 
 def on_screen(replay: Replay, frame: int, held: Held | None, known: bool = False) -> str:
     """The network of a table, in words; known: whether forces are held."""
-    words = f"Network {replay.number[frame]}" if frame else "Network as packed"
     if held is not None:
-        words = "Network: pulled by hand"
-    return f"{words}, moved to the nearest network with the held forces" if known else words
+        return "Network: pulled by hand" + (", with the held forces" if known else "")
+    words = f"Network {replay.number[frame]}" if frame else "Network as packed"
+    return f"{words}, a network of all of S: it ignores the held forces" if known else words
 
 
 def bounds_of(knowledge: Knowledge) -> str:
