@@ -24,7 +24,7 @@ def caption(state: AppState) -> dict[str, Any]:
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
-            f"colour: {colours(state, bool(state.hand.pulls))[looks.colour]}.",
+            f"colour: {colours(state, "pull" if state.hand.pulls else "")[looks.colour]}.",
             origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",

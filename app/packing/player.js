@@ -107,7 +107,7 @@ class Player {
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
     this.hand.settle()
-    this.tellHeld(false)
+    this.tellHeld("")
     this.pushed.end()
     this.tellTab()
     scene.mixed = this.replay.mixed
@@ -257,10 +257,10 @@ class Player {
     this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the pointer has come to rest
   }
 
-  /** Report whether a pulled network is on screen, for the legend. */
-  tellHeld(held) {
-    this.buttons.tellHeld(held)
-    if (this.pulled !== held) this.model.pulled = this.pulled = held // reading a model is slow
+  /** Report what led to the network on screen, for the legend: "pull", "push" or "". */
+  tellHeld(by) {
+    this.buttons.tellHeld(by === "pull")
+    if (this.pulled !== by) this.model.pulled = this.pulled = by // reading a model is slow
   }
 
   again() {

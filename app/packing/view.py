@@ -163,7 +163,7 @@ class PackingView:
         self.player.displacement = flat
 
     def _explain(self, *events: Any) -> None:
-        pulled = self.player.pulled or bool(self.state.hand.pulls)
+        pulled = self.player.pulled or ("pull" if self.state.hand.pulls else "")
         thrust = THRUST if self.player.thrust else ""
         self.player.param.update(
             legend=JAMMING if self.state.work.moving else legend(self.state, pulled) + thrust,
@@ -268,11 +268,10 @@ def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
     return labels | {"extent": f"{labels['extent']}, {state.bounds if exact else 'seen'}"}
 
 
-def colours(state: AppState, pulled: bool) -> dict[str, str]:
-    """The labels of COLOURS at present; changes of a pulled or pushed network are those by it."""
-    pushed = pulled and state.looks.tab == "perturb" and not state.hand.pulls
-    change = f"change by the {'push' if pushed else 'pull'}"
-    return quantities(state, COLOURS | {"change": change} if pulled else COLOURS)
+def colours(state: AppState, pulled: str) -> dict[str, str]:
+    """The labels of COLOURS; pulled: "pull" or "push" if that led to the network on screen."""
+    change = {"change": f"change by the {pulled}"} if pulled else {}
+    return quantities(state, COLOURS | change)
 
 
 def _full(looks: Looks, most: float) -> str:
@@ -287,7 +286,7 @@ def _largest(loads: Floats | None, full: float | None) -> str:
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
 
 
-def legend(state: AppState, pulled: bool = False) -> str:
+def legend(state: AppState, pulled: str = "") -> str:
     """The present meaning of width and colour, as HTML."""
     looks, replay = state.looks, state.shown
     if replay is None:

@@ -169,7 +169,7 @@ export class Grab {
     if (this.replay) this.replay.held = null
     this.player.pushed.end()
     this.settle()
-    this.player.tellHeld(false)
+    this.player.tellHeld("")
     this.player.say("")
     this.player.again()
   }
@@ -224,7 +224,7 @@ export class Grab {
     player.look.before = this.before
     if (held.pull.length > 2) this.spot.describe(...held.pull.slice(1))
     else this.describe(...held.pull)
-    player.tellHeld(true)
+    player.tellHeld("pull")
     player.again()
   }
 
@@ -240,7 +240,7 @@ export class Grab {
   show(held) {
     const { replay, player } = this
     replay.held = held
-    player.tellHeld(true)
+    player.tellHeld(held.place === "pushed" ? "push" : "pull")
     if (this.pendingFrame) return
     this.pendingFrame = requestAnimationFrame(() => {
       this.pendingFrame = 0
@@ -276,7 +276,7 @@ export class Grab {
       const { opened, sliding } = this.holding
       words += `, its ${end > 0 ? "largest" : "smallest"} value: it stops because ${opened.length} contacts opened ` +
         `and ${sliding.length} began to slide`
-    } else if (this.player.model.colour === "change") words += "; orange carries more than before, blue less"
+    }
     this.player.say(words)
   }
 

@@ -40,6 +40,7 @@ export class Pushed {
       if (this.held) this.leave()
       return scene.style && scene.drawMarks()
     }
+    if (!this.held) player.say("") // about a pull
     if (replay.position) player.show(0, false) // meanwhile, for the server, the network of before is on screen
     player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
     player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
