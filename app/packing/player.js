@@ -268,6 +268,12 @@ class Player {
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
   }
 
+  /** The packing as SVG text; between two compared networks, its caption says where. */
+  picture(caption) {
+    const { replay } = this, where = replay.swinging ? [`Shown: ${replay.title}.`] : []
+    return this.scene.picture({ ...caption, lines: [...where, ...caption.lines] })
+  }
+
   // Playing
 
   get playing() { return this.playback.running }

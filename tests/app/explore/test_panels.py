@@ -518,6 +518,10 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     np.testing.assert_allclose(column["f_n [mean]"], replay.normal[3], rtol=1e-6)
     assert np.all(column["f_n_low [mean]"] <= column["f_n_seen_low [mean]"] + 1e-6)
     assert np.all(column["f_n_seen_high [mean]"] <= column["f_n_high [mean]"] + 1e-6)
+    gap = state.exact["interval_gap"].values[:, 0, 0]
+    zero = np.abs(state.exact["low"].values[:, 0] / replay.force_scale) <= gap
+    assert zero.any() and not column["f_n_low [mean]"][zero].any()
+    assert "-0" not in {cell for line in table[1:] for cell in line.split(",")}
     packing = state.library.packing(state.cell.params["packing"])
     place = column["contact"].astype(int)
     np.testing.assert_array_equal(column["i"], packing.contacts.i[place])
@@ -609,7 +613,7 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
     away = np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4])
     state.looks.frame = int(np.argmax(away))
     head, played = table()  # of another network, which ignores the held force as on screen
-    assert "a network of all of S: it ignores the held forces" in head
+    assert f"of {STATES}, which ignores the held forces" in head
     shown = state.replay.normal[state.looks.frame]
     np.testing.assert_allclose(played["f_n [mean]"], shown, rtol=1e-6)
     assert abs(shown[4] - played["f_n_low [mean]"][4]) > 0.01
@@ -782,7 +786,9 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     assert all(offered("known"))
     assert ">interval ΔFₙ, seen</option>" in player.legend
     wait_for(state)
-    assert ">interval ΔFₙ, exact</option>" in player.legend  # the colours are of the exact ones now
+    assert ">interval ΔFₙ, exact given the held forces</option>" in player.legend
+    state.knowledge.release(3)
+    assert ">interval ΔFₙ, exact</option>" in player.legend
     player.colour = "known"  # chosen in the legend
     assert state.looks.colour == "known"
     state.knowledge.release(3)

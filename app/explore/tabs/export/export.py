@@ -10,7 +10,7 @@ import panel as pn
 import xarray as xr
 
 from ....background.jobs import Job, reading
-from ....packing.captions import caption, known_words, origin, stem
+from ....packing.captions import caption, known_words, network, origin, shown_stem, stem
 from ....packing.view import measured, pins, reduction
 from ....results import planes
 from ....results.compute import computed_anew, thrust
@@ -30,15 +30,14 @@ class Snapshot:
         self.library, self.cell, self.replay = state.library, state.cell, state.replay
         self.exact, self.possible = state.exact, state.possible
         self.view, self.link, self.command = state.view, state.link(), state.command
-        self.stem = stem(state.cell.selection)
+        self.stem, self.shown_stem = stem(state.cell.selection), shown_stem(state)
         self.known, self.source = list(known_words(state)), origin(state.cell)
         frame = min(state.looks.frame, len(self.replay.normal) - 1)
         held, knowledge = state.hand.held, state.knowledge
         self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
-        network = files.on_screen(self.replay, frame, held, bool(knowledge.known))
         self._head = files.explained(
-            self._columns, self.replay, self.source, network, *known_words(state, MOST_KNOWN),
-            files.bounds_of(knowledge), f"This view: ?{self.link}",
+            self._columns, self.replay, self.source, network(state),
+            *known_words(state, MOST_KNOWN), files.bounds_of(knowledge), f"This view: ?{self.link}",
         )  # fmt: skip
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)
@@ -50,8 +49,9 @@ class Snapshot:
         }
 
     def file(self, ending: str, mime: str, content: bytes) -> File:
-        """A file named after the packing."""
-        return File(f"{self.stem}.{ending}", mime, content)
+        """A file named after the packing, and after the network on screen if it depends on it."""
+        stem = self.shown_stem if ending in OF_THE_NETWORK else self.stem
+        return File(f"{stem}.{ending}", mime, content)
 
     def csv(self, job: Job) -> File:
         """A table of the contacts."""
@@ -120,14 +120,15 @@ GROUPS = {
         "json": Kind("Parameters (JSON)", Snapshot.json),
     },
 }
+OF_THE_NETWORK = ("svg", "png", "csv", "html")  # kinds of files that show the network on screen
 FILES = {
     heading: {key: kind.words for key, kind in group.items()} for heading, group in GROUPS.items()
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the current view, including pulled and held forces. Pictures have a colour bar, a
-scale and a caption. The movie plays from the first network to the last, or back and forth between
-two, at the player's speed. The HTML page needs no server and no network connection.
+Each file shows the current view, including pulled and held forces; playing pauses. Pictures have a
+colour bar, scales and a caption. The movie plays from the first network to the last, or back and
+forth between two, at the player's speed. The HTML page needs no server and no network connection.
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
 if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
 columns. States: the packing and <b>all</b> states with their measures, units and parameters; states
@@ -160,8 +161,9 @@ class View:
         if state.replay is None:
             state.work.message = "Nothing is on screen yet."
         elif kind.make is None:
-            name = f"{stem(state.cell.selection)}.{key}"
-            self.buttons.hand_over_picture(name, caption(state))
+            whole = stem(state.cell.selection)
+            name = f"{shown_stem(state) if key in OF_THE_NETWORK else whole}.{key}"
+            self.buttons.hand_over_picture(name, caption(state, moving=key == "webm"))
         else:
             task = self.making if kind.long else self.task
             task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)

@@ -89,7 +89,11 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     if order:
         most = ", ".join(f"{LINK.format(c, number[c])} (by {short[c]:.2f})" for c in order)
         text += f" Shortened most: contacts {most}."
-    return text + " Networks that are played are from all of S and ignore the held forces; pulled ones obey them."
+    return (
+        text
+        + " Networks that are played are from all of S and ignore the held forces; pulled ones "
+        "obey them."
+    )
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
