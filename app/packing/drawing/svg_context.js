@@ -88,7 +88,7 @@ function wrapped(line) {
   const fits = (text) => context.measureText(text).width <= WIDE
   for (const word of line.match(/\S+\s*/g) ?? []) {
     if (fits(lines.at(-1) + word.trimEnd())) { lines[lines.length - 1] += word; continue }
-    if (lines.at(-1)) lines.push("")
+    if (lines.at(-1) && fits(word.trimEnd())) lines.push("")
     for (const letter of word) {
       if (!fits(lines.at(-1) + letter.trimEnd())) lines.push("")
       lines[lines.length - 1] += letter
