@@ -507,3 +507,33 @@ def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
     (force,) = re.findall(r"width: ([\d.]+) ⟨fₙ⟩", text)
     (drawn,) = re.findall(r'width="40" height="([\d.]+)"', text)
     assert float(drawn) == pytest.approx(float(force) * 0.23 * 50)
+
+
+def test_a_pull_is_back_after_a_push(run):
+    """The network of before, at its place on the track, as nobody had pushed."""
+    shown, told = run(
+        "packing/hand/push_animation",
+        """({ Pushed }) => {
+            const shown = [], told = [], nothing = () => {}
+            const walk = { contacts: 1, normal: new Float32Array([1, 2]) }
+            const player = {
+                pushable: true, live: {}, model: { frame: 1 }, look: {}, say: nothing,
+                scene: { drawMarks: nothing, style: null }, sway: { take: nothing },
+                replay: { walk, held: { normal: [3] }, position: 1 },
+                show: (to, tell = true) => { shown.push([to, tell]); player.replay.position = to },
+                hand: {
+                    show: (held) => { player.replay.held = held },
+                    forget: () => { player.replay.held = null },
+                    tell: (message) => told.push(message),
+                },
+            }
+            const pushed = new Pushed(player)
+            const path = { values: [0, 1], normal: [1, 2], tangential: [0, 0], residual: [0, 0] }
+            pushed.take(path, 0.5, 0.5)
+            pushed.leave()
+            pushed.leave()
+            return [shown, told]
+        }""",
+    )
+    assert shown == [[0, False], [1, False]]  # the server never hears of another network
+    assert told == [{"anew": True}]

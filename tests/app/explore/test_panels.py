@@ -573,8 +573,11 @@ def test_every_button_hands_a_file_over(state):
         assert all(listed(TO_BROWSER, "Handover", given) for given in handed), key
         (file,) = (given for given in handed if "name" in given)
         assert "/" not in file["name"], key
+        assert ("_network0." in file["name"]) == (key in ("svg", "png", "csv", "html")), key
         drawn = key in ("svg", "png", "webm")  # by the browser
         assert file["caption"]["lines"] if drawn else file["content"][300:]
+        lines = file.get("caption", {}).get("lines", [])
+        assert ("Network as packed." in lines) == (key in ("svg", "png"))
     assert len(keys) == 9
 
 
@@ -641,6 +644,9 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
     numbers = view.numbers.object
     assert "F<sub>crit</sub>" in numbers and between(pushed.low, pushed.high) in numbers
+    assert view.load.limit == pushed.limit
+    apart = 100 * (1 - pushed.high / pushed.limit)
+    assert ("up to the limit load" if apart >= 1 else "only at the limit load") in numbers
     assert f"{pushed.limit:.4g}" in numbers and len(view.plots.objects) == 1
     assert f"{pushed.opened} contacts open" in view.lead.object
     assert state.displacement is None  # before the slider is at its end
@@ -897,6 +903,14 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
     assert b"bk-" in page and b"ofAnotherPage" not in page
+
+
+def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
+    state.knowledge.hold(4, float(state.replay.normal[0, 4]))
+    wait_for(state)
+    page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
+    assert "interval, exact given the held forces" in page and "interval, seen" not in page
+    assert "interval ΔFₙ, exact given the held forces" in page
 
 
 def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):

@@ -28,12 +28,13 @@ class Snapshot:
 
     def __init__(self, state: AppState) -> None:
         self.library, self.cell, self.replay = state.library, state.cell, state.replay
-        self.exact, self.possible = state.exact, state.possible
+        self.exact = state.exact
         self.view, self.link, self.command = state.view, state.link(), state.command
         self.stem, self.shown_stem = stem(state.cell.selection), shown_stem(state)
         self.known, self.source = list(known_words(state)), origin(state.cell)
         frame = min(state.looks.frame, len(self.replay.normal) - 1)
         held, knowledge = state.hand.held, state.knowledge
+        self.narrowed = knowledge.narrowed
         self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
         self._head = files.explained(
             self._columns, self.replay, self.source, network(state),
@@ -91,8 +92,8 @@ class Snapshot:
                 shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
         job.begin("making the page")
         content = standalone.html(
-            self.library, self.cell, self.replay, self.possible, shown, view=self.view,
-            outlined=outlined, link=self.link, command=self.command,
+            self.library, self.cell, self.replay, self.exact, shown, view=self.view,
+            outlined=outlined, narrowed=self.narrowed, link=self.link, command=self.command,
             source=" ".join([self.source, *self.known]),
         )  # fmt: skip
         return self.file("html", "text/html", content)

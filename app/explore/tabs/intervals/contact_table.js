@@ -14,7 +14,7 @@ const interval = (of) => [
 const GROUPS = [
   ["", [
     ["contact", (on, c) => on.walk.backbone[c], (number, on, c) => `${number}${on.known.has(c) ? " held" : ""}`],
-    ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
+    ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join("–")],
   ]],
   ["on screen", [
     ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
