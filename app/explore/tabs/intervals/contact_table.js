@@ -32,8 +32,8 @@ export function render({ model, view }) {
     <div class="filters">
       <label>number of contact or grain <input class="find" inputmode="numeric"></label>
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
-      <span class="pages"><button type="button" class="soft back">previous ${ROWS}</button>
-        <button type="button" class="soft on">next ${ROWS}</button></span>
+      <span class="pages"><button type="button" class="soft earlier">previous ${ROWS}</button>
+        <button type="button" class="soft later">next ${ROWS}</button></span>
     </div>
     <p class="status" role="status"></p>
     <div class="frame"><table><thead></thead><tbody></tbody></table></div>`
@@ -64,8 +64,8 @@ export function render({ model, view }) {
     from = Math.min(from, ROWS * Math.floor(Math.max(0, matching.length - 1) / ROWS))
     shown = matching.slice(from, from + ROWS)
     part(".pages").hidden = matching.length <= ROWS
-    part(".back").disabled = from === 0
-    part(".on").disabled = from + ROWS >= matching.length
+    part(".earlier").disabled = from === 0
+    part(".later").disabled = from + ROWS >= matching.length
     part(".status").textContent = `${matching.length} of ${all.length} contacts` +
       (matching.length > ROWS ? `, rows ${from + 1} to ${from + shown.length} are shown` : "") +
       `; forces in mean forces; seen: in ${on.walk.room ? "the networks so far" : `all ${on.walk.states} networks`}; ` +
@@ -127,8 +127,8 @@ export function render({ model, view }) {
     event.stopPropagation()
   })
   for (const name of [".find", ".least"]) part(name).addEventListener("input", fill)
-  part(".back").addEventListener("click", () => turn(-ROWS))
-  part(".on").addEventListener("click", () => turn(ROWS))
+  part(".earlier").addEventListener("click", () => turn(-ROWS))
+  part(".later").addEventListener("click", () => turn(ROWS))
   root.addEventListener("toggle", () => {
     const on = player()
     model.open = root.open
