@@ -171,7 +171,7 @@ TERMS = {
         "The pair of opposite forces on one contact, increased from zero, at which the disks "
         "start to move. It never exceeds the limit load; it is smaller where balanced networks "
         "still exist but friction does not build one up on the way.",
-        "Fᶜʳⁱᵗ",
+        "F_crit",
     ),
     "alpha": Term(
         "decay exponent",

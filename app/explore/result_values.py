@@ -73,6 +73,9 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     summary = state.shown.summary
     unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
     h, phi = summary["dimension"], summary["packing_fraction"]
+    free, held = f"{h} = {unknowns} − {unknowns - h}", state.knowledge.whole
+    if held is not None:
+        free = f"{h} → {held.dimension[1]} given the held forces"
     each = worded(state.shown, "contacts per disk")
     values = (
         ""
@@ -83,7 +86,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
         Quantity("z", "z", each, exact=f"{summary['coordination']:.3f}"),
         Quantity("phi", "φ", "packing fraction", exact="–" if math.isnan(phi) else f"{phi:.4f}"),
         Quantity(
-            "h", "h", "free dimensions", exact=f"{h} = {unknowns} − {unknowns - h}",
+            "h", "h", "free dimensions", exact=free,
             note="forces minus independent equations",
         ),
         Quantity("volume", "ln V", "volume of S", exact=values),

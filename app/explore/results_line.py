@@ -75,7 +75,8 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     known = " given the held forces" if state.knowledge.known else ""
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
-    heading = f"seen in all {state.replay.summary['states']} networks"
+    count = f"{state.replay.summary['states']} networks"
+    heading = f"seen in all of S ({count})" if known else f"seen in all {count}"
     if sampling and sampling.verdict:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]

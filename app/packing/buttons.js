@@ -39,7 +39,9 @@ const BUTTONS = `
     <div class="bar tools">
       ${button("undo", "the last pull (Z); Esc releases all", "Undo")}
       <span class="hold-tools">
-        ${button("hold", "hold the selected contact at its present force (H); press again to release it", "Hold")}
+        <label title="normal force of the selected contact, in mean forces; enter a value to pull it there">fₙ
+          <input class="force" type="number" min="0" step="any" aria-label="normal force of the selected contact, in mean forces"></label>
+        ${button("hold", "hold the selected contact at this force (H); press again to release it", "Hold")}
         <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
           <input class="uncertainty" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
       </span>
@@ -65,6 +67,7 @@ const BUTTONS = `
   <div class="game">Made: <span class="source"></span></div>
   <div class="skips" data-term="segment" tabindex="0"></div>
   </details><div class="message" role="status"></div></div>`
+const HALF_DIGIT = 5e-4 // of the last digit of a force
 const CLOSER = 0.7 // zoom factor of a button
 
 export class Buttons {
@@ -95,6 +98,12 @@ export class Buttons {
     })
     const extras = this.part("extras")
     extras.addEventListener("toggle", () => open("check", extras.open))
+    const force = this.part("force")
+    force.addEventListener("input", () => { this.typed = true })
+    force.addEventListener("change", () => {
+      this.typed = !force.validity.valid // stays to be corrected
+      actions.pull()
+    })
     this.part("uncertainty").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
   }
 
@@ -108,8 +117,27 @@ export class Buttons {
     return typed >= 0 ? typed : NaN
   }
 
-  /** Whether a contact is selected, so that its force can be held. */
-  tellChosen(chosen) { this.root.classList.toggle("chosen", Boolean(chosen)) }
+  /** Whether a contact is selected, so that its force can be held, and whether it is. */
+  tellChosen(chosen, held) {
+    this.root.classList.toggle("chosen", Boolean(chosen))
+    this.part("hold").classList.toggle("on", held)
+    this.part("hold").querySelector("span").textContent = held ? "Release" : "Hold"
+    this.part("force").disabled = held
+  }
+
+  /** Show the force of the selected contact and its bounds, unless another value is being typed. */
+  showForce(value, [low, high]) {
+    const field = this.part("force")
+    field.min = low - HALF_DIGIT
+    field.max = high + HALF_DIGIT
+    if (!this.typed) field.value = value.toFixed(3)
+  }
+
+  /** The typed force of the selected contact; NaN if it is outside its bounds. */
+  get force() {
+    const field = this.part("force")
+    return field.validity.valid ? field.valueAsNumber : NaN
+  }
 
   tellPlaying(playing) {
     this.bar.showPlaying(playing)

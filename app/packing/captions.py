@@ -3,20 +3,22 @@
 from collections.abc import Iterator
 from typing import Any
 
+from ..results.geometry import CHAIN_WIDTH
 from ..results.library import Cell
 from ..results.selection import Selection
 from ..state.app_state import AppState
 from ..state.view_settings import WIDTHS
-from .view import colour_bar, colour_words, quantities
+from .view import colour_bar, colours, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
+PACKED = "network as packed"
 NAMED = 4  # known forces in a caption
 
 
-def caption(state: AppState) -> dict[str, Any]:
-    """The caption of a picture: background, colour bar, scale and words."""
-    pulled, looks = bool(state.hand.pulls), state.looks
-    low, stops, high = colour_bar(state, pulled)
+def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
+    """The caption of a picture: background, colour bar, scale and words; moving: of a movie."""
+    looks, pulled = state.looks, "pull" if state.hand.pulls else ""
+    low, stops, high = colour_bar(state)
     contrast = "#f2f5f9" if looks.dark else "#18191d"
     return {
         "background": GROUND[looks.dark],
@@ -24,12 +26,28 @@ def caption(state: AppState) -> dict[str, Any]:
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
-            f"colour: {colour_words(state, pulled)}.",
+            f"colour: {colours(state, pulled)[looks.colour]}.",
             origin(state.cell),
+            *([] if moving else [f"{network(state)}."]),
             *known_words(state),
             f"granforce ?{state.link()}",
         ],
+        "width": CHAIN_WIDTH * looks.stretch,  # of a force ⟨f_n⟩, in `unit` of the picture
     }
+
+
+def network(state: AppState) -> str:
+    """The network on screen, in words, and whether it has the held forces."""
+    number, known = _number(state), state.knowledge.known
+    words = f"network {number} of {state.replay.summary['states']}" if number else PACKED
+    if state.hand.held is not None:
+        return f"Pulled by hand from the {words}" + (", with the held forces" if known else "")
+    return f"{words.capitalize()}, which ignores the held forces" if known else words.capitalize()
+
+
+def _number(state: AppState) -> int:
+    frame = min(state.looks.frame, len(state.replay.number) - 1)
+    return int(state.replay.number[frame])
 
 
 def origin(cell: Cell) -> str:
@@ -44,6 +62,12 @@ def known_words(state: AppState, most: int = NAMED) -> Iterator[str]:
     if statements:
         more = f" and {len(statements) - most} more" if len(statements) > most else ""
         yield f"Held: {'; '.join(statements[:most])}{more}."
+
+
+def shown_stem(state: AppState) -> str:
+    """A file name without suffix that also names the network on screen."""
+    pulled = "_pulled" if state.hand.held is not None else ""
+    return f"{stem(state.cell.selection)}_network{_number(state)}{pulled}"
 
 
 def stem(selection: Selection) -> str:

@@ -88,7 +88,7 @@ class Player {
   /** Apply the open tab's settings to the packing. */
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
-    if (!this.pushable) this.pushed.end()
+    if (!this.pushable) this.pushed.leave()
   }
 
   /** Whether force space is in view, where the point is what can be dragged first. */
@@ -107,7 +107,7 @@ class Player {
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
     this.hand.settle()
-    this.tellHeld(false)
+    this.tellHeld("")
     this.pushed.end()
     this.tellTab()
     scene.mixed = this.replay.mixed
@@ -184,15 +184,23 @@ class Player {
   }
 
   select() {
-    this.buttons.tellChosen(this.scene.hand && (this.model.contact ?? null) !== null)
-    this.scene.selected = this.model.contact ?? null
+    const contact = this.model.contact ?? null
+    this.buttons.tellChosen(this.scene.hand && contact !== null, this.pins.has(contact))
+    this.scene.selected = contact
+    this.tellForce()
     this.scene.pair = (this.points || this.model.wide) ? this.plots.plane.pair ?? [] : []
   }
 
-  /** Show the selection. */
-  mark() {
+  tellForce() {
+    const { selected } = this.scene
+    if (selected !== null) this.buttons.showForce(this.replay.mixed.normal[selected], this.look.boundsOf(selected))
+  }
+
+  /** Mark the selection, or another contact. */
+  mark(contact = null) {
     if (!this.replay || this.live.moves) return
     this.select()
+    this.scene.selected = contact ?? this.scene.selected
     this.scene.drawMarks()
     this.split.paint()
   }
@@ -209,6 +217,7 @@ class Player {
     if (model.tab === "intervals") plots.show(replay, model.scale)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
+    this.tellForce()
     for (const listener of this.listeners) listener()
   }
 
@@ -243,19 +252,26 @@ class Player {
     const now = performance.now()
     if (now - this.playback.painted > PLOTS_MS) return this.paintPlots(now)
     this.buttons.read(this.replay)
+    this.tellForce()
     clearTimeout(this.late)
     this.late = setTimeout(() => this.paintPlots(), PLOTS_MS) // where the pointer has come to rest
   }
 
-  /** Report whether a pulled network is on screen, for the legend. */
-  tellHeld(held) {
-    this.buttons.tellHeld(held)
-    if (this.pulled !== held) this.model.pulled = this.pulled = held // reading a model is slow
+  /** Report what led to the network on screen, for the legend: "pull", "push" or "". */
+  tellHeld(by) {
+    this.buttons.tellHeld(by === "pull")
+    if (this.pulled !== by) this.model.pulled = this.pulled = by // reading a model is slow
   }
 
   again() {
     this.split.show()
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
+  }
+
+  /** The packing as SVG text; between two compared networks, its caption says where. */
+  picture(caption) {
+    const { replay } = this, where = replay.swinging ? [`Shown: ${replay.title}.`] : []
+    return this.scene.picture({ ...caption, lines: [...where, ...caption.lines] })
   }
 
   // Playing
@@ -322,7 +338,8 @@ class Player {
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
-    this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
+    if (!known && Number.isNaN(this.buttons.force)) return this.hand.refuse()
+    this.tell({ known: known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] } })
   }
 
   /** Begin or end the motion to and fro between the pinned state and this one. */
@@ -363,8 +380,8 @@ class Player {
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       thrust: loaded(() => { this.thrust = plain(model.thrust); scene.drawMarks() }),
-      pins: loaded(() => { this.recover(); scene.drawMarks() }),
-      contact: loaded(() => { this.recover(); this.mark() }),
+      pins: loaded(() => { this.recover(); this.mark() }),
+      contact: loaded(() => { this.recover(); buttons.typed = false; this.mark() }),
     }
   }
 

@@ -163,7 +163,7 @@ class PackingView:
         self.player.displacement = flat
 
     def _explain(self, *events: Any) -> None:
-        pulled = self.player.pulled or bool(self.state.hand.pulls)
+        pulled = self.player.pulled or ("pull" if self.state.hand.pulls else "")
         thrust = THRUST if self.player.thrust else ""
         self.player.param.update(
             legend=JAMMING if self.state.work.moving else legend(self.state, pulled) + thrust,
@@ -175,6 +175,7 @@ def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
     return {
         "contacts": [one.contact for one in knowledge.known],
         "exact": [not one.error for one in knowledge.known],
+        "words": [one.force for one in knowledge.known],
         "ranked": [] if knowledge.ranked is None else knowledge.ranked.contacts.tolist(),
     }
 
@@ -243,14 +244,12 @@ def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> f
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
-def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
+def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
     change = f"≤ −{full:.3g}", diverging, f"≥ +{full:.3g} ⟨fₙ⟩"
-    if pulled:
-        return change
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
         "mobilised": ("−1", diverging, "+1 (slides)"),
@@ -266,12 +265,13 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
 def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
     """Labels {name: words}, COLOURS or WIDTHS; those of intervals say whether they are exact."""
     exact = exact_intervals(state.possible, state.shown)
-    return labels | {"extent": f"{labels['extent']}, {'exact' if exact else 'seen'}"}
+    return labels | {"extent": f"{labels['extent']}, {state.bounds if exact else 'seen'}"}
 
 
-def colour_words(state: AppState, pulled: bool) -> str:
-    """The present meaning of colours."""
-    return "change by the pull" if pulled else quantities(state, COLOURS)[state.looks.colour]
+def colours(state: AppState, pulled: str) -> dict[str, str]:
+    """The labels of COLOURS; pulled: "pull" or "push" if that led to the network on screen."""
+    change = {"change": f"change by the {pulled}"} if pulled else {}
+    return quantities(state, COLOURS | change)
 
 
 def _full(looks: Looks, most: float) -> str:
@@ -286,31 +286,28 @@ def _largest(loads: Floats | None, full: float | None) -> str:
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
 
 
-def legend(state: AppState, pulled: bool = False) -> str:
+def legend(state: AppState, pulled: str = "") -> str:
     """The present meaning of width and colour, as HTML."""
     looks, replay = state.looks, state.shown
     if replay is None:
         return ""
-    low, stops, high = colour_bar(state, pulled)
+    low, stops, high = colour_bar(state)
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
-    if looks.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
+    if looks.colour == "mobilised" and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
+    if looks.colour == "known" and state.knowledge.narrowed is None:
         bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
-    meaning = colour_words(state, pulled)
-    if pulled and looks.tab == "perturb" and not state.hand.pulls:
-        meaning = "change by the push"
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
     return worded(replay, LEGEND).format(
-        width=_chosen(state, "thickness", WIDTHS),
+        width=_chosen(state, "thickness", quantities(state, WIDTHS)),
         shown=shown,
         high=6 + 6 * shown / widest,
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=meaning if pulled else _chosen(state, "colour", COLOURS),
+        colour=_chosen(state, "colour", colours(state, pulled)),
         bar=bar,
         full="" if looks.full is None else f"{looks.full:g}",
         full_least=full_least,
@@ -335,7 +332,7 @@ def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, 
 def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     """A list of the quantities that lines can show, as HTML; the player handles the choice."""
     value = getattr(state.looks, name)
-    available = meaningful(state, quantities(state, labels), name)
+    available = meaningful(state, labels, name)
     options = "".join(
         f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
         for key, words in available.items()

@@ -23,7 +23,7 @@ def csv(columns: Columns, head: str = "") -> bytes:
     whole = [np.issubdtype(values.dtype, np.integer) for values in columns.values()]
     np.savetxt(
         file,
-        np.column_stack(list(columns.values())),
+        np.column_stack(list(columns.values())) + 0.0,  # no −0
         fmt=["%d" if w else "%.9g" for w in whole],
         delimiter=",",
         header=",".join(columns),

@@ -135,6 +135,11 @@ class AppState(param.Parameterized):
         narrowed = self.knowledge.narrowed
         return self.exact if narrowed is None else narrowed.after
 
+    @property
+    def bounds(self) -> str:
+        """The kind of the bounds in `possible`, in words."""
+        return "exact" if self.knowledge.narrowed is None else "exact given the held forces"
+
     def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue again; show what was just computed."""
         if shown is not None:

@@ -41,10 +41,14 @@ class Statement(NamedTuple):
     value: float
     error: float = 0.0
 
+    @property
+    def force(self) -> str:
+        """The force and its error bar, in ⟨f_n⟩."""
+        return f"{self.value:.3f} ± {self.error:.3g}" if self.error else f"{self.value:.3f}"
+
     def words(self, number: int) -> str:
         """The statement in words, with the contact's number in the packing."""
-        bar = f" ± {self.error:.3g}" if self.error else ""
-        return f"contact {number}: fₙ = {self.value:.3f}{bar} × the mean force"
+        return f"contact {number}: fₙ = {self.force} × the mean force"
 
 
 class Narrowed(NamedTuple):
@@ -222,10 +226,10 @@ class Knowledge(param.Parameterized):
                 "network: holding it would add no information"
             )
         if not low - INWARD * width <= value <= high + INWARD * width:
+            allow = "the held forces allow" if self.known else "balance allows"
             raise InputError(
-                f"fₙ of contact {number} is {value:.3f} × the mean force on screen, but the held "
-                f"forces allow {low:.3f} to {high:.3f}: pull it there first, or release another "
-                "force"
+                f"fₙ of contact {number} cannot be {value:.3f} × the mean force: {allow} "
+                f"{low:.3f} to {high:.3f}"
             )
         inside = np.clip(value, low + INWARD * width, high - INWARD * width)
         return Statement(contact, _rounded(inside))

@@ -15,6 +15,7 @@ from granforce.study.responses import moved_grains
 from granforce.types import Floats
 
 from ..background.jobs import Job
+from ..results import geometry
 from ..results.compute import load_or_compute
 from ..results.distributions import Row, alike, rows
 from ..results.library import Cell, Library, readable
@@ -34,7 +35,10 @@ class Loads(NamedTuple):
 
 
 class Pushed(NamedTuple):
-    """The effect of a force pair that pushes the grains of one contact apart. Forces in ⟨f_n⟩."""
+    """The effect of a force pair that pushes the grains of one contact apart.
+
+    Forces are in ⟨f_n⟩, lengths in `geometry.unit`.
+    """
 
     limit: float  # limit load
     low: float  # F_crit: largest load at rest
@@ -46,12 +50,12 @@ class Pushed(NamedTuple):
         str, Any
     ]  # networks under loads from 0 to `low`, nearest to the original, for scripts
     displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
-    distance: Floats  # (k,) of the backbone's grains from the contact, length
+    distance: Floats  # (k,) of the backbone's grains from the contact
     size: Floats  # (k,) |u| of those grains
-    radius: Floats  # (shells,) length
+    radius: Floats  # (shells,)
     profile: Floats  # (shells,) mean |u|
     exponent: float  # α of |u| ~ r^−α for this contact alone
-    fit: tuple[float, ...]  # smallest and largest r of its fit, length
+    fit: tuple[float, ...]  # smallest and largest r of its fit
     spread: tuple[float, float]  # α of other ranges of r; NaN where no fit is possible
 
 
@@ -109,6 +113,7 @@ def _pushed(dataset: xr.Dataset, packing: Packing, under: Any) -> Pushed:
 
     u = dataset["displacement"].values[0]
     distance, size = moved_grains(packing, dataset)
+    length = geometry.unit(packing)
     return Pushed(
         limit=force("limit_load"),
         low=force("critical_low"),
@@ -118,12 +123,12 @@ def _pushed(dataset: xr.Dataset, packing: Packing, under: Any) -> Pushed:
         kept=count("kept"),
         path=path(under, scale),
         displacement=np.nan_to_num(u),
-        distance=distance,
+        distance=distance / length,
         size=size,
-        radius=dataset["shell_radius"].values,
+        radius=dataset["shell_radius"].values / length,
         profile=dataset["profile"].values[0],
         exponent=dataset["decay_exponent"].item(),
-        fit=tuple(json.loads(dataset.attrs["fit_range"])),
+        fit=tuple(r / length for r in json.loads(dataset.attrs["fit_range"])),
         spread=_range(dataset["fit_exponent"].values),
     )
 

@@ -180,6 +180,7 @@ class Hand(param.Parameterized):
         self.held = networks[-1][1] if networks else None
         if refusal:
             self.pulls = [pull for pull, _ in networks]
+            self.tell({"rail": None})
             self.work.message = refusal  # set last, because observers of the pulls would clear it
             return
         if ready is not None:

@@ -24,16 +24,22 @@ export function render({ model, view }) {
     for (const [heading, files] of Object.entries(plain(model.files))) {
       const group = document.createElement("section")
       if (heading) group.append(createElement("h4", { textContent: heading }))
-      for (const [key, words] of Object.entries(plain(files))) group.append(button(words, () => ask(model, view, { key }), { className: `soft ${key}` }))
+      for (const [key, words] of Object.entries(plain(files))) group.append(button(words, () => request(key), { className: `soft ${key}` }))
       root.append(group)
     }
+  }
+
+  /** Request a file of the network at which a player in motion comes to rest. */
+  function request(key) {
+    if (player().playing) player().play(false)
+    ask(model, view, { key })
   }
 
   const player = () => view.model.document.get_model_by_name("player").player
 
   /** The packing as on screen, drawn by the player, the only place that can do it. */
   function drawn(caption) {
-    return new Blob([player().scene.picture(caption)], { type: "image/svg+xml" })
+    return new Blob([player().picture(caption)], { type: "image/svg+xml" })
   }
 
   /** A movie of the animation, from the first state to the last, or once to and fro. */
@@ -110,7 +116,7 @@ export function render({ model, view }) {
 
   /** Packing and plots as one figure, to save or print. */
   async function together({ name, width }, caption) {
-    const plots = await plotsSeen(view.model.document), packing = player().scene.picture(caption)
+    const plots = await plotsSeen(view.model.document), packing = player().picture(caption)
     const figure = composed(packing, plots, width, caption.background)
     if (name.endsWith(".pdf")) printFigure(figure, width)
     else save(new Blob([figure.text], { type: "image/svg+xml" }), name)

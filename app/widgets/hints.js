@@ -56,7 +56,7 @@ export function render({ model }) {
     at = node
     tip.replaceChildren(...keys.filter((key) => terms[key]).map((key) => {
       const [title, sentence] = plain(terms[key]), row = document.createElement("p")
-      row.append(createElement("b", { textContent: title }), ` ${sentence}`)
+      row.append(createElement("b", { innerHTML: title.replace(/_(\w+)/, "<sub>$1</sub>") }), ` ${sentence}`)
       return row
     }))
     if (!node.ariaDescription) node.setAttribute("aria-description", tip.textContent)

@@ -704,8 +704,11 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
     view = PackingView(state)
     assert "change since packed</option>" in view.player.legend
-    view.player.pulled = True
-    assert "change by the pull" in view.player.legend
+    for by in ("pull", "push"):
+        view.player.pulled = by
+        assert f'value="change" selected>change by the {by}</option>' in view.player.legend
+    state.looks.colour = "extent"
+    assert '<option value="extent" selected' in view.player.legend  # and can still be chosen
 
 
 def test_what_is_refused_does_not_stay_in_its_box(state):

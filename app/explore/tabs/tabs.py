@@ -118,7 +118,7 @@ class Tabs:
             if name == "plane":
                 pieces.insert(0, pn.pane.HTML(SPACE, stylesheets=[HEADING], margin=0))
             if name in PLOTTED and not (name == "plane" and self.looks.wide):  # there once
-                pieces.append(figure.panel(self.state))
+                pieces.append(figure.panel(self.state, TABS[name][0].lower().replace(" ", "_")))
             # Choices first, then two at a time: Bokeh processes everything at each step.
             queued = []
             for k in range(-1, len(pieces), 2):

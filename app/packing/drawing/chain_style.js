@@ -31,10 +31,17 @@ export class Look {
     this.reduction = model.reduction?.length === walk.contacts ? model.reduction : null // reduction of ΔFₙ by known forces
   }
 
+  /** The kinds of the intervals, in words: exact bounds obey held forces, networks do not. */
+  get bounds() { return this.reduction ? "exact given the held forces" : "exact" }
+  get seen() { return this.reduction ? "seen in all of S" : "seen" }
+
+  /** Least and largest possible fₙ of a contact, as far as known. */
+  boundsOf(c) { return this.exact ? [this.exact.low[c], this.exact.high[c]] : [0, Infinity] }
+
   /** The style of these forces, for the scene. */
   of(mixed) {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
-    const colour = this.before ? "pulled" : model.colour
+    const colour = this.before && model.colour === "change" ? "pulled" : model.colour
     // Reading the model is slow.
     this.settings = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
     this.settings.load = full ?? this.mostLoad
@@ -46,7 +53,7 @@ export class Look {
     for (let c = 0; c < style.lean?.length; c++) style.lean[c] = mixed.normal[c] > CARRYING ? mixed.tangential[c] / mixed.normal[c] : 0
     const coloured = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.reduction) &&
       (colour !== "deviation" || this.measured)
-    style.colours = coloured ? palettes[this.before ? "change" : colour] : [palettes.neutral]
+    style.colours = coloured ? palettes[model.colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
       style.bin[c] = coloured ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
@@ -99,8 +106,10 @@ export class Look {
       ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
-    if (exact) rows.push(["interval of fₙ, exact", interval(exact.low[c], exact.high[c])])
-    if (walk.number.length > 1) rows.push(["interval of fₙ, seen", interval(walk.low[c], walk.high[c])])
+    const pins = plain(this.model.pins ?? {}), pin = [...(pins.contacts ?? [])].indexOf(c)
+    if (pin >= 0) rows.push(["held at", pins.words[pin]])
+    if (exact) rows.push([`interval of fₙ, ${this.bounds}`, interval(exact.low[c], exact.high[c])])
+    if (walk.number.length > 1) rows.push([`interval of fₙ, ${this.seen}`, interval(walk.low[c], walk.high[c])])
     return rows
   }
 

@@ -3,7 +3,9 @@
 export const PIXELS = 900 // of the picture's side
 const BELOW = 60 // pixels from the picture to the first line of its caption
 const LINE = 21 // pixels
-const MOST = 116 // letters of a line
+const FONT = { family: "Helvetica, Arial, sans-serif", size: 15 }
+const WIDE = PIXELS - 24 // pixels of a line of the caption
+const THICK = 16 // pixels, most of the line that shows the width of a force
 const SCALE_LENGTH = 5 // of the scale, in largest radii
 
 const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
@@ -53,15 +55,15 @@ export class Sheet {
   clearRect() {}
 
   /** The drawing as text, with colour bar, scale and caption below. */
-  svg([left, right, bottom, top], { background, ink, bar, lines: told, unit, bodies }) {
-    const lines = told.flatMap(wrapped)
+  svg([left, right, bottom, top], { background, ink, bar, width, lines: told, unit, bodies }) {
+    const lines = told.flatMap(wrapped), scale = PIXELS / (right - left)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
     const element = ({ name, ...given }) =>
       `<${name} ${Object.entries(given).map(([key, value]) => `${key}="${written(value)}"`).join(" ")}/>`
     const full = PIXELS + BELOW + LINE * lines.length
     return [
       `<svg xmlns="http://www.w3.org/2000/svg" width="${PIXELS}" height="${full}" viewBox="0 0 ${PIXELS} ${full}"` +
-        ` font-family="Helvetica, Arial, sans-serif" font-size="15">`,
+        ` font-family="${FONT.family}" font-size="${FONT.size}">`,
       `<desc>${lines.map(safe).join(" ")}</desc>`,
       `<rect width="${PIXELS}" height="${full}" fill="${background}"/>`,
       `<svg width="${PIXELS}" height="${PIXELS}" viewBox="${left} ${-top} ${right - left} ${top - bottom}">`,
@@ -70,7 +72,8 @@ export class Sheet {
       "</svg>",
       `<g fill="${ink}">`,
       ...colourBar(bar),
-      ...scaleBar(PIXELS / (right - left), SCALE_LENGTH * unit, bodies),
+      ...widthBar(scale * unit * width),
+      ...scaleBar(scale, SCALE_LENGTH * unit, bodies),
       ...lines.map((line, k) => `<text x="12" y="${PIXELS + BELOW + LINE * k}">${safe(line)}</text>`),
       "</g>",
       "</svg>",
@@ -80,10 +83,16 @@ export class Sheet {
 
 /** Break a line into lines that fit, between words, or within a word that is too long. */
 function wrapped(line) {
-  const lines = [""]
-  for (const word of line.match(new RegExp(`\\S{1,${MOST}}\\s*`, "g")) ?? []) {
-    if ((lines.at(-1) + word.trimEnd()).length > MOST) lines.push("")
-    lines[lines.length - 1] += word
+  const context = document.createElement("canvas").getContext("2d"), lines = [""]
+  context.font = `${FONT.size}px ${FONT.family}`
+  const fits = (text) => context.measureText(text).width <= WIDE
+  for (const word of line.match(/\S+\s*/g) ?? []) {
+    if (fits(lines.at(-1) + word.trimEnd())) { lines[lines.length - 1] += word; continue }
+    if (lines.at(-1) && fits(word.trimEnd())) lines.push("")
+    for (const letter of word) {
+      if (!fits(lines.at(-1) + letter.trimEnd())) lines.push("")
+      lines[lines.length - 1] += letter
+    }
   }
   return lines.map((part) => part.trimEnd())
 }
@@ -100,6 +109,15 @@ function colourBar({ low, high, stops }) {
     `<text x="140" y="${PIXELS + 27}" text-anchor="end">${safe(low)}</text>`,
     `<rect x="148" y="${PIXELS + 14}" width="200" height="16" fill="url(#colours)"/>`,
     `<text x="356" y="${PIXELS + 27}">${safe(high)}</text>`,
+  ]
+}
+
+/** A line as wide as a round force; wide: pixels of the mean force. */
+function widthBar(wide) {
+  const force = [5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02].find((value) => value * wide <= THICK) ?? 0.01
+  return [
+    `<rect x="588" y="${PIXELS + 22 - (force * wide) / 2}" width="40" height="${force * wide}" opacity="0.65"/>`,
+    `<text x="634" y="${PIXELS + 27}">width: ${force} ⟨fₙ⟩</text>`,
   ]
 }
 

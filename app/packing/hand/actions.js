@@ -15,6 +15,7 @@ export function actions(player) {
     less: loaded(() => player.hand.nudge(-1)),
     more: loaded(() => player.hand.nudge(1)),
     hold: loaded((replay) => player.hold(replay)),
+    pull: loaded(() => player.hand.pullTo(player.buttons.force)),
     undo: loaded((replay) => { if (replay.held) player.hand.tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
     play: loaded(() => {

@@ -17,6 +17,7 @@ const KNOWN = "This force is held: release it (press H) before you pull it."
 const NUMBER_LINE = 14 // px, height of a line of numbers next to it
 const NUDGE = 1 / 40 // of a rail, per key press
 const REST = 600 // ms after the last key press until the force is released
+const ROUNDED = 1e-6 // in ⟨fₙ⟩, error of bounds in the page
 const LINGER = 1000 // ms for which its rail stays visible after release
 
 export class Grab {
@@ -26,6 +27,7 @@ export class Grab {
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
     this.moved = this.flung = false // whether it moved, and whether it was released before its rail arrived
+    this.aim = null // contact and value of a pull whose network has not arrived
     this.lingers = 0
     this.frames = 0
     this.spot = new PointHand(this)
@@ -125,6 +127,28 @@ export class Grab {
     this.resting = setTimeout(() => this.rest(), REST)
   }
 
+  /** Pull the selected contact to a value. */
+  pullTo(value) {
+    const { player } = this, { contact } = player.model
+    if (player.grows || this.active) return
+    if (Number.isNaN(value)) return this.refuse()
+    if (player.playing) player.play(false)
+    this.before = this.replay.mixed.normal.slice()
+    const [low, high] = player.look.boundsOf(contact) // of which `value` may have been rounded
+    this.aim = { contact, value: Math.max(low + ROUNDED, Math.min(high - ROUNDED, value)) }
+    this.tell({ hold: [contact, this.aim.value] })
+  }
+
+  /** The force of the selected contact, on screen or typed, is outside its bounds. */
+  refuse() {
+    const { model, look, replay } = this.player, [low, high] = look.boundsOf(model.contact).map((end) => end.toFixed(3))
+    const given = look.reduction ? " given the held forces" : ""
+    this.player.say(`Contact ${replay.walk.backbone[model.contact]} can bear ${low} to ${high} × the mean force${given}.`, true)
+  }
+
+  /** The value to which a contact is being pulled, until its network arrives. */
+  wanted(contact) { return this.aim?.contact === contact ? this.aim.value : null }
+
   rest() {
     if (this.rail) this.leave()
     else if (this.contact !== null) this.resting = setTimeout(() => this.rest(), REST)
@@ -137,6 +161,7 @@ export class Grab {
     this.spot.drop()
     if (!this.replay?.held) return
     this.tell({ free: true })
+    this.player.pushed.end()
     this.forget()
   }
 
@@ -144,7 +169,7 @@ export class Grab {
     if (this.replay) this.replay.held = null
     this.player.pushed.end()
     this.settle()
-    this.player.tellHeld(false)
+    this.player.tellHeld("")
     this.player.say("")
     this.player.again()
   }
@@ -159,6 +184,7 @@ export class Grab {
   // Messages from the server
 
   hear({ rail, fan, held }) {
+    this.aim = null
     if (rail !== undefined) this.ride(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))
     const pushed = !held && this.player.pushed.held // meanwhile it was no longer pulled
@@ -198,7 +224,7 @@ export class Grab {
     player.look.before = this.before
     if (held.pull.length > 2) this.spot.describe(...held.pull.slice(1))
     else this.describe(...held.pull)
-    player.tellHeld(true)
+    player.tellHeld("pull")
     player.again()
   }
 
@@ -214,7 +240,7 @@ export class Grab {
   show(held) {
     const { replay, player } = this
     replay.held = held
-    player.tellHeld(true)
+    player.tellHeld(held.place === "pushed" ? "push" : "pull")
     if (this.pendingFrame) return
     this.pendingFrame = requestAnimationFrame(() => {
       this.pendingFrame = 0
@@ -250,7 +276,7 @@ export class Grab {
       const { opened, sliding } = this.holding
       words += `, its ${end > 0 ? "largest" : "smallest"} value: it stops because ${opened.length} contacts opened ` +
         `and ${sliding.length} began to slide`
-    } else words += "; orange carries more than before, blue less"
+    }
     this.player.say(words)
   }
 

@@ -76,7 +76,7 @@ export class PointHand {
 
   describe(x, y) {
     this.hand.player.say(`The point in force space pulled to ` +
-      `(${x.toFixed(2)}, ${y.toFixed(2)}), in mean forces; orange carries more than before, blue less`)
+      `(${x.toFixed(2)}, ${y.toFixed(2)}), in mean forces`)
   }
 }
 

@@ -10,14 +10,23 @@ export class Pushed {
     this.end()
   }
 
-  /** Stop pushing. */
+  /** Stop pushing: the network of before is shown again, without its pulls. */
   end() {
     this.load = this.part = 0
     this.there = false // whether disks start to move
     const { player } = this, held = this.held
     this.held = null
     player.sway?.take(null)
-    if (held && player.replay?.held === held) player.hand.forget()
+    if (!held || player.replay?.held !== held) return
+    player.hand.forget()
+    player.show(player.model.frame, false)
+  }
+
+  /** Stop pushing; pulls are shown again. */
+  leave() {
+    const pushed = this.held
+    this.end()
+    if (pushed) this.player.hand.tell({ anew: true })
   }
 
   /** path: networks under loads up to the largest one with equilibrium; part: fraction of the longest arrow. */
@@ -25,14 +34,14 @@ export class Pushed {
     const { player } = this, { replay, scene } = player
     if (!player.pushable || player.live.moves || player.grows) return
     if (load > 0 && player.playing) player.play(false)
-    if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // a pulled network
     Object.assign(this, { load, part, there: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
     this.tellMotion()
     if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
-      if (this.held) this.end()
+      if (this.held) this.leave()
       return scene.style && scene.drawMarks()
     }
-    if (replay.position) player.show(0)
+    if (!this.held) player.say("") // about a pull
+    if (replay.position) player.show(0, false) // meanwhile, for the server, the network of before is on screen
     player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
     player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
   }

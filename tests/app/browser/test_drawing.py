@@ -1,5 +1,7 @@
 """Arithmetic of what the page draws, script by script: on a blank page, without a server."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -474,10 +476,64 @@ def test_the_scale_of_a_picture_is_a_round_length_of_bodies(run, unit, bodies, w
         """({ Sheet, PIXELS }, { unit, bodies }) => {
             const half = PIXELS / 200, window = [-half, half, -half, half]
             const bar = { low: "0", high: "1", stops: ["black", "white"] }, background = "white"
-            const caption = { background, ink: "black", bar, lines: [] }
+            const caption = { background, ink: "black", bar, width: 0.23, lines: [] }
             return new Sheet().svg(window, { ...caption, unit, bodies })
         }""",
         unit=unit,
         bodies=bodies,
     )
     assert f">{words}</text>" in text and f'width="{size}" height="4"' in text
+
+
+def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
+    """Also an address, which has no spaces to break it at."""
+    address = "granforce ?n=400&mu=0.4&states=200&relax=nearest&hold=47%3A1.495806134&tab=export"
+    text, widest = run(
+        "packing/drawing/svg_context",
+        """({ Sheet, PIXELS }, { lines }) => {
+            const bar = { low: "0", high: "1", stops: ["black", "white"] }, window = [-9, 9, -9, 9]
+            const given = { background: "white", ink: "black", bar, width: 0.23, lines, unit: 1 }
+            const text = new Sheet().svg(window, given)
+            document.body.innerHTML = text
+            const ends = [...document.querySelectorAll("text")].map((one) => {
+                const { x, width } = one.getBBox()
+                return x + width
+            })
+            return [text, Math.max(...ends) / PIXELS]
+        }""",
+        lines=["A line of words. " * 12, 3 * address],
+    )
+    assert widest <= 1
+    (force,) = re.findall(r"width: ([\d.]+) ⟨fₙ⟩", text)
+    (drawn,) = re.findall(r'width="40" height="([\d.]+)"', text)
+    assert float(drawn) == pytest.approx(float(force) * 0.23 * 50)
+
+
+def test_a_pull_is_back_after_a_push(run):
+    """The network of before, at its place on the track, as nobody had pushed."""
+    shown, told = run(
+        "packing/hand/push_animation",
+        """({ Pushed }) => {
+            const shown = [], told = [], nothing = () => {}
+            const walk = { contacts: 1, normal: new Float32Array([1, 2]) }
+            const player = {
+                pushable: true, live: {}, model: { frame: 1 }, look: {}, say: nothing,
+                scene: { drawMarks: nothing, style: null }, sway: { take: nothing },
+                replay: { walk, held: { normal: [3] }, position: 1 },
+                show: (to, tell = true) => { shown.push([to, tell]); player.replay.position = to },
+                hand: {
+                    show: (held) => { player.replay.held = held },
+                    forget: () => { player.replay.held = null },
+                    tell: (message) => told.push(message),
+                },
+            }
+            const pushed = new Pushed(player)
+            const path = { values: [0, 1], normal: [1, 2], tangential: [0, 0], residual: [0, 0] }
+            pushed.take(path, 0.5, 0.5)
+            pushed.leave()
+            pushed.leave()
+            return [shown, told]
+        }""",
+    )
+    assert shown == [[0, False], [1, False]]  # the server never hears of another network
+    assert told == [{"anew": True}]

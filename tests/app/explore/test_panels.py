@@ -518,6 +518,10 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     np.testing.assert_allclose(column["f_n [mean]"], replay.normal[3], rtol=1e-6)
     assert np.all(column["f_n_low [mean]"] <= column["f_n_seen_low [mean]"] + 1e-6)
     assert np.all(column["f_n_seen_high [mean]"] <= column["f_n_high [mean]"] + 1e-6)
+    gap = state.exact["interval_gap"].values[:, 0, 0]
+    zero = np.abs(state.exact["low"].values[:, 0] / replay.force_scale) <= gap
+    assert zero.any() and not column["f_n_low [mean]"][zero].any()
+    assert "-0" not in {cell for line in table[1:] for cell in line.split(",")}
     packing = state.library.packing(state.cell.params["packing"])
     place = column["contact"].astype(int)
     np.testing.assert_array_equal(column["i"], packing.contacts.i[place])
@@ -569,8 +573,11 @@ def test_every_button_hands_a_file_over(state):
         assert all(listed(TO_BROWSER, "Handover", given) for given in handed), key
         (file,) = (given for given in handed if "name" in given)
         assert "/" not in file["name"], key
+        assert ("_network0." in file["name"]) == (key in ("svg", "png", "csv", "html")), key
         drawn = key in ("svg", "png", "webm")  # by the browser
         assert file["caption"]["lines"] if drawn else file["content"][300:]
+        lines = file.get("caption", {}).get("lines", [])
+        assert ("Network as packed." in lines) == (key in ("svg", "png"))
     assert len(keys) == 9
 
 
@@ -608,12 +615,11 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
     assert np.ptp([held["f_n_low [mean]"][4], held["f_n_high [mean]"][4]]) < 1e-3
     away = np.abs(state.replay.normal[:, 4] - state.replay.normal[0, 4])
     state.looks.frame = int(np.argmax(away))
-    head, played = table()  # of another network, in which this force is another one
-    force = played["f_n [mean]"]
-    assert "moved to the nearest network with the held forces" in head
-    assert abs(force[4] - state.replay.normal[state.looks.frame, 4]) > 0.01
-    assert np.all(force >= played["f_n_low [mean]"] - 1e-3)
-    assert np.all(force <= played["f_n_high [mean]"] + 1e-3)
+    head, played = table()  # of another network, which ignores the held force as on screen
+    assert f"of {STATES}, which ignores the held forces" in head
+    shown = state.replay.normal[state.looks.frame]
+    np.testing.assert_allclose(played["f_n [mean]"], shown, rtol=1e-6)
+    assert abs(shown[4] - played["f_n_low [mean]"][4]) > 0.01
 
 
 def test_unknown_keys_are_ignored(state):
@@ -638,6 +644,9 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
     numbers = view.numbers.object
     assert "F<sub>crit</sub>" in numbers and between(pushed.low, pushed.high) in numbers
+    assert view.load.limit == pushed.limit
+    apart = 100 * (1 - pushed.high / pushed.limit)
+    assert ("up to the limit load" if apart >= 1 else "only at the limit load") in numbers
     assert f"{pushed.limit:.4g}" in numbers and len(view.plots.objects) == 1
     assert f"{pushed.opened} contacts open" in view.lead.object
     assert state.displacement is None  # before the slider is at its end
@@ -783,7 +792,9 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     assert all(offered("known"))
     assert ">interval ΔFₙ, seen</option>" in player.legend
     wait_for(state)
-    assert ">interval ΔFₙ, exact</option>" in player.legend  # the colours are of the exact ones now
+    assert ">interval ΔFₙ, exact given the held forces</option>" in player.legend
+    state.knowledge.release(3)
+    assert ">interval ΔFₙ, exact</option>" in player.legend
     player.colour = "known"  # chosen in the legend
     assert state.looks.colour == "known"
     state.knowledge.release(3)
@@ -892,6 +903,14 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
     assert b"bk-" in page and b"ofAnotherPage" not in page
+
+
+def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
+    state.knowledge.hold(4, float(state.replay.normal[0, 4]))
+    wait_for(state)
+    page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
+    assert "interval, exact given the held forces" in page and "interval, seen" not in page
+    assert "interval ΔFₙ, exact given the held forces" in page
 
 
 def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):

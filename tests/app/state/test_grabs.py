@@ -5,7 +5,8 @@ import pytest
 from visitor import wait_for
 
 from app.browser.messages import FROM_BROWSER, TO_BROWSER, listed
-from app.explore.tabs.export.files import contacts, on_screen
+from app.explore.tabs.export.files import contacts
+from app.packing.captions import network
 from app.results import planes
 from app.state import pulls
 from granforce.study import pulls as study_pulls
@@ -189,8 +190,6 @@ def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     replay = state.replay
     table = contacts(replay, None, state.looks.frame, state.hand.held)
     assert table["f_n [mean]"][4] == pytest.approx(value)
-    assert "pulled" in on_screen(replay, state.looks.frame, state.hand.held)
+    assert network(state) == "Pulled by hand from the network as packed"
     page.hear(undo=True)
-    assert state.hand.held is None and "as packed" in on_screen(
-        replay, state.looks.frame, state.hand.held
-    )
+    assert state.hand.held is None and network(state) == "Network as packed"

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from visitor import wait_for
 
+from app.explore.results_line import tables
+from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.known_forces import words
 from app.packing.view import PackingView
 from app.state import known
@@ -74,6 +76,24 @@ def test_the_command_holds_what_is_known(state, tmp_path):
     assert found.contacts.tolist() == [state.replay.backbone[4]]
     bounds = np.array([found.low[0, 0], found.high[0, 0]]) / state.replay.force_scale
     assert bounds == pytest.approx([value - 0.1, value + 0.1], abs=1e-6)
+
+
+def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
+    """Networks of all of S exceed bounds given held forces: they are not drawn within them."""
+    intervals = View(state)
+    held(state, 4)
+    (h, fewer), shown = state.knowledge.narrowed.dimension, tables(state, None, False)
+    assert f"{h} → {fewer} given the held forces" in shown
+    assert "exact given the held forces" in shown and "seen in all of S" in shown
+    bars, lead = intervals.drawing.bars.data, intervals.lead
+    assert np.all(np.isnan(bars["high"])) and np.all(np.isfinite(bars["exact_high"]))
+    assert "given the held forces" in lead.object and "in a network of all of S" in lead.object
+    state.hand.pulls = [(9, float(state.replay.normal[0, 9]))]  # which keeps the held force
+    assert "in a network of all of S" not in lead.object
+    state.knowledge.release(4)
+    wait_for(state)
+    assert np.all(np.isfinite(intervals.drawing.bars.data["high"]))
+    assert f"{h} = " in tables(state, None, False) and "given" not in lead.object
 
 
 def test_an_error_bar_narrows_less_and_leaves_the_dimension(state):

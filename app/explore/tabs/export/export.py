@@ -6,20 +6,18 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 import panel as pn
 import xarray as xr
 
 from ....background.jobs import Job, reading
-from ....packing.captions import caption, known_words, origin, stem
+from ....packing.captions import caption, known_words, network, origin, shown_stem, stem
 from ....packing.view import measured, pins, reduction
 from ....results import planes
 from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
 from ....results.saved_file import File, csv
 from ....state.app_state import AppState
-from ....state.known import MOST_KNOWN, rows
-from ....state.pulls import puller_of
+from ....state.known import MOST_KNOWN
 from ....widgets.file_buttons import Handover
 from ....widgets.parts import note
 from . import files, standalone
@@ -30,18 +28,17 @@ class Snapshot:
 
     def __init__(self, state: AppState) -> None:
         self.library, self.cell, self.replay = state.library, state.cell, state.replay
-        self.exact, self.possible = state.exact, state.possible
+        self.exact = state.exact
         self.view, self.link, self.command = state.view, state.link(), state.command
-        self.stem = stem(state.cell.selection)
+        self.stem, self.shown_stem = stem(state.cell.selection), shown_stem(state)
         self.known, self.source = list(known_words(state)), origin(state.cell)
         frame = min(state.looks.frame, len(self.replay.normal) - 1)
         held, knowledge = state.hand.held, state.knowledge
+        self.narrowed = knowledge.narrowed
         self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
-        self._rows = rows(self.replay, knowledge.known)
-        network = files.on_screen(self.replay, frame, held, bool(self._rows))
         self._head = files.explained(
-            self._columns, self.replay, self.source, network, *known_words(state, MOST_KNOWN),
-            files.bounds_of(knowledge), f"This view: ?{self.link}",
+            self._columns, self.replay, self.source, network(state),
+            *known_words(state, MOST_KNOWN), files.bounds_of(knowledge), f"This view: ?{self.link}",
         )  # fmt: skip
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)
@@ -53,18 +50,13 @@ class Snapshot:
         }
 
     def file(self, ending: str, mime: str, content: bytes) -> File:
-        """A file named after the packing."""
-        return File(f"{self.stem}.{ending}", mime, content)
+        """A file named after the packing, and after the network on screen if it depends on it."""
+        stem = self.shown_stem if ending in OF_THE_NETWORK else self.stem
+        return File(f"{stem}.{ending}", mime, content)
 
     def csv(self, job: Job) -> File:
-        """A table of the contacts; with held forces, of the nearest network that has them."""
-        columns, scale = self._columns, self.replay.force_scale
-        if self._rows:
-            names = [f"{part} [mean]" for part in ("f_n", "f_t")]
-            shown = np.column_stack([columns[name] for name in names]).astype(np.float64)
-            forces, _ = puller_of(self.library, self.cell, self._rows).near(shown * scale)
-            columns = columns | dict(zip(names, forces.T / scale, strict=True))
-        return self.file("csv", "text/csv", csv(columns, self._head))
+        """A table of the contacts."""
+        return self.file("csv", "text/csv", csv(self._columns, self._head))
 
     def json(self, job: Job) -> File:
         """Parameters, link, command and view."""
@@ -100,8 +92,8 @@ class Snapshot:
                 shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
         job.begin("making the page")
         content = standalone.html(
-            self.library, self.cell, self.replay, self.possible, shown, view=self.view,
-            outlined=outlined, link=self.link, command=self.command,
+            self.library, self.cell, self.replay, self.exact, shown, view=self.view,
+            outlined=outlined, narrowed=self.narrowed, link=self.link, command=self.command,
             source=" ".join([self.source, *self.known]),
         )  # fmt: skip
         return self.file("html", "text/html", content)
@@ -129,14 +121,15 @@ GROUPS = {
         "json": Kind("Parameters (JSON)", Snapshot.json),
     },
 }
+OF_THE_NETWORK = ("svg", "png", "csv", "html")  # kinds of files that show the network on screen
 FILES = {
     heading: {key: kind.words for key, kind in group.items()} for heading, group in GROUPS.items()
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the current view, including pulled and held forces. Pictures have a colour bar, a
-scale and a caption. The movie plays from the first network to the last, or back and forth between
-two, at the player's speed. The HTML page needs no server and no network connection.
+Each file shows the current view, including pulled and held forces; playing pauses. Pictures have a
+colour bar, scales and a caption. The movie plays from the first network to the last, or back and
+forth between two, at the player's speed. The HTML page needs no server and no network connection.
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
 if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
 columns. States: the packing and <b>all</b> states with their measures, units and parameters; states
@@ -169,8 +162,9 @@ class View:
         if state.replay is None:
             state.work.message = "Nothing is on screen yet."
         elif kind.make is None:
-            name = f"{stem(state.cell.selection)}.{key}"
-            self.buttons.hand_over_picture(name, caption(state))
+            whole = stem(state.cell.selection)
+            name = f"{shown_stem(state) if key in OF_THE_NETWORK else whole}.{key}"
+            self.buttons.hand_over_picture(name, caption(state, moving=key == "webm"))
         else:
             task = self.making if kind.long else self.task
             task.start(partial(kind.make, Snapshot(state)), self.buttons.hand_over)

@@ -4,7 +4,7 @@ from typing import Any
 
 import panel as pn
 
-from ....packing.captions import caption, stem
+from ....packing.captions import caption, shown_stem
 from ....state.app_state import AppState
 from ....widgets.file_buttons import Handover
 from ....widgets.number import NumberField
@@ -18,15 +18,18 @@ As on screen, as vector graphics. At 120 mm or more, the plots are next to the p
 """
 
 
-def panel(state: AppState) -> Any:
-    """The width, and a button for each kind of file; made by composed_figure.js."""
+def panel(state: AppState, tab: str) -> Any:
+    """The width, and a button for each kind of file; made by composed_figure.js.
+
+    tab: the tab's title, which the files name.
+    """
 
     def refuse(line: str) -> None:
         state.work.message = line
 
     def make(kind: str) -> None:
         if state.replay is not None:
-            name = f"{stem(state.cell.selection)}_figure.{kind}"
+            name = f"{shown_stem(state)}_{tab}.{kind}"
             buttons.hand_over_picture(name, caption(state), width.value)
 
     buttons = Handover(make, files=FILES, margin=(4, 10, -8, 10))

@@ -71,14 +71,16 @@ FREE = "_without_known"  # suffix of the names of bounds without known forces
 
 
 def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
-    """Exact bounds in ⟨f_n⟩; none if they belong to other contacts."""
+    """Exact bounds in ⟨f_n⟩, 0 within their gap; none if they belong to other contacts."""
     if not np.array_equal(exact["backbone"].values, replay.backbone):
         return {}
-    return {
-        f"{part}_{side}{ending}": exact[side].values[:, k] / replay.force_scale
-        for k, part in enumerate(("f_n", "f_t"))
-        for side in ("low", "high")
-    }
+    bounds = {}
+    for k, part in enumerate(("f_n", "f_t")):
+        for end, side in enumerate(("low", "high")):
+            value = exact[side].values[:, k] / replay.force_scale
+            zero = np.abs(value) <= exact["interval_gap"].values[:, k, end]
+            bounds[f"{part}_{side}{ending}"] = np.where(zero, 0.0, value)
+    return bounds
 
 
 # The meaning of the columns in the table of contacts.
@@ -95,10 +97,10 @@ COLUMNS = {
     "f_n_seen_high": "largest normal force of all states",
     "f_t_seen_low": "smallest tangential force of all states",
     "f_t_seen_high": "largest tangential force of all states",
-    "f_n_low": "least possible normal force (exact)",
-    "f_n_high": "largest possible normal force (exact)",
-    "f_t_low": "least possible tangential force (exact)",
-    "f_t_high": "largest possible tangential force (exact)",
+    "f_n_low": "least possible normal force (exact; 0 within its duality gap)",
+    "f_n_high": "largest possible normal force (exact; 0 within its duality gap)",
+    "f_t_low": "least possible tangential force (exact; 0 within its duality gap)",
+    "f_t_high": "largest possible tangential force (exact; 0 within its duality gap)",
 }
 
 
@@ -108,21 +110,16 @@ def _meaning(column: str) -> str:
     return f"{COLUMNS[name.removesuffix(FREE)]}{free}"
 
 
-def on_screen(replay: Replay, frame: int, held: Held | None, known: bool = False) -> str:
-    """The network of a table, in words; known: whether forces are held."""
-    words = f"Network {replay.number[frame]}" if frame else "Network as packed"
-    if held is not None:
-        words = "Network: pulled by hand"
-    return f"{words}, moved to the nearest network with the held forces" if known else words
-
-
 def bounds_of(knowledge: Knowledge) -> str:
     """The networks to which a table's exact bounds refer, in words; empty without held forces."""
     if not knowledge.known:
         return ""
     if knowledge.whole is None:
         return f"Bounds given the held forces are still being computed; {FREE[1:]}: without it."
-    return f"Bounds are exact given these held forces; {FREE[1:]}: without them."
+    return (
+        f"Bounds are exact given these held forces; {FREE[1:]}: without them. Values seen are "
+        "those of all of S."
+    )
 
 
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:

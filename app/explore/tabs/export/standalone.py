@@ -20,6 +20,7 @@ from ....packing.view import THRUST, exact_intervals, full_extent, legend
 from ....results import planes
 from ....results.library import Cell, Library
 from ....results.replays import Replay, evenly
+from ....state.known import Narrowed
 from ....state.links import View
 from ....widgets.plot_style import palettes
 from ... import explanation
@@ -68,15 +69,17 @@ def html(
     command: str,
     source: str,
     outlined: planes.Outlined | None = None,
+    narrowed: Narrowed | None = None,
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: with known forces; shown: loads, reduction, measured, pins and thrust, as for the player.
+    exact: without known forces, narrowed: with them; shown: loads, reduction, measured, pins and
+    thrust, as for the player.
     """
-    intervals = exact_intervals(exact, replay)
+    intervals = exact_intervals(exact if narrowed is None else narrowed.after, replay)
     thinned_replay = thinned(replay)
     plane = planes.principal(thinned_replay)
-    figures = still.figures(library, thinned_replay, exact, plane, outlined, view)
+    figures = still.figures(library, thinned_replay, exact, plane, outlined, view, narrowed)
     # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
     bare = Document()
     for figure in figures:
@@ -96,7 +99,9 @@ def html(
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
-        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"]))
+        "legend": legend(
+            still.at_rest(library, replay, exact, view, loads=given["loads"], narrowed=narrowed)
+        )
         + (THRUST if given["thrust"] else ""),
         "source": source,
         "frame": frame,

@@ -11,6 +11,7 @@ from ....results.library import Library
 from ....results.planes import Outlined, Plane
 from ....results.replays import Replay
 from ....state.app_state import AppState
+from ....state.known import Narrowed
 from ....state.links import View
 from ....state.view_settings import Looks
 from ..force_space import force_space
@@ -24,13 +25,16 @@ def at_rest(
     view: View,
     tab: str = "",
     loads: Floats | None = None,
+    narrowed: Narrowed | None = None,
 ) -> AppState:
-    """A state that shows a replay by day, without computations, pulls and known forces."""
+    """A state that shows a replay by day, without computations and pulls."""
     state = AppState(library, query=None)
     here = view | {"dark": False, "between": None, "tab": tab}
     with discard_events(state):
         replay = replay._replace(inviting=-1)  # nothing can be dragged
         state.param.update(replay=replay, shown=replay, exact=exact, loads=loads)
+    with discard_events(state.knowledge):
+        state.knowledge.narrowed = narrowed
     with discard_events(state.looks):
         state.looks.param.update({name: here[name] for name in Looks.param if name in here})
     return state
@@ -43,9 +47,10 @@ def figures(
     chosen: Plane,
     outlined: Outlined | None,
     view: View,
+    narrowed: Narrowed | None,
 ) -> tuple[Figure, Figure, Figure]:
     """Bokeh figures of intervals, of the growth of η, and of the principal plane `chosen`."""
-    bars = intervals.View(at_rest(library, replay, exact, view, "intervals"))
+    bars = intervals.View(at_rest(library, replay, exact, view, "intervals", None, narrowed))
     space = force_space.View(at_rest(library, replay, exact, view))
     space._show(replay, chosen)
     if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):

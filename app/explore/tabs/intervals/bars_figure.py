@@ -19,6 +19,15 @@ APART = 100  # number of bars up to which there are gaps between them, and large
 # size of dots, px; for few bars, and for many.
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.6)
 CARRYING = 0.1  # ⟨f_n⟩ as packed above which a contact counts for the axis in its own unit
+# Rows of the tooltip, without and with known forces.
+NOW = ("contact", "@contact"), ("now", "@now{0.000}"), ("as packed", "@original{0.000}")
+EXACT = "@exact_low{0.000} … @exact_high{0.000}"
+FREE = *NOW, ("interval, exact", EXACT), ("interval, seen", "@low{0.000} … @high{0.000}")
+GIVEN = (
+    *NOW,
+    ("interval, exact given the held forces", EXACT),
+    ("interval, exact without them", "@whole_low{0.000} … @whole_high{0.000}"),
+)
 SORTED = "sorted"  # tag of the figure if forces as packed ascend; see plot_layer.js
 
 
@@ -54,16 +63,8 @@ class BarsFigure:
         for moving in (sampled, self.line, self.packed, self.dots):
             moving.tags = MOVES
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
-        fig.add_tools(
-            hover(
-                [sampled, exact],
-                ("contact", "@contact"),
-                ("now", "@now{0.000}"),
-                ("as packed", "@original{0.000}"),
-                ("interval, exact", "@exact_low{0.000} … @exact_high{0.000}"),
-                ("interval, seen", "@low{0.000} … @high{0.000}"),
-            ),
-        )
+        self.tip = hover([sampled, exact])
+        fig.add_tools(self.tip)
         marks = *self.layers, self.packed, self.dots
         on_tap(fig, lambda row, data: choose(int(data["at"][row])), *marks)
 
@@ -73,15 +74,17 @@ class BarsFigure:
         """Draw these contacts; return how many bars extend beyond the axis.
 
         before: exact bounds without known forces; relative: forces in units of that as packed.
+        With known forces, the values seen are left out: networks of all of S exceed the bounds.
         """
         self.contacts = contacts
+        self.tip.tooltips = list(GIVEN if before else FREE)
+        seen = {} if before else {"low": replay.low[:, 0], "high": replay.high[:, 0]}
         original = replay.normal[0, contacts]
         unit = original if relative else np.ones_like(original)
         ends = {
             **_ends("whole_", before, contacts),
             **_ends("exact_", exact, contacts),
-            "low": replay.low[contacts, 0],
-            "high": replay.high[contacts, 0],
+            **_ends("", seen, contacts),
             "now": original,
             "original": original,
         }

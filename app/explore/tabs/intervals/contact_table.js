@@ -1,27 +1,27 @@
 // A table of all contacts: present forces, possible forces, known forces. It reads from the player,
 // not the server, and only while it is open; rows hidden by a filter are dim in the packing.
 
-const ROWS = 200 // shown at once
+const ROWS = 200 // of a page
 const AGAIN_MS = 250 // between two updates during motion
-const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3) : "–")
+const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3).replace(/^-(?=[0.]*$)/, "") : "–") // no −0.000
 const interval = (of) => [
   ["least", (on, c) => on[of].low?.[c], NUMBER],
   ["largest", (on, c) => on[of].high?.[c], NUMBER],
   ["ΔFₙ", (on, c) => on[of].high?.[c] - on[of].low?.[c], NUMBER],
 ]
-// Groups of columns [heading, columns], and of each column: heading, value for contact c, its format.
+// Groups of columns [heading, columns], and of each column: heading, value for contact c, its format. The heading of
+// a group may depend on the player's look.
 const GROUPS = [
   ["", [
-    ["contact", (on, c) => on.walk.backbone[c], String],
-    ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
+    ["contact", (on, c) => on.walk.backbone[c], (number, on, c) => `${number}${on.known.has(c) ? " held" : ""}`],
+    ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join("–")],
   ]],
   ["on screen", [
     ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
     ["fₜ", (on, c) => on.mixed.tangential[c], NUMBER],
   ]],
-  ["interval of fₙ, exact", interval("exact")],
-  ["interval of fₙ, seen", interval("walk")],
-  ["", [["held", (on, c) => Number(on.known.has(c)), (value) => (value ? "held" : "")]]],
+  [(look) => `interval of fₙ, ${look.bounds}`, interval("exact")],
+  [(look) => `interval of fₙ, ${look.seen}`, interval("walk")],
 ]
 const COLUMNS = GROUPS.flatMap(([, columns]) => columns)
 const FORCE = 2 // the column by which the table is sorted at first
@@ -32,13 +32,15 @@ export function render({ model, view }) {
     <div class="filters">
       <label>number of contact or grain <input class="find" inputmode="numeric"></label>
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
+      <span class="pages"><button type="button" class="soft earlier">previous ${ROWS}</button>
+        <button type="button" class="soft later">next ${ROWS}</button></span>
     </div>
     <p class="status" role="status"></p>
     <div class="frame"><table><thead></thead><tbody></tbody></table></div>`
   const part = (name) => root.querySelector(name), body = part("tbody")
   const sorted = { by: FORCE, down: true }
   const player = () => page.get_model_by_name("player")?.player
-  let from = 0, pending = 0, shown = []
+  let from = 0, pending = 0, shown = [], headed = ""
 
   /** The data for the columns. */
   function now() {
@@ -59,12 +61,16 @@ export function render({ model, view }) {
     const on = now(), value = COLUMNS[sorted.by][1], sign = sorted.down ? -1 : 1
     const all = Array.from(on.mixed.normal.keys()), matching = all.filter((c) => fits(on, c))
     matching.sort((a, b) => sign * (value(on, a) - value(on, b)) || a - b)
-    from = Math.min(from, Math.max(0, matching.length - 1))
+    from = Math.min(from, ROWS * Math.floor(Math.max(0, matching.length - 1) / ROWS))
     shown = matching.slice(from, from + ROWS)
+    part(".pages").hidden = matching.length <= ROWS
+    part(".earlier").disabled = from === 0
+    part(".later").disabled = from + ROWS >= matching.length
     part(".status").textContent = `${matching.length} of ${all.length} contacts` +
-      (matching.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
+      (matching.length > ROWS ? `, rows ${from + 1} to ${from + shown.length} are shown` : "") +
       `; forces in mean forces; seen: in ${on.walk.room ? "the networks so far" : `all ${on.walk.states} networks`}; ` +
       "a heading sorts the table, “Sort bars” the bars above"
+    heads()
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
       COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")
@@ -80,17 +86,25 @@ export function render({ model, view }) {
   }
 
   function heads() {
-    const groups = GROUPS.map(([words, { length }]) => `<th colspan="${length}" scope="colgroup">${words}</th>`)
-    part("thead").innerHTML = `<tr>${groups.join("")}</tr><tr>` + COLUMNS.map(([words], k) => {
+    const look = player()?.look ?? {}
+    const groups = GROUPS.map(([words, { length }]) => `<th colspan="${length}" scope="colgroup">${words.call ? words(look) : words}</th>`)
+    const html = `<tr>${groups.join("")}</tr><tr>` + COLUMNS.map(([words], k) => {
       const order = k === sorted.by ? (sorted.down ? "descending" : "ascending") : "none"
       return `<th aria-sort="${order}"><button type="button" data-k="${k}">${words}` +
         `${order === "none" ? "" : sorted.down ? " ↓" : " ↑"}</button></th>`
     }).join("")
+    if (html !== headed) part("thead").innerHTML = headed = html // otherwise a click or the focus would be lost
   }
 
   function select(row) {
     player().model.contact = Number(row.dataset.contact)
     for (const other of body.rows) other.setAttribute("aria-selected", String(other === row))
+  }
+
+  function turn(rows) {
+    from += rows
+    fill()
+    part(".frame").scrollTop = 0
   }
 
   const soon = () => { pending ||= setTimeout(() => { pending = 0; fill() }, AGAIN_MS) }
@@ -99,7 +113,7 @@ export function render({ model, view }) {
     const by = Number(dataset.k)
     sorted.down = by === sorted.by ? !sorted.down : by > 1
     sorted.by = by
-    heads()
+    from = 0
     fill()
     part(`[data-k="${by}"]`).focus()
   })
@@ -113,6 +127,8 @@ export function render({ model, view }) {
     event.stopPropagation()
   })
   for (const name of [".find", ".least"]) part(name).addEventListener("input", fill)
+  part(".earlier").addEventListener("click", () => turn(-ROWS))
+  part(".later").addEventListener("click", () => turn(ROWS))
   root.addEventListener("toggle", () => {
     const on = player()
     model.open = root.open
@@ -123,6 +139,5 @@ export function render({ model, view }) {
   model.on("open", open)
   open()
   model.on("remove", () => player()?.listeners.delete(soon))
-  heads()
   return root
 }

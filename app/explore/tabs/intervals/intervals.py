@@ -46,6 +46,8 @@ class View(TabView):
         self.drawing = BarsFigure(self._choose)
         self.growth = GrowthFigure()
         self._grown: Replay | None = None  # whose growth is drawn
+        # Whether bars are exact and sorted as packed, and how many extend beyond the axis.
+        self._drawn: tuple[bool, bool, int] | None = None
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.choices = [
             self.drawn,
@@ -56,6 +58,7 @@ class View(TabView):
         self.lead, self.details = note("Opening the packing …"), note()
         self.exact.on_click(lambda event: state.compute_exact())
         state.knowledge.param.watch(self.refresh, ["narrowed", "known"])
+        state.hand.param.watch(self._explain, "pulls")
         state.param.watch(self._offer, ["shown", "exact"])
         for task in (state.work.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
@@ -99,10 +102,17 @@ class View(TabView):
         self.drawn.options = by_words(
             {"all": f"all {len(replay.order)}", "some": f"{SOME} of them"}
         )
-        self.lead.object = sentence(state, replay, bool(exact), order.as_packed, beyond)
+        self._drawn = bool(exact), order.as_packed, beyond
+        self._explain()
         if replay is not self._grown:
             self._grown = replay
             self.growth.show(replay, state.growing)
+
+    def _explain(self, *events: Any) -> None:
+        """Say what is drawn."""
+        replay = self.state.shown
+        if replay is not None and self._drawn is not None:
+            self.lead.object = sentence(self.state, replay, *self._drawn)
 
     def _choose(self, contact: int) -> None:
         self.looks.contact = contact
@@ -116,22 +126,29 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return worded(replay, HEADING + FIXED)
-    held = len(state.knowledge.known)
-    parts = []
+    narrowed, parts = state.knowledge.narrowed, []
     if exact:
-        words = f"pale: {term('exact', 'exact')}, every admissible network"
-        parts.append(mark(PALE, words + (f" with {held} held; faintest: without" if held else "")))
+        words = f"pale: {term('exact', state.bounds)}"
+        words += "; faintest: without them" if narrowed else ", every admissible network"
+        parts.append(mark(PALE, words))
     elif state.work.arriving is not None:
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
     count = replay.summary["states"]
     random = "random networks so far" if state.growing else f"{count} random networks"
-    parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
-    parts.append(mark(now(state.looks.dark), "dot: now", "50%"))
+    if narrowed is None:
+        parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
+    parts.append(mark(now(state.looks.dark), _dot(state), "50%"))
     parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
     text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "
     return text + "Drag a dot, or a line in the packing."
+
+
+def _dot(state: AppState) -> str:
+    """The network whose forces are dots; only a pulled one is certain to have the held forces."""
+    ignores = state.knowledge.known and not state.hand.pulls
+    return "dot: now, in a network of all of S" if ignores else "dot: now"
 
 
 def _across(every: int, drawn: int, words: str) -> str:

@@ -12,6 +12,9 @@ export function render({ model, view }) {
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
+  /** Mark a contact in the packing; null: the selected one. */
+  const point = (contact) => view.model.document.get_model_by_name("player")?.player?.mark(contact)
+
   function chip([contact, text]) {
     const it = createElement("span", { className: "chip" })
     const look = { className: "release", title: "release it", ariaLabel: `release: ${text}` }
@@ -35,6 +38,9 @@ export function render({ model, view }) {
     asking: () => { next.disabled = model.asking },
   }
   next.addEventListener("click", () => tell({ next: true }))
+  words.addEventListener("click", ({ target }) => { if (target.dataset.contact) tell({ choose: Number(target.dataset.contact) }) })
+  words.addEventListener("pointerover", ({ target }) => { if (target.dataset.contact) point(Number(target.dataset.contact)) })
+  words.addEventListener("pointerout", () => point(null))
   for (const [name, show] of Object.entries(shown)) { model.on(name, show); show() }
   return root
 }

@@ -14,6 +14,7 @@ from ....state.known import Knowledge, Ranked
 from ....widgets.hints import term
 
 STRONGEST = 5  # number of contacts listed whose interval has shrunk most
+LINK = '<button type="button" class="found" data-contact="{}">{}</button>'
 ASK = (
     "To treat a force as known, for example from a measurement, hold it (button Hold, or H). All "
     "other intervals shrink or stay the same."
@@ -86,9 +87,13 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     short = narrowed.shortened
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
-        most = ", ".join(f"{number[c]} (by {short[c]:.2f})" for c in order)
+        most = ", ".join(f"{LINK.format(c, number[c])} (by {short[c]:.2f})" for c in order)
         text += f" Shortened most: contacts {most}."
-    return text + " The networks being played are from all of S; pulls keep the held forces."
+    return (
+        text
+        + " Networks that are played are from all of S and ignore the held forces; pulled ones "
+        "obey them."
+    )
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:

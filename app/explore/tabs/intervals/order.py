@@ -38,7 +38,8 @@ def ordered(
             why = "no force is held"
         return Order(replay.order, f"{SORTS[USUAL]}: {why}", as_packed=True)
     order = replay.order if by == USUAL else np.argsort(value, kind="stable")
-    return Order(order, SORTS[by], as_packed=by == USUAL)
+    given = " given the held forces" if by in ("exact", "position") and narrowed else ""
+    return Order(order, SORTS[by] + given, as_packed=by == USUAL)
 
 
 def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) -> Floats | None:

@@ -66,7 +66,7 @@ export function render({ model, view }) {
   }
 
   function scale() {
-    range.max = known() ? Math.max(model.most, ROOM * end()) : model.most
+    range.max = known() ? Math.max(model.most, ROOM * Math.max(end(), model.limit)) : model.most
     range.step = range.max / STEPS
     range.disabled = model.contact === null
     drawScale()
@@ -81,7 +81,7 @@ export function render({ model, view }) {
     const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
     let drawn = ""
     for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
-    if (known()) drawn += mark("critical", end(), "▲ F<sub>crit</sub>")
+    if (known()) drawn += mark("critical", end(), "▲ F<sub>crit</sub>") + mark("limit", model.limit, "▲ limit load")
     line.innerHTML = drawn
   }
 
@@ -111,7 +111,7 @@ export function render({ model, view }) {
   model.on("remove", () => player()?.listeners.delete(look))
   model.on("contact", anew)
   model.on("most", scale)
-  model.on("path", () => {
+  model.on(["path", "limit"], () => {
     if (!known()) return anew() // of another packing
     asked = true
     scale()

@@ -13,6 +13,7 @@ class LoadSlider(Scripted):
 
     contact = param.Integer(default=None, allow_None=True, doc="the one that is pushed")
     path = param.Dict(default={}, doc="networks under growing loads, see perturb.path; {} unknown")
+    limit = param.Number(default=None, allow_None=True, doc="limit load; None: not known")
     most = param.Number(default=1.0, doc="end of the scale until the limit is known")
     running = param.Boolean(doc="whether it is being computed")
 

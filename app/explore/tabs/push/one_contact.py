@@ -33,10 +33,15 @@ HELD = (
 )
 COMPUTED = (
     "Of all sets of forces that balance the push, those nearest to the forces as packed are "
-    "shown; orange carries more than before, blue less. F<sub>crit</sub> lies between the largest "
+    "shown. F<sub>crit</sub> lies between the largest "
     "load at which contact dynamics finds rest and the smallest at which it finds none. |u| is "
     "the first motion of a disk, relative to the root mean square over all disks."
 )
+EARLIER = (
+    "Balanced networks exist up to the limit load. The disks move {part:.0f} % earlier, at "
+    "F<sub>crit</sub>, because friction does not build these networks up on the way."
+)
+TOGETHER = "The disks move only at the limit load, where no balanced network is left."
 TABLE = '<table class="claims"><tr>{}</tr><tr>{}</tr></table>'
 
 
@@ -64,12 +69,23 @@ def table(replay: Replay, contact: int, pushed: Pushed) -> str:
         F_CRIT: between(pushed.low, pushed.high) + " ⟨fₙ⟩",
         LIMIT: f"{pushed.limit:.4g} ⟨fₙ⟩",
         term("fn", "fₙ as packed"): f"{replay.normal[0, contact]:.4g} ⟨fₙ⟩",
-        term("alpha", "decay exponent α"): f"{pushed.exponent:.2f}",
+        term("alpha", "decay exponent α"): _alpha(pushed),
     }
-    if not np.isfinite(pushed.exponent):  # in boxes too small for a fit
-        cells[term("alpha", "decay exponent α")] = "–"
     heads = "".join(f"<th>{head}</th>" for head in cells)
     return TABLE.format(heads, "".join(f"<td>{cell}</td>" for cell in cells.values()))
+
+
+def difference(pushed: Pushed) -> str:
+    """The reason for which the critical force is below the limit load, as HTML."""
+    part = 100 * (1 - pushed.high / pushed.limit)
+    return EARLIER.format(part=part) if part >= 1 else TOGETHER
+
+
+def _alpha(pushed: Pushed) -> str:
+    """α over the ranges of the fit; a dash in boxes too small for a fit."""
+    if not np.isfinite(pushed.exponent):
+        return "–"
+    return f"{between(*pushed.spread)}, by range of r"
 
 
 def decay_sentence(pushed: Pushed) -> str:
@@ -80,8 +96,8 @@ def decay_sentence(pushed: Pushed) -> str:
     (inner, outer), (least, most) = pushed.fit, pushed.spread
     falls = "falls like r⁻ᵅ" if least > 0 else "shows no clear decay: it is fitted by r⁻ᵅ"
     text = (
-        f"Mean |u| {falls} with α = {pushed.exponent:.2f} from r = {inner:.1f} to "
-        f"{outer:.1f} (shaded); over other ranges α is {between(least, most)}."
+        f"Mean |u| {falls} with α = {between(least, most)}, depending on the range of r; the "
+        f"dashed line is the fit from r = {inner:.1f} to {outer:.1f} (shaded)."
     )
     power, exponential = statistics.decay_misfits(r, u)
     if not np.isfinite([power, exponential]).all():
@@ -92,10 +108,11 @@ def decay_sentence(pushed: Pushed) -> str:
     )
 
 
-def decay(pushed: Pushed) -> Figure:
+def decay(pushed: Pushed, bodies: bool) -> Figure:
     """|u| of every grain against its distance from the contact, and its mean in shells."""
+    unit = "half the median distance of touching bodies" if bodies else "largest radii"
     fig = figure(
-        "displacement", None, "distance from the pushed contact, in the packing's unit",
+        "displacement", None, f"distance r from the pushed contact, in {unit}",
         "first motion |u| (rms = 1)", height=300, x_axis_type="log", y_axis_type="log",
     )  # fmt: skip
     visible = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
@@ -115,7 +132,7 @@ def decay(pushed: Pushed) -> Figure:
         ends = np.array([inner, outer])
         fig.line(
             ends, middle * ends**-pushed.exponent, color=DOT, line_width=2.5, line_dash="dashed",
-            legend_label=f"fit, α = {pushed.exponent:.2f}",
+            legend_label="fit over the shaded range",
         )  # fmt: skip
         fig.add_layout(BoxAnnotation(left=inner, right=outer, fill_alpha=0.1, fill_color="#808080"))
     legend_above(fig)

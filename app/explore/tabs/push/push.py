@@ -97,6 +97,7 @@ class View(TabView):
         self.load.param.update(
             contact=self.contact,
             path={} if self.pushed is None else self.pushed[0].path,
+            limit=None if self.pushed is None else self.pushed[0].limit,
             most=float(f"{SCALE * replay.normal[0].max(initial=0.5):.2g}"),
         )
         if fixed:
@@ -150,8 +151,8 @@ class View(TabView):
         if pushed is None:
             return Shown(lead, details=folded(one_contact.COMPUTED))
         text = one_contact.decay_sentence(pushed) + folded(one_contact.COMPUTED)
-        numbers = one_contact.table(replay, contact, pushed)
-        return Shown(lead, [one_contact.decay(pushed)], numbers, text)
+        numbers = one_contact.table(replay, contact, pushed) + one_contact.difference(pushed)
+        return Shown(lead, [one_contact.decay(pushed, bool(replay.outlines))], numbers, text)
 
     def _animate(self, *events: Any) -> None:
         """Animate the first motion to and fro on the packing while this tab is visible."""
