@@ -93,7 +93,7 @@ def bounds(state: AppState) -> str:
         return "exact bounds: not computed"
     gap = exact["interval_gap"].values
     count, total = int(np.isfinite(gap).sum()), gap.size
-    most = float(exact["max_gap"]) / state.replay.force_scale
+    most = float(exact["max_gap"])
     of = "" if count == total else f" of {total}"
     return f"{count}{of} bounds certified, gap ≤ {power(most)} ⟨fₙ⟩"
 

@@ -641,7 +641,8 @@ def test_the_status_line_says_what_is_certified_and_what_failed(state):
     state.compute_exact()
     wait_for(state)
     count = 4 * state.replay.summary["contacts"]  # both ends of both components
-    assert f"{count} bounds certified, gap ≤ " in line.facts[0]
+    most = power(float(state.exact["max_gap"]))  # in ⟨fₙ⟩, as stored
+    assert f"{count} bounds certified, gap ≤ {most} ⟨fₙ⟩" in line.facts[0]
     state.work.message = "nothing balances"
     assert line.failed == "nothing balances"
     line.hear({"read": True})
