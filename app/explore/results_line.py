@@ -114,7 +114,12 @@ def _titles(quantities: Iterable[Quantity]) -> list[str]:
 
 def _values(quantities: Iterable[Quantity], of: str) -> list[str]:
     values = [(getattr(one, of), UNIT.get(one.key, "")) for one in quantities]
-    return [value + unit if value else "" for value, unit in values]
+    return [_explained(value) + unit if value else "" for value, unit in values]
+
+
+def _explained(value: str) -> str:
+    """A value as HTML, with the meaning of its standard error."""
+    return value.replace("±", term("error", "±"))
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
