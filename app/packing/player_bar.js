@@ -3,7 +3,7 @@
 import { button, createElement } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
-const OUTSIDE = (last) => `Networks have the numbers 1 to ${last}; 0 is the network as packed.`
+const OUTSIDE = ({ states, origin }) => `Networks have the numbers 1 to ${states}; 0 is the network ${origin}.`
 const NEAREST = (asked, found) => `Network ${asked} is not stored; showing ${found}, the nearest stored one.`
 
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
@@ -58,7 +58,7 @@ export class PlayerBar {
     const { walk } = replay
     if (this.number.value.trim() === "" || !Number.isInteger(asked) || asked < 0 || asked > walk.states) {
       this.number.value = walk.number[replay.frame]
-      return this.say(OUTSIDE(walk.states))
+      return this.say(OUTSIDE(walk))
     }
     const position = replay.positionOf(asked), found = walk.number[position]
     this.actions.scrub(position)

@@ -337,7 +337,8 @@ def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     value = getattr(state.looks, name)
     available = meaningful(state, quantities(state, labels), name)
     options = "".join(
-        f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
+        f'<option value="{key}"{" selected" if key == value else ""}>'
+        f"{worded(state.shown, words)}</option>"
         for key, words in available.items()
     )
     title = {"colour": "Colour", "thickness": "Width"}[name]

@@ -687,9 +687,6 @@ def test_the_axis_holds_every_bar_and_names_the_order_that_there_is(state):
     for sort in SORTS:  # all of them in any order
         state.looks.sort = sort
         assert sorted(view.drawing.bars.data["at"]) == list(range(every))
-        line, dots = view.drawing.line.glyph, view.drawing.packed.glyph
-        ascending = np.all(np.diff(view.drawing.bars.data["original"]) >= 0)
-        assert (line.line_alpha, dots.fill_alpha) == ((1, 0) if ascending else (0, 1))
 
 
 def test_another_friction_is_packed_as_is_usual_there(state):

@@ -97,7 +97,7 @@ export class Look {
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
-      ["force as packed", walk.normal[c].toFixed(3)],
+      [`force ${walk.origin}`, walk.normal[c].toFixed(3)],
     ]
     if (exact) rows.push(["interval of fₙ, exact", interval(exact.low[c], exact.high[c])])
     if (walk.number.length > 1) rows.push(["interval of fₙ, seen", interval(walk.low[c], walk.high[c])])

@@ -136,6 +136,7 @@ WALK = {
     "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "states": 3, "number": [0, 1, 2, 3],
     "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
     "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8], "unit": 1,
+    "origin": "as packed",
 }  # fmt: skip
 
 

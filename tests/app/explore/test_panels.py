@@ -32,6 +32,7 @@ from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction.claims import VERDICTS
+from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
@@ -215,6 +216,31 @@ def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
     press(view.read)
     wait_for(state, lambda: state.cell.selection.imported)
     assert "bears no vertical stress" in results.html
+
+
+def test_a_packing_without_forces_follows_the_friction(state):
+    """Six disks of which three carry at μ = 0.3, and all at μ = 1; nothing is said of packing."""
+    high = 3**0.5
+    places = [(0.5, 0.5), (1.5, 0.5), (2.5, 0.5), (1, 0.5 + high / 2), (2, 0.5 + high / 2)]
+    places.append((1.5, 0.5 + high))
+    rows = "".join(f"{x!r},{y!r},0.5\n" for x, y in places)
+    view, results, controls = upload_view.View(state), Results(state), Controls(state)
+    bars = intervals_view.View(state)
+    assert "as packed" in bars.lead.object and controls.scene.shown == "many"
+    view._dropped([("six.csv", b"x,y,r\n" + rows.encode())])
+    view.box.value = f"3, {1 + high!r}"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported)
+    assert "bears no vertical stress" in results.html and "<b>0.3</b>" in view.report.object
+    assert controls.scene.shown == "imported"
+    controls.mu.mu = 1.0
+    wait_for(state, lambda: state.cell.mu == 1.0)
+    assert state.replay.summary["dimension"] == 2 and "bears no" not in results.html
+    report = dict(re.findall("<td[^>]*>([^<]*)</td><td><b>([^<]*)", view.report.object))
+    assert (report["friction μ"], report["dimension h of S"], report["rattlers"]) == ("1", "2", "0")
+    assert "as packed" not in bars.lead.object + bars.drawing.figure.xaxis[0].axis_label
+    assert bars.drawing.packed.glyph.size == 0
+    assert "force at the start" in bars.sorts.options
 
 
 @pytest.mark.parametrize("contacts", [False, True])

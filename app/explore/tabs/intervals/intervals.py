@@ -47,9 +47,10 @@ class View(TabView):
         self.growth = GrowthFigure()
         self._grown: Replay | None = None  # whose growth is drawn
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
+        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196})
         self.choices = [
             self.drawn,
-            question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196}),
+            self.sorts,
             question("Unit", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
@@ -91,15 +92,17 @@ class View(TabView):
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
         relative = looks.scale == "own"
         beyond = self.drawing.show(replay, order.contacts[ranks], exact, before, relative)
-        self.drawing.draw_packed(order.as_packed)
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
-        self.drawing.figure.xaxis.axis_label = _across(len(replay.order), len(ranks), order.words)
+        self.drawing.figure.xaxis.axis_label = worded(
+            replay, _across(len(replay.order), len(ranks), order.words)
+        )
         self.drawing.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[looks.scale]})"
         self.drawn.options = by_words(
             {"all": f"all {len(replay.order)}", "some": f"{SOME} of them"}
         )
-        self.lead.object = sentence(state, replay, bool(exact), order.as_packed, beyond)
+        self.sorts.options = by_words({key: worded(replay, name) for key, name in SORTS.items()})
+        self.lead.object = sentence(state, replay, bool(exact), beyond)
         if replay is not self._grown:
             self._grown = replay
             self.growth.show(replay, state.growing)
@@ -112,7 +115,7 @@ class View(TabView):
         self.exact.visible = self.state.replay is not None and self.state.exact_requested
 
 
-def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: int = 0) -> str:
+def sentence(state: AppState, replay: Replay, exact: bool, beyond: int = 0) -> str:
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return worded(replay, HEADING + FIXED)
@@ -127,7 +130,8 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     random = "random networks so far" if state.growing else f"{count} random networks"
     parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
     parts.append(mark(now(state.looks.dark), "dot: now", "50%"))
-    parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
+    if replay.given:
+        parts.append(mark(ORIGINAL, term("original", "as packed"), "50%"))
     text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "
