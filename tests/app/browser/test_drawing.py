@@ -24,7 +24,7 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
             const text = () => bar.root.textContent, type = (number) => {
                 bar.number.value = number
                 bar.number.dispatchEvent(new Event("change"))
-                return [bar.number.value, replay.frame, said.pop() ?? ""]
+                return [bar.number.value, replay.frame, said.pop() ?? "", bar.stored.textContent]
             }
             bar.showTrack(replay, true)
             const words = text(), kept = !bar.keep.hidden
@@ -37,8 +37,9 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
     )
     assert "every 20th of 60 is stored" in words and "1 stored network/s" in words
     assert kept == [True, False]
-    assert reached[0] == ["41", 3, ""] and reached[2] == ["0", 0, ""]
-    assert reached[1] == ["21", 2, "Network 12 is not stored; showing 21, the nearest stored one."]
+    every = "every 20th of 60 is stored"
+    assert reached[0] == ["41", 3, "", every] and reached[2] == ["0", 0, "", every]
+    assert reached[1] == ["21", 2, "", "12 is not stored: showing 21."]
     assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
 
 
