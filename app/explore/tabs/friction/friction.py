@@ -20,7 +20,7 @@ from .this_packing import extents, forces
 
 # If it is wide enough, z is drawn inside Figure 1, where there is no curve; otherwise below it.
 INSET = """
-:host { position: absolute; top: 56px; left: 70px; width: 40% !important; z-index: 1; }
+:host { position: absolute; top: 66px; left: 70px; width: 40% !important; z-index: 1; }
 @media (max-width: 599.95px) { :host { position: static; width: 100% !important; } }
 """
 CLAIMED = {

@@ -66,7 +66,7 @@ class Indeterminacy:
             return "The finished study is not part of this installation."
         z = statistics.means(walks, "coordination")
         return (
-            f"<b>Largest in nearest-network walks: {_maxima(self.lines)}.</b> "
+            f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> "
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
             f"As in the paper's Figure 1. Points: means over {packings(walks)} packings of 400 "
