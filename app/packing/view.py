@@ -47,8 +47,13 @@ THRUST = """
 """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
-<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
+{colour}
 <span>pale disks: no contacts; dashed: the shrinking box; disks outside: periodic copies</span>
+"""
+DIVERGING = [BLUE, GREY, ORANGE]
+MOBILISED = "−1", DIVERGING, "+1 (slides)"
+MOBILISATION = """
+<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span><span>{bar}</span>
 """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
@@ -164,10 +169,10 @@ class PackingView:
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)
-        thrust = THRUST if self.player.thrust else ""
-        self.player.param.update(
-            legend=JAMMING if self.state.work.moving else legend(self.state, pulled) + thrust,
-        )
+        if self.state.work.moving:
+            self.player.legend = jamming(self.state)
+            return
+        self.player.legend = legend(self.state, pulled) + (THRUST if self.player.thrust else "")
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
@@ -245,19 +250,18 @@ def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> f
 
 def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
-    diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"≤ −{full:.3g}", diverging, f"≥ +{full:.3g} ⟨fₙ⟩"
+    change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
     if pulled:
         return change
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
-        "mobilised": ("−1", diverging, "+1 (slides)"),
+        "mobilised": MOBILISED,
         "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
-        "deviation": (f"≥ {FULL_DEVIATION:g} σ less", diverging, f"≥ {FULL_DEVIATION:g} σ more"),
+        "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
         "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
@@ -276,7 +280,7 @@ def colour_words(state: AppState, pulled: bool) -> str:
 
 def _full(looks: Looks, most: float) -> str:
     """The ΔF_n of full colour, and the reason for it."""
-    why = "" if looks.full else f" ({SATURATION:g} quantile)"
+    why = "" if looks.full else f" ({SATURATION:g} quantile of this packing)"
     return f"≥ {most:.2f} ⟨fₙ⟩{why}"
 
 
@@ -284,6 +288,15 @@ def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
+
+
+def jamming(state: AppState) -> str:
+    """The meaning of width and, with friction, of colour while a packing is compressed, as HTML."""
+    low, stops, high = MOBILISED
+    bar = BAR.format(low=low, stops=",".join(stops), high=high)
+    live = state.work.live
+    coloured = live is not None and live.selection.packing["mu"] > 0
+    return JAMMING.format(colour=MOBILISATION.format(bar=bar) if coloured else "")
 
 
 def legend(state: AppState, pulled: bool = False) -> str:
