@@ -115,10 +115,10 @@ TERMS = {
     ),
     "eta3": Term(
         "indeterminacy by intervals",
-        "Mean length of the intervals of fₙ and fₜ over mean midpoint; times 0.15 it compares with "
-        "η1 and η2. Seen: grows with the number of networks, without a standard error. Each ratio "
-        "has its own midpoints, so that seen can exceed exact although every seen interval lies "
-        "within the exact one.",
+        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints; "
+        "times 0.15, it is comparable to η1 and η2. The value seen grows with the number of "
+        "networks and has no standard error. It can exceed the exact one, because their midpoints "
+        "differ.",
         "η3",
     ),
     "width": Term(
@@ -263,8 +263,8 @@ TERMS = {
         "random walk",
         "Each step kicks all forces at random, then restores balance: by moving to the nearest "
         "network, or, in the paper's walk, by sweeps. Most of its states lie on the boundary of "
-        "S: they are not uniform in S. In a shadow of many dimensions, even boundary points can "
-        "fall near the middle.",
+        "S: they are not uniform in S. Projected from many dimensions onto two, even boundary "
+        "points can fall near the middle.",
     ),
     "uniform": Term(
         "uniform in S",

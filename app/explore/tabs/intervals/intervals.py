@@ -48,10 +48,11 @@ class View(TabView):
         self._grown: Replay | None = None  # whose growth is drawn
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196})
+        self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
         self.choices = [
             self.drawn,
             self.sorts,
-            question("Unit", SCALES, self.looks, "scale", **SMALL),
+            self.units,
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.lead, self.details = note("Opening the packing …"), note()
@@ -97,11 +98,14 @@ class View(TabView):
         self.drawing.figure.xaxis.axis_label = worded(
             replay, _across(len(replay.order), len(ranks), order.words)
         )
-        self.drawing.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[looks.scale]})"
+        self.drawing.figure.yaxis.axis_label = worded(
+            replay, f"normal force fₙ ({SCALES[looks.scale]})"
+        )
         self.drawn.options = by_words(
             {"all": f"all {len(replay.order)}", "some": f"{SOME} of them"}
         )
-        self.sorts.options = by_words({key: worded(replay, name) for key, name in SORTS.items()})
+        for select, labels in ((self.sorts, SORTS), (self.units, SCALES)):
+            select.options = by_words({key: worded(replay, name) for key, name in labels.items()})
         self.lead.object = sentence(state, replay, bool(exact), beyond)
         if replay is not self._grown:
             self._grown = replay
