@@ -35,7 +35,8 @@ LEGEND = """
   </svg> {shown:.3g} ⟨fₙ⟩</span>
 <span tabindex="0" data-term="rattler">pale disks: no force</span>
 <details><summary>Scales</summary>
-<label>colours full at <input name="full" type="number" step="any" placeholder="auto"
+<label title="auto: for ΔFₙ, its {saturation:g} quantile in this packing">colours full at
+  <input name="full" type="number" step="any" placeholder="auto"
   min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
 <label>widths times <input name="stretch" type="number" step="any"
   min="{stretch_least:g}" max="{stretch_most:g}" value="{stretch:g}"></label>
@@ -279,8 +280,8 @@ def colour_words(state: AppState, pulled: bool) -> str:
 
 
 def _full(looks: Looks, most: float) -> str:
-    """The ΔF_n of full colour, and the reason for it."""
-    why = "" if looks.full else f" ({SATURATION:g} quantile of this packing)"
+    """The ΔF_n of full colour, and whether it differs between packings."""
+    why = "" if looks.full else " (this packing)"
     return f"≥ {most:.2f} ⟨fₙ⟩{why}"
 
 
@@ -325,6 +326,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         colour_term=EXPLAINED[looks.colour],
         colour=meaning if pulled else _chosen(state, "colour", COLOURS),
         bar=bar,
+        saturation=SATURATION,
         full="" if looks.full is None else f"{looks.full:g}",
         full_least=full_least,
         full_most=full_most,
