@@ -19,7 +19,7 @@ VERDICTS = {
     "too few data": "…",
     "not measured": "…",
 }
-DECIDED = {"reproduced", "differs", "not reproduced"}
+DECIDED = {"reproduced", "differs", "not reproduced"}  # the others may change with more data
 # Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
     "gauss_seidel": "the paper’s walk, to 10⁻³",

@@ -35,7 +35,6 @@ THIS = (
     "0.15 η₃ seen by other samplers, and exact",
 )
 WIDE = {"sizing_mode": "stretch_width"}
-NOWHERE: dict[str, list[float]] = {"x": [], "y": []}  # no ring
 
 
 class Rows(NamedTuple):
@@ -92,9 +91,10 @@ class View(TabView):
     def _clear(self) -> None:
         """Remove the rings and figures of another packing."""
         if self.indeterminacy is not None:
-            self.indeterminacy.etas.here.data = self.indeterminacy.z.here.data = NOWHERE
+            self.indeterminacy.etas.mark([])
+            self.indeterminacy.z.mark([])
         if self.correlations is not None:
-            self.correlations.drawn.here.data = NOWHERE
+            self.correlations.drawn.mark([])
         self.scatter = None
         for figures in self.folded[:2]:
             figures.objects = []
