@@ -97,7 +97,8 @@ TERMS = {
     ),
     "extent": Term(
         "extent of a force",
-        "Largest minus smallest fₙ of one contact, over all of S (exact) or over the states seen.",
+        "Largest minus smallest fₙ of one contact, over all of S (exact) or over the states seen; "
+        "the latter grows with their number.",
         "ΔFₙ",
     ),
     "eta1": Term(
@@ -114,9 +115,10 @@ TERMS = {
     ),
     "eta3": Term(
         "indeterminacy by intervals",
-        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints. "
-        "Intervals are several times as long as forces scatter, so plots show 0.15 η3 for "
-        "comparison with η1 and η2.",
+        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints; "
+        "times 0.15, it is comparable to η1 and η2. The value seen grows with the number of "
+        "networks and has no standard error. It can exceed the exact one, because their midpoints "
+        "differ.",
         "η3",
     ),
     "width": Term(
@@ -148,6 +150,12 @@ TERMS = {
     ),
     "accepted": Term(
         "accepted", "The fraction of the walk's attempts that ended in a balanced network."
+    ),
+    "error": Term(
+        "standard error",
+        "The sampling error of a mean over the networks of this one packing: how much it would "
+        "vary if the walk were repeated. Other packings made with the same μ differ by more.",
+        "±",
     ),
     "r_hat": Term(
         "mixing",
@@ -188,6 +196,16 @@ TERMS = {
     "exact": Term(
         "possible (exact)",
         "All values that a contact's force can take: bounds over all of S, computed and certified.",
+    ),
+    "certified": Term(
+        "certified bounds",
+        "Each end of an exact interval is a linear program. Its dual solution proves that no "
+        "network in S lies beyond the end by more than the gap.",
+    ),
+    "at_rest": Term(
+        "at rest",
+        "Tested: with its forces as packed, contact dynamics moves no disk. Not tested: the "
+        "packing was imported, or made without this test.",
     ),
     "known": Term(
         "known forces",
@@ -243,10 +261,10 @@ TERMS = {
     # Sources of states
     "walk": Term(
         "random walk",
-        "At each step, all forces are kicked at random and then brought back into balance: in the "
-        "nearest-network walk by moving to the nearest network, in the paper's walk by sweeps. "
-        "Most of its states lie on the boundary of S; in a two-dimensional shadow of many "
-        "dimensions, even boundary points can fall near the middle.",
+        "Each step kicks all forces at random, then restores balance: by moving to the nearest "
+        "network, or, in the paper's walk, by sweeps. Most of its states lie on the boundary of "
+        "S: they are not uniform in S. Projected from many dimensions onto two, even boundary "
+        "points can fall near the middle.",
     ),
     "uniform": Term(
         "uniform in S",

@@ -43,6 +43,7 @@ export function render({ model, view }) {
 
   function draw() {
     root.querySelector("small").textContent = model.fixed ? "the same packing at every μ" : "each μ has its own packing"
+    part("hill").hidden = model.fixed // the curve is of other packings
     range.min = model.least
     range.max = model.most
     part("ticks").innerHTML = model.stored

@@ -35,10 +35,10 @@ class Quantity(NamedTuple):
 class Sampling(NamedTuple):
     """How the states were generated, and whether they are reliable, in words."""
 
-    sampler: str  # "nearest-network walk"
+    sampler: str  # "nearest-network walk", with its explanation as HTML
     networks: str  # "1000 of 1000 attempts accepted, 50 kept"
     verdict: str  # "mixed", "not mixed", or empty if undecided
-    mixing: str  # the reason: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20"
+    mixing: str  # the reason: "R̂ 1.01 ≤ 1.1, effective size at least 49 ≥ 20", as HTML
     doubt: str  # why they are not reliable, "not mixed: …"; empty if they are
 
     def __str__(self) -> str:
@@ -120,17 +120,17 @@ def _judged(
     agree, enough = "≤" if r_hat <= MIXED else ">", "≥" if size >= least else "<"
     mixing = (
         f"{before}R̂ {r_hat:.2f} {agree} {MIXED:g}, "
-        f"{of_size}effective size {bound}{size:.0f} {enough} {least:g}"
+        f"{of_size}{term('ess', 'effective size')} {bound}{size:.0f} {enough} {least:g}"
     )
     doubt = "; ".join(_doubts(r_hat, size, least))
     return Sampling(name, networks, "not mixed" if doubt else "mixed", mixing, doubt)
 
 
 def sampler(selection: Selection) -> str:
-    """The sampler, in words."""
+    """The sampler, in words; a walk is also said not to be uniform."""
     if selection.kind == "uniform":
-        return "uniform sample of S"
-    return SOLVERS[selection.relax]
+        return term("uniform", "uniform sample of S")
+    return f"{term('walk', SOLVERS[selection.relax])} (not uniform)"
 
 
 def _networks(replay: Replay) -> str:
@@ -140,7 +140,7 @@ def _networks(replay: Replay) -> str:
     words = f"{states} networks"
     if "accepted" in summary and not summary.get("skipped"):
         tried = sum(int(summary[name]) for name in ("accepted", "rejected", "unconverged"))
-        words = f"{int(summary['accepted'])} of {tried} attempts accepted"
+        words = f"{int(summary['accepted'])} of {tried} {term('accepted', 'attempts accepted')}"
     return f"{words}, {stored} kept" if stored < states else words
 
 
@@ -163,14 +163,16 @@ def _mean_extent(possible: xr.Dataset | None) -> str:
 
 
 def unborne(replay: Replay) -> str:
-    """A warning if the packing bears no stress along a closed direction; empty if it does."""
+    """A warning if no network bears stress along a closed direction; empty if one does."""
     links, first = replay.links, np.unique(replay.links.contact, return_index=True)[1]
     branch = np.stack([links.x1 - links.x0, links.y1 - links.y0])[:, first]
     normal = branch / np.hypot(*branch)
     tangent = np.stack([-normal[1], normal[0]])
-    force = replay.normal[0] * normal + replay.tangential[0] * tangent
-    stress = (force * branch).sum(axis=1)
-    small = np.isfinite(replay.box) & (np.abs(stress) < UNBORNE * np.abs(stress).max(initial=0.0))
+    # The first network of a packing without forces may carry less than others at this μ.
+    stress = np.abs(
+        replay.normal @ (normal * branch).T + replay.tangential @ (tangent * branch).T
+    ).max(axis=0)
+    small = np.isfinite(replay.box) & (stress < UNBORNE * stress.max(initial=0.0))
     if replay.outlines or not small.any():
         return ""
     missing, other = ("horizontal", "vertical") if small[0] else ("vertical", "horizontal")
@@ -200,4 +202,4 @@ def short(value: float) -> str:
     """A value to four digits, and 0 for rounding errors."""
     if not np.isfinite(value):
         return "–"
-    return "0" if abs(value) < 1e-12 else f"{value:.4g}".replace("-", "−")
+    return "0" if abs(value) < 1e-12 else f"{value:#.4g}".rstrip(".").replace("-", "−")

@@ -81,11 +81,11 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]
     if known and state.knowledge.whole is None:
-        rows.append([f"exact{known}: being computed", *"–" * len(measures)])
+        rows.append([f"exact{known}: being computed", *_dashes(measures)])
     elif any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
-    values = [one.exact or (MEASURE if offered else "–") for one in packing]
+    values = [_named(one, one.exact or (MEASURE if offered else "–")) for one in packing]
     doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
@@ -100,8 +100,8 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
 def coming(state: AppState) -> str:
     """The tables while the requested states are being computed."""
     measures, packing = result_values.measures(state), result_values.packing(state)
-    found = [one.exact if state.growing and one.exact else "–" for one in packing]
-    rows = [[words, *"–" * len(measures)] for words in ("seen: being computed", "exact")]
+    found = [_named(one, one.exact if state.growing and one.exact else "–") for one in packing]
+    rows = [[words, *_dashes(measures)] for words in ("seen: being computed", "exact")]
     return (
         _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [found])
@@ -114,8 +114,17 @@ def _titles(quantities: Iterable[Quantity]) -> list[str]:
 
 
 def _values(quantities: Iterable[Quantity], of: str) -> list[str]:
-    values = [(getattr(one, of), UNIT.get(one.key, "")) for one in quantities]
-    return [value + unit if value else "" for value, unit in values]
+    values = [(one, getattr(one, of).replace("±", term("error", "±"))) for one in quantities]
+    return [_named(one, value + UNIT.get(one.key, "")) if value else "" for one, value in values]
+
+
+def _dashes(quantities: Iterable[Quantity]) -> list[str]:
+    return [_named(one, "–") for one in quantities]
+
+
+def _named(quantity: Quantity, value: str) -> str:
+    """A value after its symbol, which is seen where a low window leaves no room for titles."""
+    return f'<i class="symbol">{term(quantity.key, quantity.symbol)}</i> {value}'
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

@@ -5,9 +5,14 @@ export function render({ model }) {
   const root = document.createElement("label")
   root.className = "scenelist"
   root.innerHTML = `Scene <select aria-label="Scene">${model.titles.map(([name, title]) =>
-    `<option value="${name}" ${name === model.shown ? "selected" : ""}>${title}</option>`).join("")}</select>`
+    `<option value="${name}">${title}</option>`).join("")}</select>`
   const list = root.querySelector("select")
-  model.on("shown", () => { list.value = model.shown })
+  const show = () => {
+    list.value = model.shown
+    list.querySelector("[value=imported]").hidden = model.shown !== "imported"
+  }
+  model.on("shown", show)
+  show()
   list.addEventListener("change", (event) => {
     const here = new URLSearchParams(window.location.search), there = new URLSearchParams({ scene: event.target.value })
     if (here.get("dark")) there.set("dark", here.get("dark"))

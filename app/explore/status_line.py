@@ -11,6 +11,7 @@ from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results.library import Cell
 from ..state.app_state import AppState
+from ..widgets.hints import term
 from . import result_values
 
 TESTED = "distance_to_rest"  # in the record of a packing tested to be at rest
@@ -57,7 +58,7 @@ class StatusLine(Scripted):
     def _tell(self, *events: Any) -> None:
         lines = list(facts(self._state))
         if self._rest is not None and self._rest[0] == self._state.cell:
-            lines.append("at rest: tested" if self._rest[1] else "at rest: not tested")
+            lines.append(f"{term('at_rest')}: {'' if self._rest[1] else 'not '}tested")
         self.facts = lines
 
     def _report(self, *events: Any) -> None:
@@ -95,7 +96,7 @@ def bounds(state: AppState) -> str:
     count, total = int(np.isfinite(gap).sum()), gap.size
     most = float(exact["max_gap"])
     of = "" if count == total else f" of {total}"
-    return f"{count}{of} bounds certified, gap ≤ {power(most)} ⟨fₙ⟩"
+    return f"{count}{of} {term('certified', 'bounds certified')}, gap ≤ {power(most)} ⟨fₙ⟩"
 
 
 def power(value: float) -> str:

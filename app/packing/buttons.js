@@ -55,7 +55,7 @@ const BUTTONS = `
     ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
   </div>
   <div class="read">
-    <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
+    <span class="differs">from that <b class="origin"></b>, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span class="running">
       <span>of the <b class="played"></b> stored networks played so far:</span>
@@ -193,6 +193,7 @@ export class Buttons {
     const { walk, seen, residual } = replay
     const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
     const texts = {
+      origin: walk.origin,
       apart: `${Math.round(100 * replay.apart)} %`,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),

@@ -111,8 +111,7 @@ class Player {
     this.pushed.end()
     this.tellTab()
     scene.mixed = this.replay.mixed
-    scene.palette = plain(plain(model.palettes).scene)
-    this.plots.colours = plain(plain(model.palettes).plots)
+    this.dress()
     this.select()
     this.tellTrack()
     this.buttons.say("")
@@ -127,6 +126,13 @@ class Player {
     this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null)
     if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
     else if (!shown) this.playFirst()
+  }
+
+  /** Apply the colours of the theme. */
+  dress() {
+    const palettes = plain(this.model.palettes)
+    this.scene.palette = plain(palettes.scene)
+    this.plots.colours = plain(palettes.plots)
   }
 
   /** The position in a finished walk that corresponds to the walk in progress; null for another walk. */
@@ -378,7 +384,7 @@ class Player {
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
-      palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
+      palettes: loaded(() => { this.dress(); scene.changed(); this.again() }),
       thrust: loaded(() => { this.thrust = plain(model.thrust); scene.drawMarks() }),
       pins: loaded(() => { this.recover(); this.mark() }),
       contact: loaded(() => { this.recover(); buttons.typed = false; this.mark() }),

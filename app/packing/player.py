@@ -9,7 +9,7 @@ import param
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from ..results.replays import Replay
+from ..results.replays import Replay, worded
 from ..state.view_settings import Appearance
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
@@ -92,6 +92,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "tilt": replay.tilt,
         "window": list(replay.window),
         "inviting": replay.inviting,
+        "origin": worded(replay, "as packed"),
         "x": disks.x,
         "y": disks.y,
         "r": disks.r,

@@ -3,8 +3,8 @@
 import { button, createElement } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
-const OUTSIDE = (last) => `Networks have the numbers 1 to ${last}; 0 is the network as packed.`
-const NEAREST = (asked, found) => `Network ${asked} is not stored; showing ${found}, the nearest stored one.`
+const OUTSIDE = ({ states, origin }) => `Networks have the numbers 1 to ${states}; 0 is the network ${origin}.`
+const NEAREST = (asked, found) => `${asked} is not stored: showing ${found}.`
 
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 
@@ -28,7 +28,7 @@ export class PlayerBar {
     this.place = createElement("span", { className: "state" })
     this.speedInput = createElement("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
     this.rate = createElement("span", { className: "rate" })
-    this.stored = createElement("span", { className: "stored" })
+    this.stored = createElement("span", { className: "stored", role: "status" })
     this.keep = button("Keep all", () => actions.keep(), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
     const along = createElement("label", { className: "at" }), speed = createElement("label", { title: "networks per second" })
@@ -58,12 +58,19 @@ export class PlayerBar {
     const { walk } = replay
     if (this.number.value.trim() === "" || !Number.isInteger(asked) || asked < 0 || asked > walk.states) {
       this.number.value = walk.number[replay.frame]
-      return this.say(OUTSIDE(walk.states))
+      return this.say(OUTSIDE(walk))
     }
     const position = replay.positionOf(asked), found = walk.number[position]
     this.actions.scrub(position)
     this.number.value = found
-    if (found !== asked) this.say(NEAREST(asked, found))
+    this.missed = found === asked ? null : { asked, found }
+    this.showStored()
+  }
+
+  /** Beside the button that stores all networks: which ones are stored, or that the requested one is not. */
+  showStored() {
+    const { missed, replay: { stride, walk } } = this, usual = stride > 1 ? `every ${ordinal(stride)} of ${walk.states} is stored` : ""
+    this.stored.textContent = missed ? NEAREST(missed.asked, missed.found) : usual
   }
 
   showPlaying(playing) {
@@ -82,11 +89,12 @@ export class PlayerBar {
   /** Show another track: its length, and whether the omitted networks can be computed. */
   showTrack(replay, keepable) {
     this.replay = replay
-    const { last, swinging, stride, walk } = replay
+    const { last, swinging, stride } = replay
     this.scrub.max = last
     this.scrub.step = swinging ? 0.01 : 1
     this.root.classList.toggle("swings", swinging)
-    this.stored.textContent = stride > 1 ? `every ${ordinal(stride)} of ${walk.states} is stored` : ""
+    this.missed = null
+    this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)
     this.showRate()
   }
@@ -95,6 +103,10 @@ export class PlayerBar {
   show(replay) {
     this.scrub.value = replay.position
     this.place.textContent = this.place.title = replay.place
+    if (this.missed && this.missed.found !== replay.walk.number[replay.frame]) {
+      this.missed = null
+      this.showStored()
+    }
     if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
   }
 }

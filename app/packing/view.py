@@ -35,7 +35,8 @@ LEGEND = """
   </svg> {shown:.3g} ⟨fₙ⟩</span>
 <span tabindex="0" data-term="rattler">pale disks: no force</span>
 <details><summary>Scales</summary>
-<label>colours full at <input name="full" type="number" step="any" placeholder="auto"
+<label title="auto: for ΔFₙ, its {saturation:g} quantile in this packing">colours full at
+  <input name="full" type="number" step="any" placeholder="auto"
   min="{full_least:g}" max="{full_most:g}" value="{full}"> ⟨fₙ⟩</label>
 <label>widths times <input name="stretch" type="number" step="any"
   min="{stretch_least:g}" max="{stretch_most:g}" value="{stretch:g}"></label>
@@ -47,8 +48,13 @@ THRUST = """
 """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
-<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
+{colour}
 <span>pale disks: no contacts; dashed: the shrinking box; disks outside: periodic copies</span>
+"""
+DIVERGING = [BLUE, GREY, ORANGE]
+MOBILISED = "−1", DIVERGING, "+1 (slides)"
+MOBILISATION = """
+<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span><span>{bar}</span>
 """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
@@ -164,10 +170,10 @@ class PackingView:
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or ("pull" if self.state.hand.pulls else "")
-        thrust = THRUST if self.player.thrust else ""
-        self.player.param.update(
-            legend=JAMMING if self.state.work.moving else legend(self.state, pulled) + thrust,
-        )
+        if self.state.work.moving:
+            self.player.legend = jamming(self.state)
+            return
+        self.player.legend = legend(self.state, pulled) + (THRUST if self.player.thrust else "")
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
@@ -246,17 +252,16 @@ def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> f
 
 def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
-    diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"≤ −{full:.3g}", diverging, f"≥ +{full:.3g} ⟨fₙ⟩"
+    change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
-        "mobilised": ("−1", diverging, "+1 (slides)"),
+        "mobilised": MOBILISED,
         "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
-        "deviation": (f"≥ {FULL_DEVIATION:g} σ less", diverging, f"≥ {FULL_DEVIATION:g} σ more"),
+        "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
         "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
@@ -275,8 +280,8 @@ def colours(state: AppState, pulled: str) -> dict[str, str]:
 
 
 def _full(looks: Looks, most: float) -> str:
-    """The ΔF_n of full colour, and the reason for it."""
-    why = "" if looks.full else f" ({SATURATION:g} quantile)"
+    """The ΔF_n of full colour, and whether it differs between packings."""
+    why = "" if looks.full else " (this packing)"
     return f"≥ {most:.2f} ⟨fₙ⟩{why}"
 
 
@@ -284,6 +289,15 @@ def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
+
+
+def jamming(state: AppState) -> str:
+    """The meaning of width and, with friction, of colour while a packing is compressed, as HTML."""
+    low, stops, high = MOBILISED
+    bar = BAR.format(low=low, stops=",".join(stops), high=high)
+    live = state.work.live
+    coloured = live is not None and live.selection.packing["mu"] > 0
+    return JAMMING.format(colour=MOBILISATION.format(bar=bar) if coloured else "")
 
 
 def legend(state: AppState, pulled: str = "") -> str:
@@ -309,6 +323,7 @@ def legend(state: AppState, pulled: str = "") -> str:
         colour_term=EXPLAINED[looks.colour],
         colour=_chosen(state, "colour", colours(state, pulled)),
         bar=bar,
+        saturation=SATURATION,
         full="" if looks.full is None else f"{looks.full:g}",
         full_least=full_least,
         full_most=full_most,
@@ -334,7 +349,8 @@ def _chosen(state: AppState, name: str, labels: dict[str, str]) -> str:
     value = getattr(state.looks, name)
     available = meaningful(state, labels, name)
     options = "".join(
-        f'<option value="{key}"{" selected" if key == value else ""}>{words}</option>'
+        f'<option value="{key}"{" selected" if key == value else ""}>'
+        f"{worded(state.shown, words)}</option>"
         for key, words in available.items()
     )
     title = {"colour": "Colour", "thickness": "Width"}[name]

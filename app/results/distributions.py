@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from granforce.study import kinds
 from granforce.study.bounds import UNDETERMINED
-from granforce.study.cells import entry_name
 from granforce.study.store import Store
 from granforce.types import Floats
 
-from .library import Cell, Library, readable
+from .library import Cell, readable
 from .selection import Selection, unusual
 
 MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
@@ -46,18 +44,6 @@ def _kin(selection: Selection) -> tuple[Any, ...]:
 def rows(cells: Iterable[Cell]) -> list[Row]:
     """A dict per cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
     return [_row(cell.store, cell.name, cell.selection) for cell in cells]
-
-
-def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
-    """The same from exact intervals, for packings whose intervals are in a store."""
-    rows = []
-    for cell in cells:
-        for store in library.stores:
-            name = entry_name(store, kinds.INTERVALS, cell.selection.intervals)
-            if name in store:
-                rows.append(_row(store, name, cell.selection))
-                break
-    return rows
 
 
 def _row(store: Store, name: str, selection: Selection) -> Row:

@@ -29,6 +29,7 @@ class Replay(NamedTuple):
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     friction: Floats  # (N_c,) friction coefficients
     force_scale: float  # ⟨f_n⟩, force
+    given: bool  # whether the original network came with the packing; otherwise it was computed
     normal: Any  # (F, N_c) float32 f_n: the original network, then the stored states
     tangential: Any  # (F, N_c) float32 f_t
     number: Any  # (F,) number of the state, 0 for the original
@@ -47,7 +48,9 @@ class Replay(NamedTuple):
 
 
 def worded(replay: Replay, text: str) -> str:
-    """A text about disks, for what the replay shows: disks, or bodies."""
+    """A text about disks as packed, for what the replay shows: also bodies, and other origins."""
+    if not replay.given:
+        text = text.replace("as packed", "at the start").replace("since packed", "since the start")
     return text.replace("disk", "body").replace("bodys", "bodies") if replay.outlines else text
 
 
@@ -136,6 +139,7 @@ def _replay(
         backbone=backbone,
         friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
         force_scale=scale,
+        given=packing.info.get("forces") != "found",
         normal=np.ascontiguousarray(frames[..., 0]),
         tangential=np.ascontiguousarray(frames[..., 1]),
         order=np.argsort(frames[0, :, 0], kind="stable"),

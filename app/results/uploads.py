@@ -14,6 +14,7 @@ from ..background.jobs import Job
 from ..background.limits import LIMITS, Limits
 from .entry_labels import call
 from .library import Library
+from .replays import Replay
 
 Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
 
@@ -216,6 +217,21 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
         return Brought(params, report, source)
 
     return work
+
+
+def at_friction(report: dict[str, Any], replay: Replay) -> dict[str, Any]:
+    """The report with numbers of the packing on screen, whose friction may differ."""
+    summary = replay.summary
+    same = summary["mu"] == report["friction"]
+    return report | {
+        "rattlers": summary.get("rattlers", report["rattlers"]),
+        "backbone_contacts": summary["contacts"],
+        "coordination": summary["coordination"],
+        "dimension": summary["dimension"],
+        "friction": summary["mu"],
+        "mean_normal_force": replay.force_scale,
+        "violation": report["violation"] if same else None,
+    }
 
 
 def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:

@@ -101,7 +101,8 @@ export function render({ model }) {
     else if (word !== at) show(word, keys)
   }
 
-  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll: hide }
+  // Scrolling inside a shadow root is not heard here, but what causes it is.
+  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll: hide, wheel: hide, touchmove: hide }
   for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, true)
   model.on("remove", () => {
     for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)

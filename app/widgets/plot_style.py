@@ -24,6 +24,10 @@ PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 # The page's font, which canvases do not inherit.
 FONT = 'Inter, Roboto, "Helvetica Neue", sans-serif'
 
+# Bokeh makes both white: a notice about the wheel, and the strip behind the tools.
+NOTICE = ".bk-Panel { color: var(--ink); background-color: var(--paper); }"
+TOOLS = ":host(.bk-inner) { background: none; }"
+
 COLOURS = 33
 
 
@@ -104,12 +108,13 @@ def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
         "min_border_left": 56,
         "min_border_right": 18,
         "styles": {"flex-shrink": "0"},  # in a low window texts would cover it
+        "stylesheets": [NOTICE],
     }
     fig = Figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
     if fig.toolbar.tools:
         fig.add_tools(WheelZoomTool(modifiers={"ctrl": True}))
     fig.toolbar.logo = None
-    fig.toolbar.autohide = True
+    fig.toolbar.update(autohide=True, stylesheets=[TOOLS])
     if title:
         fig.title.update(text_font=FONT, text_font_size="13px")
     for axis in fig.axis:

@@ -43,6 +43,8 @@ _INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
 LEAST_ACCURACY = 0.01
 # Paths on each rung to find the next one, of which the first are left out of the mean of q.
 _PILOT, _FORGOTTEN = 48, 16
+# Rungs of a ladder over √h, for progress before it is built: 36 for h = 227.
+_RUNGS = 2.4
 # Initial paths on each rung, and number of batches whose scatter gives the error.
 _FIRST, _BATCHES = 256, 16
 # Number of paths whose speeds are drawn together; after each such batch rounding is corrected.
@@ -103,7 +105,7 @@ def volume(
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
-    number. progress(done, total) counts paths; total is an estimate.
+    number. progress(done, total) counts paths; total is an estimate that later rounds may raise.
 
     Raises InputError for an accuracy below LEAST_ACCURACY and unbounded forces, NotJammedError if S
     is empty.
@@ -127,15 +129,16 @@ def volume(
         )
     top, log_top, top_variance = _top(polytope, np.random.default_rng([seed, 0]))
     stores = uniform.stores_for(polytope, workers, workers)
-    rungs = _climbed(polytope, stores[0], top, seed)
-    rungs = _extended(polytope, stores, rungs, np.full((2, len(rungs[0])), _FIRST), progress)
+    paths = _Paths(progress)
+    rungs = _climbed(polytope, stores[0], top, seed, paths)
+    rungs = _extended(polytope, stores, rungs, np.full((2, len(rungs[0])), _FIRST), paths)
     for _ in range(_MOST_ROUNDS):
         ladders, variance = _summed(rungs)
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
         allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
-        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, allowed), progress)
+        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, allowed), paths)
     ladders += polytope.units + log_top
     log_volume, two_errors = float(ladders.mean()), 2 * np.sqrt(variance.sum())
     agree = abs(ladders[1] - ladders[0]) <= AGREE * two_errors
@@ -172,6 +175,25 @@ def _top(polytope: Walls, rng: np.random.Generator) -> tuple[float, float, float
     return beta, log, (1 - part) / (part * _COUNTED)
 
 
+class _Paths:
+    """Counts paths for a progress callback; threads share it."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress, self._total = progress, 0
+        self._flown: list[int] = []  # appending needs no lock
+
+    def expect(self, more: int) -> None:
+        """So many paths are still to come."""
+        self._total = sum(self._flown) + more
+
+    def add(self, count: int) -> None:
+        """So many have been flown."""
+        self._flown.append(count)
+        if self._progress is not None:
+            done = sum(self._flown)
+            self._progress(done, max(done, self._total))
+
+
 class _Rung(NamedTuple):
     """One chain at one β."""
 
@@ -184,21 +206,27 @@ class _Rung(NamedTuple):
     refused: int
 
 
-def _climbed(polytope: Walls, rows: billiard.RowStore, top: float, seed: int) -> list[list[_Rung]]:
+def _climbed(
+    polytope: Walls, rows: billiard.RowStore, top: float, seed: int, paths: _Paths
+) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
     down: list[_Rung] = []
+    paths.expect(int(_RUNGS * np.sqrt(polytope.dimension)) * 2 * (_PILOT + _FIRST))
     beta, slacks, reach = top, np.ones(polytope.count), float(np.sqrt(polytope.dimension / top))
     while not down or down[-1].beta > 0:
         down.append(_settled(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
+        paths.add(_PILOT)
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
         spread = max(float(q.std()), 1e-300)
         # Wider distributions have wider q: the last step is short, and none is too long.
         beta = 0.0 if beta * spread < STEP else max(0.5 * beta, beta - 2 * STEP / spread)
     up = []
+    paths.expect(len(down) * (_PILOT + 2 * _FIRST))
     for number in range(len(down) - 1, -1, -1):
         beta, reach = down[number].beta, down[number].reach
         up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
+        paths.add(_PILOT)
         slacks = up[-1].end.slacks
     rungs = down, up[::-1]
     # New paths: those that built the ladder are not used in the result.
@@ -312,7 +340,7 @@ def _extended(
     stores: Sequence[Any],
     rungs: list[list[_Rung]],
     more: Integers,
-    progress: Progress | None,
+    paths: _Paths,
 ) -> list[list[_Rung]]:
     """The rungs with this many more paths each, on threads."""
     count = len(rungs[0])
@@ -324,9 +352,16 @@ def _extended(
         for way in (0, 1)
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
-    parts = uniform.shared(
-        stores, tasks, lambda some, rows: [_flown(polytope, rows, *task) for task in some]
-    )
+    paths.expect(int(more.sum()))
+
+    def flown(some: list[tuple[_Rung, int]], rows: billiard.RowStore) -> list[_Rung]:
+        flying = []
+        for rung, number in some:
+            flying.append(_flown(polytope, rows, rung, number))
+            paths.add(number)
+        return flying
+
+    parts = uniform.shared(stores, tasks, flown)
     longer = [list(way) for way in rungs]
     for (way, k), rung in zip(order, itertools.chain(*parts), strict=True):
         longer[way][k] = rung

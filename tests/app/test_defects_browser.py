@@ -341,7 +341,7 @@ def test_legends_lie_where_no_curve_goes(lasting, tab, least):
 
 def test_ticks_of_friction_stand_apart(lasting):
     page = lasting("?tab=statistics")
-    page.get_by_text("In nearest-network walks, η₂ is largest at").wait_for()
+    page.get_by_text("Maxima in nearest-network walks").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -362,7 +362,7 @@ def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page.get_by_role("button", name="increase the push").click()
     page.get_by_text("contacts open,").first.wait_for()
     page.get_by_role("tab", name="Friction").click()
-    page.get_by_text("In nearest-network walks, η₂ is largest at").wait_for()
+    page.get_by_text("Maxima in nearest-network walks").wait_for()
     assert "already known" not in (served[1] / "log").read_text()
 
 
@@ -395,7 +395,7 @@ def test_curves_of_the_shown_states_end_at_their_targets(page):
 
 def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(visit):
     page = visit("?tab=statistics")
-    for words in ("In nearest-network walks, η₂ is largest at", "How long are the intervals?"):
+    for words in ("Maxima in nearest-network walks", "How long are the intervals seen?"):
         page.get_by_text(words).wait_for()
     page.get_by_text("Are the strong contacts the undetermined ones?").wait_for()
     page.wait_for_function(f"() => {MODEL}('indeterminacy_here')?.get_length() === 3")

@@ -29,8 +29,9 @@ LOOK = {
     "& .MuiTabs-root": {"minHeight": "36px", "margin": "0 10px"},
     "& .MuiTab-root": {
         "minWidth": 0, "minHeight": "36px", "padding": "6px 2px",
-        "marginRight": "clamp(8px, 1.2vw, 20px)",
-        "fontSize": "15px", "letterSpacing": 0, "color": "var(--quiet)", **PLAIN,
+        "marginRight": "clamp(4px, 2.6vw - 18px, 20px)",
+        "fontSize": "clamp(13px, 1.4vw, 15px)", "letterSpacing": 0,
+        "color": "var(--quiet)", **PLAIN,
     },
     "& .MuiTab-root.Mui-selected": {"color": "var(--ink)", "fontWeight": 600},
     "& .MuiTabs-list, & .MuiTabs-flexContainer": {"borderBottom": "1px solid var(--line)"},

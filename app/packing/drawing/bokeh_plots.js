@@ -57,13 +57,13 @@ export class Plots {
     source.properties.data.change.connect(this.onData)
   }
 
-  /** Intervals and measures of the states passed. */
+  /** Intervals, and the measures of a walk in progress. */
   show(replay, scale) {
     this.replay = replay
     const bars = this.find("bars"), growth = this.find("growth"), { walk, seen } = replay
     if (replay.bounds && bars && bars.data !== this.filled) this.fillBounds(replay, scale)
     if (bars?.get_column("at")) this.showBars(bars, replay, scale)
-    if (!(growth?.get_column("state")?.length >= walk.number.length)) return
+    if (!walk.numbers || !(growth?.get_column("state")?.length >= walk.number.length)) return
     let most = 0
     for (const name of ["eta1", "eta2", "eta3"]) {
       const column = growth.get_column(name), factor = name === "eta3" ? 0.15 : 1, all = walk[name]

@@ -104,7 +104,7 @@ export class Look {
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
-      ["force as packed", walk.normal[c].toFixed(3)],
+      [`force ${walk.origin}`, walk.normal[c].toFixed(3)],
     ]
     const pins = plain(this.model.pins ?? {}), pin = [...(pins.contacts ?? [])].indexOf(c)
     if (pin >= 0) rows.push(["held at", pins.words[pin]])

@@ -5,7 +5,6 @@ import { createElement } from "../../browser/dom.js"
 import { circle, line } from "../../browser/canvas_paths.js"
 
 const TRAIL = 4 // states in the trail in force space
-const PACKED = 1.25 // radius of the dot for the original force, px
 const DOT_REACH = 9 // px from a dot that still count as the dot
 const TOUCH_REACH = 22 // the same for a finger
 
@@ -70,18 +69,16 @@ export const LAYERS = {
     const column = (name) => plots.find("bars").get_column(name)
     const rank = column("rank"), low = column("low"), high = column("high")
     const now = column("now"), original = column("original")
-    const half = 0.5 * glyph("seen").width.value * Math.abs(x(1) - x(0)), radius = glyph("dots").size.value / 2
+    const half = 0.5 * glyph("seen").width.value * Math.abs(x(1) - x(0)), radius = (name) => glyph(name).size.value / 2
     context.fillStyle = plots.colours.seen
     for (let k = 0; k < rank.length; k++) {
       const top = y(high[k])
       context.fillRect(x(rank[k]) - half, top, 2 * half, y(low[k]) - top)
     }
-    context.strokeStyle = context.fillStyle = plots.colours.original
-    context.lineWidth = 1.5
-    if (fig.tags.includes("sorted")) curve(context, rank, original, x, y, rank.length)
-    else dots(context, rank, original, x, y, PACKED)
+    context.fillStyle = plots.colours.original
+    dots(context, rank, original, x, y, radius("packed"))
     context.fillStyle = plots.colours.dots
-    dots(context, rank, now, x, y, radius)
+    dots(context, rank, now, x, y, radius("dots"))
     context.fillStyle = plots.colours.now
     const chosen = plots.find("chosen")?.get_column("rank")?.[0]
     const at = chosen === undefined ? -1 : rank.indexOf(chosen)

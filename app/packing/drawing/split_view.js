@@ -59,7 +59,7 @@ export class Split {
       captions[0].textContent = `${of(other.walk)}: ${other.title}`
       captions[1].textContent = live.moves ? "being compressed" : of(walk)
     } else {
-      captions[0].textContent = frame ? `pinned: network ${walk.number[frame]}` : "pinned: as packed"
+      captions[0].textContent = frame ? `pinned: network ${walk.number[frame]}` : `pinned: ${walk.origin}`
       captions[1].textContent = "now"
     }
   }

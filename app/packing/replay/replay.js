@@ -94,10 +94,10 @@ export class Replay {
   /** The position in words, following the number of the network. */
   get place() {
     const { walk, frame } = this, [a, b, portion] = this.spot
-    const name = (k) => (k ? `network ${walk.number[k]}` : "that as packed")
+    const name = (k) => (k ? `network ${walk.number[k]}` : `that ${walk.origin}`)
     if (this.held) return `of ${walk.states}, ${this.held.place ?? "pulled"}`
     if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
-    return frame ? `of ${walk.states}` : `of ${walk.states}, as packed`
+    return frame ? `of ${walk.states}` : `of ${walk.states}, ${walk.origin}`
   }
 
   /** The number of the network, and its position. */

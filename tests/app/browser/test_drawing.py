@@ -26,7 +26,7 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
             const text = () => bar.root.textContent, type = (number) => {
                 bar.number.value = number
                 bar.number.dispatchEvent(new Event("change"))
-                return [bar.number.value, replay.frame, said.pop() ?? ""]
+                return [bar.number.value, replay.frame, said.pop() ?? "", bar.stored.textContent]
             }
             bar.showTrack(replay, true)
             const words = text(), kept = !bar.keep.hidden
@@ -39,8 +39,9 @@ def test_a_network_is_reached_by_its_number_and_the_stride_is_said(run):
     )
     assert "every 20th of 60 is stored" in words and "1 stored network/s" in words
     assert kept == [True, False]
-    assert reached[0] == ["41", 3, ""] and reached[2] == ["0", 0, ""]
-    assert reached[1] == ["21", 2, "Network 12 is not stored; showing 21, the nearest stored one."]
+    every = "every 20th of 60 is stored"
+    assert reached[0] == ["41", 3, "", every] and reached[2] == ["0", 0, "", every]
+    assert reached[1] == ["21", 2, "", "12 is not stored: showing 21."]
     assert all(found[:2] == ["0", 0] and "1 to 60" in found[2] for found in refused)
 
 
@@ -138,6 +139,7 @@ WALK = {
     "contacts": 2, "mu": 0.5, "friction": [0.5, 0.5], "states": 3, "number": [0, 1, 2, 3],
     "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
     "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8], "unit": 1,
+    "origin": "as packed",
 }  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction.claims import VERDICTS
+from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
@@ -215,6 +216,31 @@ def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
     press(view.read)
     wait_for(state, lambda: state.cell.selection.imported)
     assert "bears no vertical stress" in results.html
+
+
+def test_a_packing_without_forces_follows_the_friction(state):
+    """Six disks of which three carry at μ = 0.3, and all at μ = 1; nothing is said of packing."""
+    high = 3**0.5
+    places = [(0.5, 0.5), (1.5, 0.5), (2.5, 0.5), (1, 0.5 + high / 2), (2, 0.5 + high / 2)]
+    places.append((1.5, 0.5 + high))
+    rows = "".join(f"{x!r},{y!r},0.5\n" for x, y in places)
+    view, results, controls = upload_view.View(state), Results(state), Controls(state)
+    bars = intervals_view.View(state)
+    assert "as packed" in bars.lead.object and controls.scene.shown == "many"
+    view._dropped([("six.csv", b"x,y,r\n" + rows.encode())])
+    view.box.value = f"3, {1 + high!r}"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported)
+    assert "bears no vertical stress" in results.html and "<b>0.3</b>" in view.report.object
+    assert controls.scene.shown == "imported"
+    controls.mu.mu = 1.0
+    wait_for(state, lambda: state.cell.mu == 1.0)
+    assert state.replay.summary["dimension"] == 2 and "bears no" not in results.html
+    report = dict(re.findall("<td[^>]*>([^<]*)</td><td><b>([^<]*)", view.report.object))
+    assert (report["friction μ"], report["dimension h of S"], report["rattlers"]) == ("1", "2", "0")
+    assert "as packed" not in bars.lead.object + bars.drawing.figure.xaxis[0].axis_label
+    assert bars.drawing.packed.glyph.size == 0
+    assert "force at the start" in bars.sorts.options
 
 
 @pytest.mark.parametrize("contacts", [False, True])
@@ -419,15 +445,6 @@ def test_rows_are_those_of_the_study_and_unlike_cells_stay_out(state):
     assert len(distributions.alike([*cells, cells[1]._replace(selection=seed)], cells[0])) == 4
 
 
-def test_exact_rows_come_from_kept_intervals(state):
-    cell = state.cell
-    assert distributions.exact_rows(state.library, [cell]) == []
-    state.compute_exact()
-    wait_for(state, lambda: state.exact is not None)
-    (row,) = distributions.exact_rows(state.library, [cell])
-    assert row["eta3"] == state.exact["eta3"].item() > distributions.rows([cell])[0]["eta3"]
-
-
 def test_groups_spread_over_mu_and_hold_the_one_on_screen():
     found = [{"mu": mu, "extent": np.full(3, mu)} for mu in (0, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10)]
     chosen = distributions.groups(found, 0.3)
@@ -469,22 +486,25 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
 
 def test_what_is_said_of_friction_is_made_from_the_study(state):
     view = friction_tab(state)
-    points = statistics.means(study_data.rows("walk"), "eta2")
-    mu, *largest = max(points, key=lambda point: point[1])
-    words = rf"nearest-network walks, η₂ is largest at μ = {mu:g}: ([\d.]+) ± ([\d.]+)\."
-    shown = re.search(words, view.first.object)
-    assert [float(number) for number in shown.groups()] == pytest.approx(largest, abs=6e-5)
+    for name, words in (("eta1", "η₁"), ("eta2", "η₂"), ("eta3", "0.15 η₃ seen")):
+        points = statistics.means(study_data.rows("walk"), name, factor=0.15 ** (name == "eta3"))
+        mu, *largest = max(points, key=lambda point: point[1])
+        shown = re.search(rf"{words} ([\d.]+) ± ([\d.]+)", view.first.object)
+        assert [float(number) for number in shown.groups()] == pytest.approx(largest, abs=6e-5)
+        assert f"at μ = {mu:g}" in view.first.object
     told = view.details.object
     assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
     shown = [c for about in study_data.ABOUT for c in study_data.claims(about)]
     assert len(shown) == len(every)  # each once
+    agree, total, *parts = map(int, re.findall(r"\d+", told.partition("(")[0]))
+    assert total == agree + sum(parts) == told.count("<tr><td>")
 
 
 def test_a_tap_on_a_point_opens_such_a_packing_or_computes_it(state):
     view = friction_tab(state)
-    points = view.indeterminacy.etas.points[1].data_source
+    points = view.indeterminacy.etas.points[0].data_source
     rings = []
     state.param.watch(lambda event: rings.extend(view.indeterminacy.etas.here.data["x"]), "replay")
     points.selected.indices = [list(points.data["x"]).index(1)]

@@ -1,5 +1,7 @@
 """The numbers of the results line: values with errors, and what they are worth in words."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -32,6 +34,7 @@ def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
     kept = 0.15 * ready.replay.growth["eta3"][-1]  # of the 50 networks that are stored
     assert float(found["eta3"].seen) > kept + 0.01
     told = tables(ready, None, False)
+    assert 'data-term="error"' in told
     assert "seen in all 1000 networks" in told and "from these 50, the values from all 1000" in told
     assert found["eta3"].exact == short(0.15 * ready.exact["eta3"].item())
     assert float(found["extent"].exact) > float(found["extent"].seen) > 0
@@ -45,8 +48,11 @@ def test_free_dimensions_are_derived(ready):
 
 def test_the_walk_says_how_it_was_sampled(ready):
     told = result_values.sampling(ready)
-    assert str(told).startswith("nearest-network walk, 1000 of 1000")
+    line = re.sub("<[^>]*>", "", str(told))
+    assert line.startswith("nearest-network walk (not uniform), 1000 of 1000 attempts accepted")
     assert "50 kept" in told.networks and "at least" in told.mixing and not told.doubt
+    for key in ("walk", "accepted", "ess"):
+        assert f'data-term="{key}"' in str(told)
     assert told.verdict == "mixed" and "≤ 1.1" in told.mixing and ">mixed</span>" in str(told)
 
 
@@ -59,9 +65,12 @@ def test_a_walk_that_is_short_is_not_said_to_have_mixed(state):
 def test_errors_have_two_digits():
     assert with_error(0.101234, 0.00123) == "0.1012 ± 0.0012"
     assert with_error(-487.23, 12.7) == "−487 ± 13"
-    assert with_error(0.5, float("nan")) == "0.5"
-    assert between(1.40012, 1.40034) == "1.40012 … 1.40034" and between(2.0, 2.0) == "2"
+    assert with_error(0.5, float("nan")) == "0.5000"
+    assert between(1.40012, 1.40034) == "1.40012 … 1.40034" and between(2.0, 2.0) == "2.000"
     assert short(1e-17) == "0" and short(float("nan")) == "–"
+    assert [short(value) for value in (0.118, 0.2084, 2, 1234, 12345)] == [
+        "0.1180", "0.2084", "2.000", "1234", "1.234e+04",
+    ]  # fmt: skip
 
 
 def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
@@ -73,7 +82,7 @@ def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
             "force_scale": 2.0,
         }
     )
-    assert result_values._mean_extent(possible) == "1"
+    assert result_values._mean_extent(possible) == "1.000"
     exact = {"low": np.zeros(3), "high": high[:, 0]}
     assert view.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
     assert np.isfinite(view.full_extent(None, exact))

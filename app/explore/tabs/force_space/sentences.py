@@ -6,7 +6,7 @@ from granforce.types import Floats
 
 from ....results import planes
 from ....results.planes import Outlined, Plane
-from ....results.replays import Replay
+from ....results.replays import Replay, worded
 from ....widgets.hints import term
 from ....widgets.parts import mark
 from ....widgets.plot_style import DOT, ORIGINAL, PALE, STATES
@@ -33,7 +33,7 @@ def lead(replay: Replay, plane: Plane, outlined: bool) -> str:
     marks = [
         mark(STATES, "a dot: a whole force network", "50%"),
         mark(DOT, "the one in the packing: drag it", "50%"),
-        mark(ORIGINAL, term("original", "as packed")),
+        mark(ORIGINAL, term("original", worded(replay, "as packed"))),
     ]
     if outlined:
         marks.insert(0, mark(PALE, f"all possible values ({term('exact', 'exact')})"))

@@ -1,4 +1,4 @@
-"""A figure against friction: lines of the study with error bars, and the page's packings on top."""
+"""A figure against friction: lines of the study with error bars, and the packing on screen."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ class Line(NamedTuple):
 
 
 class AgainstFriction:
-    """Lines of the study against μ; `mark` puts rings at the page's packings."""
+    """Lines of the study against μ; `mark` puts rings at the packing on screen."""
 
     def __init__(self, name: str, label: str, lines: Sequence[Line], **options: Any) -> None:
         """name: of the file to save the figure in; label: of the value axis."""
@@ -39,7 +39,6 @@ class AgainstFriction:
         fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
         self.figure = fig
         self.points: list[GlyphRenderer] = []
-        self.page_sources: list[ColumnDataSource] = []
         self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
         for k, line in enumerate(lines):
             self._draw(k, line)
@@ -47,30 +46,24 @@ class AgainstFriction:
             "x", "y", source=self.here, size=13, fill_alpha=0, line_color=DOT, line_width=2,
             legend_label=HERE,
         )  # fmt: skip
+        self._entry = fig.legend[0].items[-1]
+        self._entry.visible = False
 
     def _draw(self, k: int, line: Line) -> None:
-        fig, colour, marker = self.figure, COLOURS[k], MARKERS[k % len(MARKERS)]
         x, y, error = shown(line.points)
-        source = ColumnDataSource({"x": [], "y": []})
-        self.page_sources.append(source)
-        rings = fig.scatter(
-            "x", "y", source=source, size=9, marker=marker, fill_alpha=0, line_color=colour,
-            line_alpha=0.7,
-        )  # fmt: skip
-        self.points.append(rings)
         if not len(x):
             return
         columns = {"x": x, "y": y, "error": error}
         rows = ("μ", "@x{0.[00000]}")
-        self.points.append(draw_means(fig, line.label, columns, k, rows, line_dash=line.dash))
+        self.points.append(
+            draw_means(self.figure, line.label, columns, k, rows, line_dash=line.dash)
+        )
 
-    def mark(self, points_of_page: Sequence[Points], here: Sequence[tuple[float, float]]) -> None:
-        """Open symbols at the points of the page, of each line, and rings at `here`, (μ, value)."""
-        for source, points in zip(self.page_sources, points_of_page, strict=True):
-            x, y, _ = shown(points)
-            source.data = {"x": x, "y": y}
+    def mark(self, here: Sequence[tuple[float, float]]) -> None:
+        """Put rings at `here`, (μ, value)."""
         x, y, _ = shown([(mu, value, 0.0) for mu, value in here])
         self.here.data = {"x": x, "y": y}
+        self._entry.visible = len(x) > 0  # no entry without a mark
 
     def choosable(self, choose: Callable[[float], object]) -> None:
         """choose(μ): called when a point is clicked."""

@@ -3,6 +3,8 @@
 import html
 import re
 from collections import Counter
+from collections.abc import Iterable
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ VERDICTS = {
     "too few data": "…",
     "not measured": "…",
 }
+DECIDED = {"reproduced", "differs", "not reproduced"}  # the others may change with more data
 # Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
     "gauss_seidel": "the paper’s walk, to 10⁻³",
@@ -49,12 +52,26 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
     )
 
 
-def legend() -> str:
-    """The contents of the tables, as HTML."""
+def summary(about: Iterable[str]) -> str:
+    """How many claims about some of `study_data.ABOUT` are reproduced, and how to read the tables.
+
+    Methods without a verdict do not count.
+    """
+    verdicts: dict[str, set[str]] = {}
+    for claim in chain.from_iterable(map(study_data.claims, about)):
+        decided = {claim["verdict"]} & DECIDED
+        verdicts.setdefault(claim["statement"], set()).update(decided)
+    found = list(verdicts.values())
+    all_agree = found.count({"reproduced"})
+    some = sum("reproduced" in one for one in found) - all_agree
+    undecided = found.count(set())
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
-        f"<b>What the paper claims, and what the study found</b> ({PAPER}). Each cell: verdict, "
-        f"value, 95 % interval over packings; hover over it for the criterion. {marks}."
+        f"<b>This study reproduces {all_agree} of the paper's {len(found)} claims by every method "
+        f"that reached a verdict, and {some} by some methods only.</b> "
+        f"{len(found) - all_agree - some - undecided} differ or are not reproduced, and "
+        f"{undecided} are undecided ({PAPER}). Each cell: verdict, value, 95 % interval over "
+        f"packings; hover over it for the criterion. {marks}."
     )
 
 

@@ -9,7 +9,7 @@ from ....background.jobs import Job, reading
 from ....packing.view import exact_intervals
 from ....results import distributions, study_data
 from ....results.distributions import Row
-from ....results.library import Cell, Library
+from ....results.library import Cell
 from ....results.replays import Replay
 from ....state.app_state import AppState
 from ....widgets.contact_scatter import ContactScatter
@@ -20,7 +20,7 @@ from .this_packing import extents, forces
 
 # If it is wide enough, z is drawn inside Figure 1, where there is no curve; otherwise below it.
 INSET = """
-:host { position: absolute; top: 56px; left: 70px; width: 40% !important; z-index: 1; }
+:host { position: absolute; top: 66px; left: 70px; width: 40% !important; z-index: 1; }
 @media (max-width: 599.95px) { :host { position: static; width: 100% !important; } }
 """
 CLAIMED = {
@@ -32,17 +32,15 @@ CLAIMED = {
 THIS = (
     "This packing: which contacts are least determined",
     "This packing: how many forces are large",
-    "0.15 η₃ by other samplers, and exact",
+    "0.15 η₃ seen by other samplers, and exact",
 )
 WIDE = {"sizing_mode": "stretch_width"}
-NOWHERE: dict[str, list[float]] = {"x": [], "y": []}  # no ring
 
 
 class Rows(NamedTuple):
     """Numbers of the page's packings made with the same options as the one on screen."""
 
     page: list[Row]
-    exact: list[Row]  # of those whose exact intervals are in a store
     here: Row  # that on screen
 
 
@@ -66,14 +64,14 @@ class View(TabView):
         self.catch_up()
 
     def panel(self) -> pn.Column:
-        """The figures, each below its sentence; claims last."""
+        """The figures, each below its sentence; the paper's claims after the first."""
         first, fourth, sixth = self.figures
         pairs = [part for pair in zip(THIS, self.folded, strict=True) for part in pair]
         folds = folded_away(*pairs)
         self.looks.keep_open(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
-            self.first, first, self.fourth, fourth, self.sixth,
-            sixth, folds, self.details, **WIDE,
+            self.first, first, self.details, self.fourth, fourth, self.sixth,
+            sixth, folds, **WIDE,
         )  # fmt: skip
 
     def update(self) -> None:
@@ -87,15 +85,16 @@ class View(TabView):
         if replay is not self._of:
             self._clear()
         self._of = replay
-        work = read(state.library, cells, state.cell)
+        work = read(cells, state.cell)
         self.task.start(work, lambda rows: state.work.piecewise(self._show(replay, rows)))
 
     def _clear(self) -> None:
         """Remove the rings and figures of another packing."""
         if self.indeterminacy is not None:
-            self.indeterminacy.etas.here.data = self.indeterminacy.z.here.data = NOWHERE
+            self.indeterminacy.etas.mark([])
+            self.indeterminacy.z.mark([])
         if self.correlations is not None:
-            self.correlations.drawn.here.data = NOWHERE
+            self.correlations.drawn.mark([])
         self.scatter = None
         for figures in self.folded[:2]:
             figures.objects = []
@@ -105,8 +104,9 @@ class View(TabView):
         if self.indeterminacy is None:
             self.indeterminacy = Indeterminacy()
             self._place(self.indeterminacy)
+            self.details.object = _claims()
         self.first.object = self.indeterminacy.sentence()
-        self.indeterminacy.mark(rows.page, rows.here)
+        self.indeterminacy.mark(rows.here)
         yield
         fig, self.fourth.object = study_figures.extents(rows.page, rows.here["mu"])
         self.figures[1].objects = [plotted(fig)]
@@ -116,8 +116,7 @@ class View(TabView):
             self.correlations.drawn.choosable(self._choose)
             self.figures[2].objects = [plotted(self.correlations.drawn.figure)]
             self.sixth.object = self.correlations.sentence()
-            self.details.object = _claims()
-        self.correlations.mark(rows.page, rows.exact, rows.here)
+        self.correlations.mark(rows.here)
         yield
         self._show_packing(replay, rows)
 
@@ -136,7 +135,7 @@ class View(TabView):
         fig, sentence = forces(replay)
         self.folded[0].objects = [plotted(self.scatter.figure)]
         self.folded[1].objects = [note(sentence), plotted(fig)]
-        self.folded[2].objects = [plotted(study_figures.samplers(rows.page, rows.exact))]
+        self.folded[2].objects = [plotted(study_figures.samplers(rows.here))]
 
     def _mark(self, *events: Any) -> None:
         if self.scatter is not None and self.visible:
@@ -152,14 +151,14 @@ class View(TabView):
             self.state.compute()
 
 
-def read(library: Library, cells: Sequence[Cell], cell: Cell) -> Callable[[Job], Rows]:
+def read(cells: Sequence[Cell], cell: Cell) -> Callable[[Job], Rows]:
     """Work that reads the numbers of the cells, where `cell` is on screen; and the study, once."""
 
     def work(job: Job) -> Rows:
         job.begin(f"reading {len(cells)} results and the finished study")
         study_data.study()
         rows = distributions.rows(cells)
-        return Rows(rows, distributions.exact_rows(library, cells), rows[list(cells).index(cell)])
+        return Rows(rows, rows[list(cells).index(cell)])
 
     return work
 
@@ -168,4 +167,4 @@ def _claims() -> str:
     tables = [
         claims.claims(about, heading, opened=about == "eta") for about, heading in CLAIMED.items()
     ]
-    return claims.legend() + "".join(tables) if any(tables) else ""
+    return claims.summary(CLAIMED) + "".join(tables) if any(tables) else ""

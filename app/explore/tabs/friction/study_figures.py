@@ -16,16 +16,16 @@ from ....widgets.hints import term
 from ....widgets.parts import figure
 from ....widgets.plot_style import DOT, legend_above
 from ...result_values import with_error
-from .against_friction import COLOURS, MARKERS, AgainstFriction, Line, Points
+from .against_friction import COLOURS, MARKERS, AgainstFriction, Line
 
-MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃", 0.15))
+MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃ seen", 0.15))
 # Parts of the study, and their labels.
 SAMPLERS = {
-    "walk": "nearest-network walk",
-    "sweeps_1e-3": "the paper’s walk, to 10⁻³",
-    "uniform": "uniform in S",
+    "walk": "seen: nearest-network walk",
+    "sweeps_1e-3": "seen: the paper’s walk, to 10⁻³",
+    "uniform": "seen: uniform in S",
     "exact": "exact",
-    "sweeps_1e-4": "the paper’s walk, to 10⁻⁴",
+    "sweeps_1e-4": "seen: the paper’s walk, to 10⁻⁴",
 }
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
@@ -38,42 +38,35 @@ class Indeterminacy:
 
     def __init__(self) -> None:
         walks = study_data.rows("walk")
-        lines = [
+        self.lines = [
             Line(label, statistics.means(walks, name, factor=factor))
             for name, label, factor in MEASURES
         ]
         self.etas = AgainstFriction(
-            "indeterminacy", "indeterminacy η", lines, height=340, min_border_left=62
+            "indeterminacy", "indeterminacy η", self.lines, height=340, min_border_left=62
         )
-        most = max((y + error for line in lines for _, y, error in line.points), default=1.0)
+        most = max((y + error for line in self.lines for _, y, error in line.points), default=1.0)
         self.etas.figure.y_range = DataRange1d(start=0, end=ROOM * most)
         self.z = AgainstFriction(
             "coordination", "z", [Line("z", statistics.means(walks, "coordination"))], height=130,
-            min_border_left=28, min_border_right=6, tools="",
+            min_border_left=28, min_border_right=6, tools="", toolbar_location=None,
         )  # fmt: skip
-        legend_above(self.etas.figure, 3)
+        legend_above(self.etas.figure)
         _small(self.z.figure)
 
-    def mark(self, page_rows: list[Row], here: Row) -> None:
-        """Mark the page's packings, with `here` on screen."""
-        points = [statistics.means(page_rows, name, factor=factor) for name, _, factor in MEASURES]
-        rings = [(here["mu"], factor * here[name]) for name, _, factor in MEASURES]
-        self.etas.mark(points, rings)
-        self.z.mark(
-            [statistics.means(page_rows, "coordination")], [(here["mu"], here["coordination"])]
-        )
+    def mark(self, here: Row) -> None:
+        """Mark the packing on screen."""
+        self.etas.mark([(here["mu"], factor * here[name]) for name, _, factor in MEASURES])
+        self.z.mark([(here["mu"], here["coordination"])])
 
     def sentence(self) -> str:
-        """The μ at which η is largest, and why it falls again, as HTML."""
+        """The μ at which each η is largest, and why it falls again, as HTML."""
         walks = study_data.rows("walk")
-        points = statistics.means(walks, "eta2")
-        if not points:
+        if not walks:
             return "The finished study is not part of this installation."
-        mu, value, error = max(points, key=lambda point: point[1])
         z = statistics.means(walks, "coordination")
         return (
-            f"<b>In nearest-network walks, η₂ is largest at μ = {mu:g}: "
-            f"{with_error(value, error)}.</b> "
+            f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> "
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
             f"As in the paper's Figure 1. Points: means over {packings(walks)} packings of 400 "
@@ -82,8 +75,18 @@ class Indeterminacy:
         )
 
 
-def samplers(page_rows: list[Row], exact: list[Row]) -> Figure:
-    """0.15 η3 by every sampler and exact, and of the page's packings."""
+def _maxima(lines: Iterable[Line]) -> str:
+    """The largest value of each line, with its error and μ; a μ that they share only once."""
+    largest = [(line.label, *max(line.points, key=lambda point: point[1])) for line in lines]
+    values = [f"{label} {with_error(value, error)}" for label, _, value, error in largest]
+    where = [f"at μ = {mu:g}" for _, mu, _, _ in largest]
+    if len(set(where)) == 1:
+        return f"{', '.join(values)}, {'all ' * (len(where) > 1)}{where[0]}"
+    return ", ".join(map(" ".join, zip(values, where, strict=True)))
+
+
+def samplers(here: Row) -> Figure:
+    """0.15 η3 by every sampler and exact, with the packing on screen."""
     lines = [
         Line(
             label,
@@ -93,9 +96,7 @@ def samplers(page_rows: list[Row], exact: list[Row]) -> Figure:
         for part, label in SAMPLERS.items()
     ]
     drawn = AgainstFriction("samplers", "0.15 η₃", lines, height=280)
-    none: Points = []
-    points = [statistics.means(rows, "eta3", factor=0.15) for rows in (page_rows, exact)]
-    drawn.mark([points[0], none, none, points[1], none], [])
+    drawn.mark([(here["mu"], 0.15 * here["eta3"])])
     legend_above(drawn.figure, 3)
     return drawn.figure
 
@@ -126,8 +127,9 @@ def extents(page_rows: list[Row], mu: float) -> tuple[Figure, str]:
         return fig, ""
     widest = max(means, key=lambda label: means[label])
     text = (
-        f"<b>How long are the intervals?</b> (Figure 4) Longest on average at {widest}: "
-        f"{means[widest]:.2f} mean forces. Beyond the median P falls like exp(−(λx)<sup>b</sup>); "
+        "<b>How long are the intervals seen?</b> (Figure 4) Longest on average at "
+        f"{widest}: {means[widest]:.2f} mean forces; exact intervals are longer. "
+        "Beyond the median P falls like exp(−(λx)<sup>b</sup>); "
         f"b = 1 is exponential. {'; '.join(tails)}. Bars: standard errors over packings."
     )
     return fig, text
@@ -160,14 +162,11 @@ class Correlations:
             for part, points in self.points.items()
         ]
         self.drawn = AgainstFriction("correlation", "corr(fₙ, ΔFₙ)", lines, height=280)
-        legend_above(self.drawn.figure, 3)
+        legend_above(self.drawn.figure, 2)
 
-    def mark(self, page_rows: list[Row], exact: list[Row], here: Row) -> None:
-        """Mark the page's packings, with `here` on screen."""
-        known = [[row for row in rows if _has(row, "correlation")] for rows in (page_rows, exact)]
-        points = [statistics.means(rows, "correlation") for rows in known]
-        ring = [(here["mu"], here["correlation"])] if _has(here, "correlation") else []
-        self.drawn.mark([points[0], [], points[1]], ring)
+    def mark(self, here: Row) -> None:
+        """Mark the packing on screen."""
+        self.drawn.mark([(here["mu"], here.get("correlation", np.nan))])
 
     def sentence(self) -> str:
         """The range of the walk's correlation, as HTML; empty without a study."""
@@ -178,15 +177,11 @@ class Correlations:
         mu, most, error = max(points, key=lambda point: point[1])
         return (
             "<b>Are the strong contacts the undetermined ones?</b> (Figure 6) The "
-            f"{term('correlation')} of fₙ as packed with ΔFₙ lies between {min(values):.2f} and "
-            f"{max(values):.2f} for nearest-network walks; it is largest, "
+            f"{term('correlation')} of fₙ as packed with ΔFₙ seen lies between "
+            f"{min(values):.2f} and {max(values):.2f} for nearest-network walks; it is largest, "
             f"{with_error(most, error)}, at μ = {mu:g}. 1: the strongest contacts are the least "
             "determined; 0: unrelated."
         )
-
-
-def _has(row: Row, name: str) -> bool:
-    return bool(np.isfinite(row.get(name, np.nan)))
 
 
 def packings(rows: Iterable[Row]) -> str:

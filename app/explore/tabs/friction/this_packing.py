@@ -8,7 +8,7 @@ from bokeh.plotting import figure as Figure
 from granforce.measures import statistics
 
 from ....packing.view import Bounds
-from ....results.replays import Replay
+from ....results.replays import Replay, worded
 from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import figure
 from ....widgets.plot_style import DARK, ORIGINAL, PALE, legend_above
@@ -33,7 +33,7 @@ def forces(replay: Replay) -> tuple[Figure, str]:
         "force_distribution", None, "normal force fₙ, in mean forces", "P(fₙ)", height=300,
         y_axis_type="log",
     )  # fmt: skip
-    layers = [("as packed", replay.normal[0], ORIGINAL)]
+    layers = [(worded(replay, "as packed"), replay.normal[0], ORIGINAL)]
     if len(replay.normal) > 1:
         layers.insert(0, ("networks shown", replay.normal[1:], DARK))
     edges = np.linspace(0, min(LARGEST, float(replay.normal.max())), BINS + 1)

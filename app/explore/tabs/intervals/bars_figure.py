@@ -16,11 +16,11 @@ COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low"
 COLUMNS += ("whole_low", "whole_high")  # exact intervals without known forces
 APART = 100  # number of bars up to which there are gaps between them, and large dots
 # Widths of the bars for previously possible, possible and seen forces, in that of one contact, and
-# size of dots, px; for few bars, and for many.
-FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.6)
-CARRYING = 0.1  # ⟨f_n⟩ as packed above which a contact counts for the axis in its own unit
+# sizes of the dots now and as packed, px; for few bars, and for many.
+FEW, MANY = (0.8, 0.8, 0.4, 7.5, 5.5), (1.0, 1.0, 0.9, 2.6, 2.5)
 # Rows of the tooltip, without and with known forces.
-NOW = ("contact", "@contact"), ("now", "@now{0.000}"), ("as packed", "@original{0.000}")
+PACKED = ("as packed", "@original{0.000}")
+NOW = ("contact", "@contact"), ("now", "@now{0.000}"), PACKED
 EXACT = "@exact_low{0.000} … @exact_high{0.000}"
 FREE = *NOW, ("interval, exact", EXACT), ("interval, seen", "@low{0.000} … @high{0.000}")
 GIVEN = (
@@ -28,7 +28,7 @@ GIVEN = (
     ("interval, exact given the held forces", EXACT),
     ("interval, exact without them", "@whole_low{0.000} … @whole_high{0.000}"),
 )
-SORTED = "sorted"  # tag of the figure if forces as packed ascend; see plot_layer.js
+CARRYING = 0.1  # ⟨f_n⟩ as packed above which a contact counts for the axis in its own unit
 
 
 class BarsFigure:
@@ -57,10 +57,12 @@ class BarsFigure:
         ]  # fmt: skip
         _, exact, sampled = self.layers
         sampled.name = "seen"  # see plot_layer.js
-        self.line = fig.line("rank", "original", source=self.bars, color=ORIGINAL, line_width=1.5)
-        self.packed = fig.scatter("rank", "original", source=self.bars, size=2.5, color=ORIGINAL)
+        # Points, because neighbours in an order are not neighbours in the packing.
+        self.packed = fig.scatter(
+            "rank", "original", source=self.bars, color=ORIGINAL, name="packed"
+        )
         self.dots = fig.scatter("rank", "now", source=self.bars, color=now(False), name="dots")
-        for moving in (sampled, self.line, self.packed, self.dots):
+        for moving in (sampled, self.packed, self.dots):
             moving.tags = MOVES
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.tip = hover([sampled, exact])
@@ -77,7 +79,6 @@ class BarsFigure:
         With known forces, the values seen are left out: networks of all of S exceed the bounds.
         """
         self.contacts = contacts
-        self.tip.tooltips = list(GIVEN if before else FREE)
         seen = {} if before else {"low": replay.low[:, 0], "high": replay.high[:, 0]}
         original = replay.normal[0, contacts]
         unit = original if relative else np.ones_like(original)
@@ -95,10 +96,14 @@ class BarsFigure:
             "at": contacts.astype(np.int32),
             "contact": replay.backbone[contacts].astype(np.int32),
         }
-        *widths, size = FEW if len(contacts) <= APART else MANY
+        *widths, size, packed = FEW if len(contacts) <= APART else MANY
         for renderer, width in zip(self.layers, widths, strict=True):
             renderer.glyph.width = width
         self.dots.glyph.size = size
+        # Not hidden by `visible`, which the player sets.
+        self.packed.glyph.size = packed if replay.given else 0
+        rows = GIVEN if before else FREE
+        self.tip.tooltips = [row for row in rows if replay.given or row is not PACKED]
         set_range(self.figure.x_range, 0, len(contacts) + 1)
         highest = np.fmax.reduce([scaled[name] for name in ("whole_high", "exact_high", "high")])
         highest = np.where(np.isinf(highest), np.nan, highest)  # without an upper bound
@@ -106,13 +111,6 @@ class BarsFigure:
         top = 1.04 * float(np.nanmax(highest[counted], initial=1.0))
         set_range(self.figure.y_range, 0, top)
         return int(np.sum(highest > top))
-
-    def draw_packed(self, ascending: bool) -> None:
-        """Draw forces as packed as a line if they ascend, otherwise as dots."""
-        # Not by `visible`, which the player sets.
-        self.line.glyph.line_alpha = float(ascending)
-        self.packed.glyph.update(fill_alpha=float(not ascending), line_alpha=float(not ascending))
-        self.figure.tags = [SORTED] if ascending else []
 
     def mark(self, contact: int | None) -> None:
         """Mark a contact if it is drawn."""

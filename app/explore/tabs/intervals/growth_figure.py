@@ -1,4 +1,4 @@
-"""η1, η2 and 0.15 η3 of the stored networks played so far."""
+"""η1, η2 and 0.15 η3 of the stored networks, as their number grows."""
 
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d, Span
@@ -9,11 +9,12 @@ from ....widgets.parts import MOVES, figure
 from ....widgets.plot_style import SERIES, legend_above
 from .bars_figure import set_range
 
+FACTORS = {"eta3": 0.15}
 LABELS = {"eta1": "η₁", "eta2": "η₂", "eta3": "0.15 η₃"}
 
 
 class GrowthFigure:
-    """Curves that the player fills in; dashed: their final values over all networks shown."""
+    """Curves over all stored networks; the player extends them during a walk. Dashed: ends."""
 
     def __init__(self) -> None:
         self.growth = ColumnDataSource({name: [] for name in ("state", *LABELS)}, name="growth")
@@ -37,11 +38,15 @@ class GrowthFigure:
     def show(self, replay: Replay, growing: bool) -> None:
         """Curves of a Replay, or of a walk in progress with unknown end."""
         number = progress_feed.numbers(replay.summary) if growing else replay.number
-        counted = f"{len(number) - 1} stored of {replay.summary['states']} networks"
-        self.figure.xaxis.axis_label = f"number of the network; η of the {counted} played so far"
-        unseen = np.full(len(number), np.nan, dtype=np.float32)
+        stored = f"{len(number) - 1} of {replay.summary['states']}"
+        self.figure.xaxis.axis_label = f"network; η over the stored ones up to it ({stored})"
+        unseen = np.full(len(number), np.nan)
+        columns = {
+            name: unseen.copy() if growing else FACTORS.get(name, 1.0) * replay.growth[name]
+            for name in LABELS
+        }
         self.growth.data = {"state": number.astype(np.int32)} | {
-            name: unseen.copy() for name in LABELS
+            name: values.astype(np.float32) for name, values in columns.items()
         }
         set_range(self.figure.x_range, 0, max(1, int(number[-1])))
         for span in self.finals:
@@ -49,8 +54,7 @@ class GrowthFigure:
         if growing:
             return
         # Of the states shown, like the curves: the states of the whole walk span more.
-        ends = [replay.growth[name][-1] * (0.15 if name == "eta3" else 1) for name in LABELS]
-        ends = [float(np.nan_to_num(end)) for end in ends]
+        ends = [float(np.nan_to_num(values[-1])) for values in columns.values()]
         for span, end in zip(self.finals, ends, strict=True):
             span.location = end
         set_range(self.figure.y_range, 0, 1.25 * max(ends) if max(ends) > 1e-9 else 1)

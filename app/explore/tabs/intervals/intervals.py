@@ -46,13 +46,15 @@ class View(TabView):
         self.drawing = BarsFigure(self._choose)
         self.growth = GrowthFigure()
         self._grown: Replay | None = None  # whose growth is drawn
-        # Whether bars are exact and sorted as packed, and how many extend beyond the axis.
-        self._drawn: tuple[bool, bool, int] | None = None
+        # Whether bars are exact, and how many extend beyond the axis.
+        self._drawn: tuple[bool, int] | None = None
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
+        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196})
+        self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
         self.choices = [
             self.drawn,
-            question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196}),
-            question("Unit", SCALES, self.looks, "scale", **SMALL),
+            self.sorts,
+            self.units,
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.lead, self.details = note("Opening the packing …"), note()
@@ -94,15 +96,20 @@ class View(TabView):
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
         relative = looks.scale == "own"
         beyond = self.drawing.show(replay, order.contacts[ranks], exact, before, relative)
-        self.drawing.draw_packed(order.as_packed)
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
-        self.drawing.figure.xaxis.axis_label = _across(len(replay.order), len(ranks), order.words)
-        self.drawing.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[looks.scale]})"
+        self.drawing.figure.xaxis.axis_label = worded(
+            replay, _across(len(replay.order), len(ranks), order.words)
+        )
+        self.drawing.figure.yaxis.axis_label = worded(
+            replay, f"normal force fₙ ({SCALES[looks.scale]})"
+        )
         self.drawn.options = by_words(
             {"all": f"all {len(replay.order)}", "some": f"{SOME} of them"}
         )
-        self._drawn = bool(exact), order.as_packed, beyond
+        for select, labels in ((self.sorts, SORTS), (self.units, SCALES)):
+            select.options = by_words({key: worded(replay, name) for key, name in labels.items()})
+        self._drawn = bool(exact), beyond
         self._explain()
         if replay is not self._grown:
             self._grown = replay
@@ -122,7 +129,7 @@ class View(TabView):
         self.exact.visible = self.state.replay is not None and self.state.exact_requested
 
 
-def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: int = 0) -> str:
+def sentence(state: AppState, replay: Replay, exact: bool, beyond: int = 0) -> str:
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return worded(replay, HEADING + FIXED)
@@ -138,7 +145,8 @@ def sentence(state: AppState, replay: Replay, exact: bool, line: bool, beyond: i
     if narrowed is None:
         parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
     parts.append(mark(now(state.looks.dark), _dot(state), "50%"))
-    parts.append(mark(ORIGINAL, term("original", "as packed"), "50%" if not line else "1px"))
+    if replay.given:
+        parts.append(mark(ORIGINAL, term("original", "as packed"), "50%"))
     text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "

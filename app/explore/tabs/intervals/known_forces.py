@@ -107,7 +107,7 @@ def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
 def _worth(before: float, after: float, expected: float) -> str:
     """The value of knowing a contact."""
     if np.isnan(after) or np.isnan(before):
-        return f"errors about {expected:.1%} smaller, by the networks"
+        return f"would make errors about {expected:.1%} smaller (estimated from the networks)"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 
 

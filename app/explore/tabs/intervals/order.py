@@ -21,7 +21,6 @@ class Order(NamedTuple):
 
     contacts: Integers
     words: str
-    as_packed: bool  # whether forces as packed ascend
 
 
 def ordered(
@@ -36,10 +35,10 @@ def ordered(
         why = "exact bounds are being computed" if coming else f"no {SORTS[by]} yet"
         if by == "shortened":
             why = "no force is held"
-        return Order(replay.order, f"{SORTS[USUAL]}: {why}", as_packed=True)
+        return Order(replay.order, f"{SORTS[USUAL]}: {why}")
     order = replay.order if by == USUAL else np.argsort(value, kind="stable")
     given = " given the held forces" if by in ("exact", "position") and narrowed else ""
-    return Order(order, SORTS[by] + given, as_packed=by == USUAL)
+    return Order(order, SORTS[by] + given)
 
 
 def _value(replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None) -> Floats | None:

@@ -73,10 +73,12 @@ class View:
         self.read = pmui.Button(label="Read", margin=(8, 8), **PRIMARY)
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
         self.waiting = pmui.Alert(severity="info", visible=False, sizing_mode="stretch_width")
+        self.brought: uploads.Brought | None = None
         self.report = note()
         self.frame = pn.Column(sizing_mode="stretch_width")
         self.read.on_click(lambda event: self._read())
         self.task.param.watch(lambda event: self._refuse(event.new), "message")
+        state.param.watch(self._report, "replay")
         self._ask()
 
     def panel(self) -> pn.Column:
@@ -162,13 +164,22 @@ class View:
         self, brought: uploads.Brought, frame: photoelastic_frames.Frame | None = None
     ) -> None:
         """Report, and open the packing; its walk is computed at once."""
-        rows = "".join(
-            ROW.format(*map(html.escape, row)) for row in uploads.report_rows(brought.report)
-        )
-        self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
+        self.brought = brought
+        self._report()
         self.state.measured = frame and photoelastic_frames.measured(frame, brought.params)
         mu = brought.params["mu"]
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
+
+    def _report(self, *events: Any) -> None:
+        """Show the report, at the friction on screen if the packing is there."""
+        brought, cell = self.brought, self.state.cell
+        if brought is None:
+            return
+        report = brought.report
+        if cell and cell.selection.packing.get("imported") == brought.params["imported"]:
+            report = uploads.at_friction(report, self.state.replay)
+        rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.report_rows(report))
+        self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
 
     def _compare(self, frame: photoelastic_frames.Frame) -> None:
         """Compare measured and inferred forces."""
@@ -187,7 +198,7 @@ class View:
         )
 
     def _clear(self) -> None:
-        self.report.object = ""
+        self.brought, self.report.object = None, ""
         self.frame[:] = []
 
     def _wait(self, line: str) -> None:
