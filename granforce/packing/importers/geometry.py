@@ -106,8 +106,7 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
             f"(tolerance=) leaves out grains {named} (counted from 0)"
         )
         i, j, gap = (
-            np.concatenate([one, more[doubted]])
-            for one, more in ((i, c.i), (j, c.j), (gap, c.gap))
+            np.concatenate([one, more[doubted]]) for one, more in ((i, c.i), (j, c.j), (gap, c.gap))
         )
     rows = zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
     info["nearly_touching"] = [list(row) for row in rows]

@@ -281,7 +281,7 @@ def _missed(packing: Packing) -> str:
     pairs = counted(len(gap), "pair nearly touches", "pairs nearly touch")
     words = f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius"
     listed = "tolerance" not in packing.info
-    return f"{words}, but no contact is listed" if listed else larger_tolerance(words)
+    return f"{words}, but are not listed as contacts" if listed else larger_tolerance(words)
 
 
 def _settled(packing: Packing) -> Packing:
@@ -298,11 +298,11 @@ def _settled(packing: Packing) -> Packing:
         worst = worst[unbalanced[worst] > LOAD_MISFIT]
         named = ", ".join(str(whole.grains[k]) for k in worst)
         total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
-        walls = (
-            ""
-            if left_open_in(packing).any()
-            else ("; if walls hold the grains, give them (--walls floor, or walls=)")
-        )
+        walls = ""
+        if len(packing.info.get("walls", [])) == 1:
+            walls = "; only one wall is given: do grains need side walls (--walls box, or walls=)?"
+        elif not left_open_in(packing).any():
+            walls = "; if walls hold the grains, give them (--walls floor, or walls=)"
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
             f"friction; the largest unbalance is at grains {named} (counted from 0){walls}"
