@@ -1198,7 +1198,7 @@ def test_a_contact_just_inside_the_tolerance_is_in_doubt_too():
 
 def test_an_export_to_lammps_says_that_walls_become_grains(cache):
     gf.save_packing(gf.scene("groove", 0.3), "groove.npz")
-    with pytest.warns(UserWarning, match="^2 walls and grains whose balance is not required will"):
+    with pytest.warns(UserWarning, match="^2 walls or other grains whose balance is not"):
         assert main("export groove.npz grains.dump contacts.dump".split()) == 0
     gf.save_packing(packed(30, 0.3), "p.npz")
     with warnings.catch_warnings():

@@ -36,6 +36,7 @@ from granforce.records import (
     make_packing,
     positive,
 )
+from granforce.tolerances import OUTLIER
 from granforce.types import Floats, Integers, Mask
 
 # Cost of changing a measured force by ⟨f_n⟩, compared with 1 for ⟨f_n⟩ of unbalance.
@@ -44,9 +45,8 @@ _CHANGE = 0.2
 _BALANCED = 1e-6
 # Interior-point steps after which another method is tried; usually 10 to 40 are enough.
 _ITERATIONS = 500
-# Half differences beyond this many standard errors are outliers, not noise; the default error is
-# estimated this often, as outliers change it, and it decides what is one.
-_OUTLIER, _ESTIMATES = 3.0, 4
+# Most estimates of the default error: outliers change it, and it decides what is one.
+_ESTIMATES = 4
 # Findings of one kind listed in the report.
 _LISTED = 10
 
@@ -413,7 +413,7 @@ def _inferred(
     def with_spread(error: float) -> Floats:
         # Smaller differences are the noise itself: adding them would count it twice.
         own = error * relative
-        return np.hypot(own, np.where(differing > _OUTLIER * own, differing, 0.0))
+        return np.hypot(own, np.where(differing > OUTLIER * own, differing, 0.0))
 
     if error is None:
         error = unit
@@ -422,7 +422,7 @@ def _inferred(
             freedom = max(best.freedom, 1)
             least = unit * np.sqrt(_BALANCED / freedom)
             error = max(error * np.sqrt(best.chi_square / freedom), least)
-            if not (differing > _OUTLIER * error * relative).any():
+            if not (differing > OUTLIER * error * relative).any():
                 break
     sigma = np.where(unmeasured, with_spread(positive(error, "error")), sigma)
     sigma[np.isnan(m)] = np.nan

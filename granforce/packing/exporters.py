@@ -82,9 +82,9 @@ def save_lammps(
     forces, c = _forces(packing, forces), packing.contacts
     if held := int(left_open_in(packing).sum()):
         warnings.warn(
-            f"{counted(held, 'wall or grain', 'walls and grains')} whose balance is not required "
-            "will be ordinary grains in LAMMPS dumps: `granforce import lammps` gives them loads "
-            "and requires their balance, so S becomes smaller",
+            f"{counted(held, 'wall or other grain', 'walls or other grains')} whose balance is not "
+            "required: in LAMMPS dumps these are ordinary grains; `granforce import lammps` gives "
+            "them loads and requires their balance, so S becomes smaller",
             stacklevel=3,
         )
     ids = np.arange(1, len(packing.r) + 1)

@@ -156,11 +156,11 @@ def run(
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
     the same folder, to use instead of processes. dtypes: as for Store.save, for the states.
     Cells are started in order; a cell whose packing is among them waits for it, and is skipped
-    silently if that fails. progress(cells done, cells in all) counts quarters of cells and never
-    decreases; on_done(position in cells, whether it was stored) is called after each. Once enough()
-    is true no further cell is started; running ones are finished (not called with a scheduler,
-    which gets all cells at once). An interruption loses only running cells, and workers end with
-    this process; the KeyboardInterrupt says how many cells are saved.
+    silently if that fails. progress(done, total) counts quarters of the cells that are not stored
+    yet, and never decreases; on_done(position in cells, whether it was stored) is called after
+    each. Once enough() is true no further cell is started; running ones are finished (not called
+    with a scheduler, which gets all cells at once). An interruption loses only running cells, and
+    workers end with this process; the KeyboardInterrupt says how many cells are saved.
 
     Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """

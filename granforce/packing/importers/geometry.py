@@ -20,7 +20,7 @@ from granforce.records import (
     repeated,
 )
 from granforce.system.plain import counted
-from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP
+from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP, UNUSUAL_GAP
 from granforce.types import Floats, Integers, Mask
 
 # Contacts may overlap, or have a gap, up to this fraction of the smaller radius.
@@ -28,9 +28,6 @@ OVERLAP_ALLOWED = 0.2
 
 # Pairs whose gap is below this many tolerances, and which are no contacts, are in doubt.
 NEARLY = 100.0
-
-# Gaps of contacts above this many median gaps are no rounding errors.
-_UNUSUAL = 10.0
 
 # Largest difference, in largest radii, between a given distance or branch and the positions: dumps
 # with six digits pass; a wrong box or a wrong grain does not.
@@ -118,7 +115,7 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
 def _barely(gap: Floats, tolerance: float) -> Integers:
     """Contacts whose gap (in largest radii) is near the tolerance and far above the median."""
     usual = np.quantile(np.abs(gap), 0.5, method="lower") if len(gap) else 0.0
-    return np.flatnonzero(gap > max(tolerance / NEARLY, _UNUSUAL * usual))
+    return np.flatnonzero(gap > max(tolerance / NEARLY, UNUSUAL_GAP * usual))
 
 
 def listed(
