@@ -1270,3 +1270,18 @@ def test_building_the_documentation_is_said_at_once(tmp_path, monkeypatch, capsy
 
     monkeypatch.setattr(subprocess, "run", run)
     assert main(["docs", "--out", str(tmp_path / "site")]) == 0
+
+
+@pytest.mark.filterwarnings("ignore:.*whose balance is not required")
+def test_notes_on_snapshots_name_all_of_them(cache, capsys):
+    pyramid = gf.read_table(io.StringIO(PYRAMID), mu=0.3, walls="floor", gravity=1)
+    gf.save_lammps(pyramid, "g.dump", "c.dump")
+    for name in ("g.dump", "c.dump"):
+        once = Path(name).read_text()
+        steps = [once.replace("TIMESTEP\n0", f"TIMESTEP\n{step}") for step in (100, 200)]
+        Path(name).write_text("".join(steps))
+    words = "import lammps g.dump c.dump --mu 0.3 --frames all --states 0 --workers 1"
+    assert main(words.split()) == 0
+    told = capsys.readouterr().err
+    assert told.count("contacts do not balance") == 1
+    assert "granforce: timestep 100, 200: contacts do not balance 5 of 5 grains" in told
