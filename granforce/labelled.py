@@ -13,6 +13,7 @@ import xarray as xr
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.records import InputError, Packing, brief, with_article
+from granforce.study.bounds import clusters_of
 from granforce.study.schema import VARIABLES
 from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
@@ -48,7 +49,7 @@ _DIMENSIONS = {
         "low": "contact component",
         "high": "contact component",
         "gap": "contact component side",
-        "backbone": "contact",
+        "cluster": "contact",
     },
     "LimitLoads": {"load": "contact", "gap": "contact"},
     "CriticalForce": {"forces": "contact component"},
@@ -153,7 +154,7 @@ def _arrays(result: Any, names: Sequence[str]) -> dict[str, Any]:
     """The arrays of a result; the inner and outer corners of an outline are joined."""
     if type(result).__name__ == "Outline":
         return {"corners": np.concatenate([result.inner, result.outer])}
-    return {name: getattr(result, name) for name in names}
+    return {name: getattr(result, name, None) for name in names}
 
 
 def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
@@ -186,6 +187,8 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         raise InputError(f"{kind} cannot be labelled; labels exist for: {known}, networks")
     if type(result).__name__ == "Informative" and isinstance(ensemble, Ensemble):
         arrays["after"] = result.after * ensemble.force_scale
+    if type(result).__name__ == "Intervals" and isinstance(ensemble, Ensemble):
+        arrays["cluster"] = clusters_of(ensemble, result)
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
@@ -214,11 +217,11 @@ def to_dataframe(
     Columns have the names of the tables of the command line: contact, i, j, x, y, then component,
     variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
     `read_known` and ``--known`` read the file that the table's `to_csv` writes. Of intervals,
-    ``backbone`` is True where the largest f_n is above 0. A Volume has a row for each ladder, an
-    Outline for each corner, a Body for each contact along each direction. unit: of forces,
-    "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of the
-    command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are
-    always in [mean]. Other arguments and errors as for `to_dataset`.
+    ``cluster`` is the cluster of undetermined contacts, −1 where determined. A Volume has a row for
+    each ladder, an Outline for each corner, a Body for each contact along each direction. unit: of
+    forces, "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of
+    the command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are always in
+    [mean]. Other arguments and errors as for `to_dataset`.
     """
     if unit not in UNITS:
         raise InputError(f"unit must be packing or mean, got {brief(unit)}")
@@ -326,16 +329,18 @@ def _contact_labels(packing: Packing, contacts: Integers) -> dict[str, Any]:
 
 def _labels(result: Any) -> dict[str, Any]:
     """Labels of all dimensions except contacts."""
-    labels: dict[str, Any] = {
+    texts = {
         "component": COMPONENTS,
         "side": ["low", "high"],
         "axis": ["x", "y"],
         "load_component": ["x", "y", "torque"],
         "ladder": ["down", "up"],
     }
+    # Text of fixed length is not in Zarr's specification: writing it warns.
+    labels: dict[str, Any] = {name: np.array(text, dtype=object) for name, text in texts.items()}
     if type(result).__name__ == "Outline":
         polygons = ["inner"] * len(result.inner) + ["outer"] * len(result.outer)
-        labels["polygon"] = ("corner", polygons)
+        labels["polygon"] = ("corner", np.array(polygons, dtype=object))
     for dimension, name in (("value", "values"), ("load", "loads")):
         if isinstance(values := getattr(result, name, None), np.ndarray):
             labels[dimension] = values

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
@@ -251,6 +251,17 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
     return checked
 
 
+def refuse_options(function: Callable[..., Any], given: Iterable[str], more: Iterable[str]) -> None:
+    """TypeError for an option that is neither the function's own nor among `more`."""
+    own = inspect.signature(function).parameters.values()
+    names = [one.name for one in own if one.default is not one.empty]
+    for name in sorted(set(given) - set(more))[:1]:
+        raise TypeError(
+            f"{function.__name__} has no option {name!r}; its options are "
+            f"{', '.join([*names, *more])}"
+        )
+
+
 def with_article(noun: str) -> str:
     """A noun with its indefinite article: a Packing, an Ensemble, a UniformSample."""
     return f"{'an' if noun[0] in 'AEIOaeio' else 'a'} {noun}"
@@ -306,7 +317,8 @@ def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
     if array.ndim != len(shape) or any(
         want not in (-1, have) for want, have in zip(shape, array.shape, strict=True)
     ):
-        raise InputError(f"{name} must have shape {shape}, got {array.shape}")
+        wanted = str(shape).replace("-1", "N")
+        raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.all(np.isfinite(array)):
         raise InputError(f"{name} contains NaN or infinite values; remove or repair them")
     return array
@@ -344,15 +356,22 @@ def brief_list(values: Collection[Any], most: int = 8) -> str:
     return first if len(values) <= most else f"{first} and {len(values) - most} more"
 
 
+def _number(value: Any, name: str) -> float:
+    """The value as a float; InputError for anything else, also for text."""
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be a number, got {brief(value)}") from None
+
+
 def friction(mu: Any) -> float:
     """μ as a float on the storage grid (15 digits).
 
     Raises InputError unless it is 0 or between 1/LARGEST_UNIT and LARGEST_FRICTION.
     """
-    try:
-        value = float(mu)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"friction coefficient must be a number, got {brief(mu)}") from None
+    value = _number(mu, "friction coefficient")
     if not np.isfinite(value) or value < 0:
         raise InputError(f"friction coefficient must be finite and ≥ 0, got {value:g}")
     if value > LARGEST_FRICTION:
@@ -387,10 +406,7 @@ def positive(
     value: Any, name: str, *, or_zero: bool = False, least: float = 0.0, most: float = np.inf
 ) -> float:
     """The value as a finite float > 0 (or_zero: ≥ 0) from least to most; InputError otherwise."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be a number, got {brief(value)}") from None
+    number = _number(value, name)
     if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
         raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
     if number < least:

@@ -15,6 +15,10 @@ LISTED_TOUCHING = 1e-6
 # Largest overlap (in largest radii) in a finished rigid packing.
 OVERLAP = 1e-9
 
+# A gap that makes two disks of a table touch is in doubt if it exceeds this many median gaps of
+# contacts: rounding in the file does not.
+UNUSUAL_GAP = 10.0
+
 # Contacts that overlap by more than this (in largest radii) belong to soft disks, with the contact
 # point in the middle of the overlap. Below it disks are rigid and lever arms are the radii.
 RIGID_OVERLAP = 1e-5
@@ -32,6 +36,10 @@ EQUILIBRIUM = 1e-6
 
 # Residual of an admissible network: a finished packing's own, and every state of a walk.
 BALANCED = 1e-10
+
+# Residual and violation of the cones (in ⟨f_n⟩) beyond which imported forces are clearly no
+# equilibrium: simulations that have come to rest, and files with three digits, stay below.
+NO_EQUILIBRIUM = 0.05
 
 # Largest violation of the cones in an admissible state: f_n below 0 or |f_t| above μ f_n, in ⟨f_n⟩.
 ADMISSIBLE = 1e-9
@@ -71,6 +79,9 @@ LARGEST_TILT = 1e6
 
 # Pressures and radii are within this factor of 1: squares and products of forces stay finite.
 LARGEST_UNIT = 1e60
+
+# Half differences of two measurements beyond this many standard errors are outliers, not noise.
+OUTLIER = 3.0
 
 # Largest measured forces and errors in ⟨f_n⟩; errors may also be as small as 1/ERRORS. Beyond, a
 # unit is wrong.

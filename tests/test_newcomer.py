@@ -8,6 +8,7 @@ import pydoc
 import re
 import subprocess
 import sys
+import warnings
 from contextlib import suppress
 from pathlib import Path
 
@@ -545,7 +546,8 @@ def test_tables_of_pandas_are_read_where_those_of_the_command_line_are(cache, ca
     with pytest.raises(gf.InputError, match=r"as in gf\.to_dataframe\(result, S\)"):
         gf.to_dataframe(exact)
     written = pd.read_csv("bounds.csv")
-    assert [*table.columns.drop("backbone"), "cluster"] == [*written.columns]
+    assert [*table.columns] == [*written.columns]
+    assert table["cluster"].tolist() == written["cluster"].tolist()
     table.to_csv("known.csv")  # with the index of pandas as a column without a name
     known = gf.read_known("known.csv")
     assert np.array_equal(known.low, exact.low) and np.array_equal(known.contacts, S.index)
@@ -979,10 +981,18 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
     S = gf.ensemble(gf.scene("groove"))
     with pytest.raises(gf.InputError, match=r"open_store"):
         gf.figures.indeterminacy("scan.zarr")
-    with pytest.raises(gf.InputError, match=r"to_dict"):
-        gf.figures.indeterminacy(pd.DataFrame({"mu": [0.1]}))
-    with pytest.raises(TypeError, match=r"^walk has no option 'start'; its options are chains, "):
+    with pytest.raises(TypeError, match=r"^walk has no option 'start'; its .* are states, seed, "):
         gf.walk(S, 5, start=3)
+    with pytest.raises(TypeError, match=r"^scan has no option 'N'; its options are seeds, n, .*dt"):
+        gf.scan(tmp_path / "s.zarr", [0.1], N=30)
+    with pytest.raises(TypeError, match=r"^critical_force has no option 'preciion'; .*precision"):
+        gf.critical_force(S, 0, preciion=1)
+    with pytest.raises(gf.InputError, match=r"coefficient must be a number, got '0\.1'"):
+        gf.pack(30, "0.1")
+    with pytest.raises(gf.InputError, match=r"pressure must be a number, got '2'"):
+        gf.pack(30, 0.1, pressure="2")
+    with pytest.raises(gf.InputError, match=r"radii must have shape \(N,\), got \(\)"):
+        gf.from_disks([[0, 1], [2, 1]], 1.0, 0.3)
     with pytest.raises(gf.InputError, match=r"labelled by the ensemble"):
         gf.to_dataframe(gf.informative(S, states=8, check=0))
     with pytest.raises(gf.InputError, match=r"array of 1 contacts .* S has 2 .*limit_load_bounds"):
@@ -1124,3 +1134,154 @@ def test_failed_cells_of_a_scan_have_the_relaxation_as_typed(tmp_path, monkeypat
     monkeypatch.setattr(scan, "walks", all_fail)
     _, [(cell, _)] = gf.scan(tmp_path / "s.zarr", [0.3], n=12, states=3)
     assert cell["relax"] == "nearest"
+
+
+def square_lattice(f_n, across, up):
+    """Files of 3 × 3 disks of radius 1/2 in rows and columns, and of their contacts.
+
+    f_t is `across` on horizontal and `up` on vertical contacts.
+    """
+    grains, contacts = "x,y,r\n", "i,j,f_n,f_t\n"
+    for k in range(9):
+        a, b = k % 3, k // 3
+        grains += f"{a},{b},0.5\n"
+        contacts += f"{k},{3 * b + (a + 1) % 3},{f_n},{across}\n"
+        contacts += f"{k},{3 * ((b + 1) % 3) + a},{f_n},{up}\n"
+    return io.StringIO(grains), io.StringIO(contacts)
+
+
+def test_forces_that_are_clearly_no_equilibrium_are_noted():
+    """A sheared lattice balances if |f_t| has opposite signs; of equal sign they turn each disk."""
+    good = gf.read_table(*square_lattice(1, 0.25, -0.25), mu=0.3, box=[3, 3])
+    assert good.info["residual"] < 1e-14 and "notes" not in good.info
+    slipped = gf.read_table(*square_lattice(1, 0.5, -0.5), mu=0.3, box=[3, 3])
+    (note,) = slipped.info["notes"]
+    assert "|f_t| ≤ μ f_n by up to 0.2 ⟨f_n⟩: check μ = 0.3" in note  # 0.5 − 0.3
+    turned = gf.read_table(*square_lattice(1, 0.25, 0.25), mu=0.3, box=[3, 3])
+    (note,) = turned.info["notes"]
+    assert "do not balance the grains, by up to 1 ⟨f_n⟩" in note  # four contacts
+
+
+def test_the_command_prints_such_a_note(cache, capsys):
+    for name, file in zip(("g.csv", "c.csv"), square_lattice(1, 0.5, -0.5), strict=True):
+        Path(name).write_text(file.read())
+    assert main("import table g.csv c.csv --mu 0.3 --box 3 3".split()) == 0
+    assert "granforce: the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n" in capsys.readouterr().err
+
+
+def test_a_periodic_table_with_few_digits_is_answered_with_the_tolerance():
+    """The box is larger by 10⁻⁴, so that 3 rows of contacts lack 3 and 3 columns lack 1 each."""
+    rows = "".join(f"{k % 3 * 1.0001},{k // 3},0.5\n" for k in range(9))
+    options = {"mu": 0.3, "box": [3.0003, 3.0001]}
+    with pytest.raises(gf.NotJammedError, match=r"12 pairs nearly touch, .* 0\.0002 .*--tolerance"):
+        gf.read_table(io.StringIO("x,y,r\n" + rows), **options)
+    contacts = io.StringIO("i,j\n0,3\n3,6\n1,4\n4,7\n2,5\n5,8\n")
+    with pytest.raises(gf.NotJammedError, match=r"12 pairs nearly touch.* not listed as contacts$"):
+        gf.read_table(io.StringIO("x,y,r\n" + rows), contacts, **options)
+
+
+def test_a_contact_just_inside_the_tolerance_is_in_doubt_too():
+    row = [[1, 1], [3, 1], [5 + 9e-7, 1]]
+    options = {"mu": 0.6, "walls": "floor", "gravity": 1}
+    packing = gf.from_disks(row, [1, 1, 1], **options)
+    (note,) = packing.info["notes"]
+    assert "1 contact is in doubt: gaps up to 9e-07 of the largest radius" in note
+    assert "tolerance 1e-06" in note and "leaves out grains 1 and 2 (counted from 0)" in note
+    ((i, j, gap),) = packing.info["nearly_touching"]
+    assert (i, j) == (1, 2) and gap == pytest.approx(9e-7, rel=1e-6)
+    without = gf.from_disks(row, [1, 1, 1], tolerance=1e-7, **options)
+    assert len(without.contacts.i) == len(packing.contacts.i) - 1
+    assert without.info["nearly_touching"] == packing.info["nearly_touching"]
+    even = [[1, 1], [3 + 9e-7, 1], [5 + 18e-7, 1]]  # all have few digits: none stands out
+    assert "notes" not in gf.from_disks(even, [1, 1, 1], **options).info
+
+
+def test_an_export_to_lammps_says_that_walls_become_grains(cache):
+    gf.save_packing(gf.scene("groove", 0.3), "groove.npz")
+    with pytest.warns(UserWarning, match="^2 walls or other grains whose balance is not"):
+        assert main("export groove.npz grains.dump contacts.dump".split()) == 0
+    gf.save_packing(packed(30, 0.3), "p.npz")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main("export groove.npz grains.vtp contacts.vtp".split()) == 0
+        assert main("export p.npz grains.dump contacts.dump".split()) == 0
+
+
+@pytest.mark.parametrize("row", [",,", "", " , , "])
+def test_empty_rows_between_others_are_refused_with_their_line(row):
+    options = {"mu": 0.6, "walls": "floor", "gravity": 1}
+    rows = "x,y,r\n1,1,1\n{}3,1,1\n"
+    with pytest.raises(gf.InputError, match=r", line 3: an empty row; fill or remove it"):
+        gf.read_table(io.StringIO(rows.format(row + "\n")), **options)
+    assert len(gf.read_table(io.StringIO(rows.format("") + row + "\n"), **options).r) == 4
+
+
+def test_the_default_error_of_a_frame_makes_chi_square_its_degrees_of_freedom():
+    """Each contact is measured on both disks with errors of 0.1, the mean with 0.1/√2."""
+    frames = [gf.synthetic_frame(packed(40, 0.5, 2), noise=0.1, seed=seed) for seed in range(10)]
+    reports = [gf.read_pegs(frame, mu=0.5).report for frame in frames]
+    ratio = [report["chi_square"] / report["freedom"] for report in reports]
+    assert np.mean(ratio) == pytest.approx(1, abs=0.02)
+    assert np.mean([report["error"] for report in reports]) == pytest.approx(0.0707, rel=0.06)
+
+
+def test_figure_1_takes_a_pandas_table():
+    rows = [{"mu": mu, "coordination": 4.0, "eta1": 0.1, "eta2": 0.1} for mu in (0.1, 1.0)]
+    assert gf.figures.indeterminacy(pd.DataFrame(rows)) is not None
+
+
+def test_datasets_are_written_to_zarr_without_warnings(tmp_path):
+    S = gf.ensemble(gf.scene("groove", 0.3))
+    dataset = gf.to_dataset(gf.intervals(S), S)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        dataset.to_zarr(tmp_path / "s.zarr", consolidated=False)
+    read = xr.open_zarr(tmp_path / "s.zarr", consolidated=False)
+    assert read.identical(dataset) and read["low"].sel(component="f_t").shape == (2,)
+
+
+def test_a_table_where_an_archive_is_meant_is_answered_with_the_import(cache, capsys):
+    Path("pile.csv").write_text("x,y,r\n1,1,1\n")
+    assert main("intervals pile.csv".split()) == 2
+    assert "granforce import" in capsys.readouterr().err
+
+
+PYRAMID = f"x,y,r\n1,1,1\n3,1,1\n2,{1 + 3**0.5},1\n"  # stands from μ = tan 15° = 0.268
+
+
+def test_a_smooth_contact_in_a_conflict_is_named_as_such():
+    pyramid = gf.read_table(io.StringIO(PYRAMID), mu=0.3, walls="floor", gravity=1)
+    mu = np.where(pyramid.contacts.j < 3, 0.3, 0.0)  # a smooth floor
+    with pytest.raises(
+        gf.NotJammedError, match=r"f_t = 0 where μ is 0; these conflict: f_t = 0 on"
+    ):
+        gf.ensemble(pyramid, mu)
+
+
+def test_a_floor_without_side_walls_is_said():
+    with pytest.raises(gf.NotJammedError, match=r"only one wall is given: .*--walls box"):
+        gf.read_table(io.StringIO(PYRAMID), mu=0.1, walls="floor", gravity=1)
+
+
+def test_building_the_documentation_is_said_at_once(tmp_path, monkeypatch, capsys):
+    def run(*arguments, **options):
+        assert "building the documentation" in capsys.readouterr().err
+        return subprocess.CompletedProcess(arguments, 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert main(["docs", "--out", str(tmp_path / "site")]) == 0
+
+
+@pytest.mark.filterwarnings("ignore:.*whose balance is not required")
+def test_notes_on_snapshots_name_all_of_them(cache, capsys):
+    pyramid = gf.read_table(io.StringIO(PYRAMID), mu=0.3, walls="floor", gravity=1)
+    gf.save_lammps(pyramid, "g.dump", "c.dump")
+    for name in ("g.dump", "c.dump"):
+        once = Path(name).read_text()
+        steps = [once.replace("TIMESTEP\n0", f"TIMESTEP\n{step}") for step in (100, 200)]
+        Path(name).write_text("".join(steps))
+    words = "import lammps g.dump c.dump --mu 0.3 --frames all --states 0 --workers 1"
+    assert main(words.split()) == 0
+    told = capsys.readouterr().err
+    assert told.count("contacts do not balance") == 1
+    assert "granforce: timestep 100, 200: contacts do not balance 5 of 5 grains" in told

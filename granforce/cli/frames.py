@@ -13,7 +13,7 @@ from granforce.cli.tables import write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots
-from granforce.records import InputError, whole, worker_count
+from granforce.records import InputError, brief_list, whole, worker_count
 from granforce.study import series
 from granforce.study.evolution import SCALARS, evolution
 from granforce.study.store import open_store
@@ -80,8 +80,11 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
         )
     print_notes(f"{snapshots.word} {number}: {message}" for number, message in failed)
     if dataset is not None:
-        last, notes = list(json.loads(dataset.attrs["notes"]).items())[-1]
-        print_notes(f"{snapshots.word} {last}: {note}" for note in notes)
+        where: dict[str, list[str]] = {}
+        for number, notes in json.loads(dataset.attrs["notes"]).items():
+            for note in notes:
+                where.setdefault(note, []).append(number)
+        print_notes(f"{snapshots.word} {brief_list(some)}: {note}" for note, some in where.items())
         columns = with_units({name: dataset[name].values for name in ("frame", *SCALARS)})
         lists = {name: values.tolist() for name, values in columns.items()}
         rows = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]

@@ -36,6 +36,7 @@ from granforce.records import (
     make_packing,
     positive,
 )
+from granforce.tolerances import OUTLIER
 from granforce.types import Floats, Integers, Mask
 
 # Cost of changing a measured force by ⟨f_n⟩, compared with 1 for ⟨f_n⟩ of unbalance.
@@ -44,6 +45,8 @@ _CHANGE = 0.2
 _BALANCED = 1e-6
 # Interior-point steps after which another method is tried; usually 10 to 40 are enough.
 _ITERATIONS = 500
+# Most estimates of the default error: outliers change it, and it decides what is one.
+_ESTIMATES = 4
 # Findings of one kind listed in the report.
 _LISTED = 10
 
@@ -112,7 +115,8 @@ def read_pegs(
     its number, by default the last one in both files. scale: factor on the listed radii. reach:
     largest gap between the disks of a candidate, in mean radii (0: no candidates). error: standard
     error of a measured component, force; by default the one that makes χ² equal to its degrees of
-    freedom; half the difference between two measurements of a contact is added in quadrature.
+    freedom. Where two measurements of a contact differ by far more, half their difference is added
+    in quadrature.
     reverse: change the sign of f_t (programs differ). repair: repair errors in up to a tenth of the
     data (or in the given fraction); False: the first error raises. most_grains: largest number of
     grains. columns: {name here: header or number in the files}, such as {"r": "diameter", "f_n":
@@ -403,11 +407,23 @@ def _inferred(
     S = ensemble(packing, prune=False)
     relative = np.sqrt(factor)[:, None] * np.ones(2)
     unmeasured = np.isnan(sigma)
+    differing = np.zeros_like(m)
+    differing[: len(spread)] = np.nan_to_num(spread)
+
+    def with_spread(error: float) -> Floats:
+        # Smaller differences are the noise itself: adding them would count it twice.
+        own = error * relative
+        return np.hypot(own, np.where(differing > OUTLIER * own, differing, 0.0))
+
     if error is None:
-        # With one σ for all, the network does not depend on it, and χ² σ² is the residual.
-        best = likeliest(S, np.where(unmeasured, m, np.nan), unit * relative)
-        error = unit * np.sqrt(max(best.chi_square, _BALANCED) / max(best.freedom, 1))
-    sigma = np.where(unmeasured, positive(error, "error") * relative, sigma)
-    sigma[: len(spread)] = np.hypot(sigma[: len(spread)], spread)
+        error = unit
+        for _ in range(_ESTIMATES):
+            best = likeliest(S, np.where(unmeasured, m, np.nan), with_spread(error))
+            freedom = max(best.freedom, 1)
+            least = unit * np.sqrt(_BALANCED / freedom)
+            error = max(error * np.sqrt(best.chi_square / freedom), least)
+            if not (differing > OUTLIER * error * relative).any():
+                break
+    sigma = np.where(unmeasured, with_spread(positive(error, "error")), sigma)
     sigma[np.isnan(m)] = np.nan
     return likeliest(S, m, sigma), sigma

@@ -26,6 +26,7 @@ from granforce.records import (
     Relaxation,
     brief,
     random_seed,
+    refuse_options,
     takes,
     worker_count,
 )
@@ -94,17 +95,9 @@ def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
 
 def _check_options(relax: Relax, options: dict[str, Any]) -> None:
     """TypeError for an option of neither `walk` nor the relaxation, naming those they have."""
-    if not options:
-        return
-    own = inspect.signature(walk).parameters.values()
     _, _, *relaxing = inspect.signature(relax).parameters.values()
-    unknown = sorted(options.keys() - {one.name for one in relaxing})
-    if unknown and not any(one.kind is one.VAR_KEYWORD for one in relaxing):
-        names = [one.name for one in own if one.kind is one.KEYWORD_ONLY]
-        raise TypeError(
-            f"walk has no option {unknown[0]!r}; its options are {', '.join(names)}, and those of "
-            f"relax: {', '.join(one.name for one in relaxing)}"
-        )
+    if not any(one.kind is one.VAR_KEYWORD for one in relaxing):
+        refuse_options(walk, options, [one.name for one in relaxing])
 
 
 @takes(Ensemble, begun=Walk)

@@ -31,10 +31,10 @@ def indeterminacy(
 ) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
-    rows: dicts with mu, coordination (z), and any of eta1, eta2, eta3, extent (the width of S per
-    free dimension, in ⟨f_n⟩); or the store of a scan. compare: {name: rows} from other sources of
-    the same measures, such as exact η3; missing values are not drawn. outside: rows whose states
-    are outside S, so that their spread is not η: grey crosses.
+    rows: dicts or a pandas table with mu, coordination (z), and any of eta1, eta2, eta3, extent
+    (the width of S per free dimension, in ⟨f_n⟩); or the store of a scan. compare: {name: dicts}
+    from other sources of the same measures, such as exact η3; missing values are not drawn.
+    outside: dicts of walks whose states are outside S, so that their spread is not η: grey crosses.
     """
     style.ready(backend)
     rows = scan_rows(rows) if isinstance(rows, Store) else _checked(rows)
@@ -74,12 +74,12 @@ def indeterminacy(
 
 
 def _checked(rows: Any) -> Rows:
-    """The rows themselves; InputError with what to give for tables, paths and other values."""
-    give = 'dicts, or the store of a scan: gf.open_store("scan.zarr")'
+    """The rows as dicts; InputError with what to give for paths and other values."""
+    give = 'dicts, a pandas table, or the store of a scan: gf.open_store("scan.zarr")'
     if isinstance(rows, (str, Path)):
         raise InputError(f"rows must be {give}; got {brief(str(rows))}")
-    if hasattr(rows, "to_dict"):
-        raise InputError(f"rows must be {give}; a pandas table gives them by .to_dict('records')")
+    if hasattr(rows, "iterrows"):
+        rows = rows.to_dict("records")
     try:
         rows = list(rows)
     except TypeError:

@@ -316,4 +316,7 @@ def _statements(
                 text += f" (must be relaxed by {given[k]:.3g})"
             texts.append(text)
     together = "; ".join(texts)
-    return f"no network satisfies all known forces; these conflict: {together}"
+    return (
+        "no network satisfies all known forces, and f_t = 0 where μ is 0; these conflict: "
+        f"{together}"
+    )

@@ -71,7 +71,8 @@ def blocks(
     contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. names: of the bodies, for
     messages; by default their numbers.
 
-    Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights.
+    Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights, and
+    UndecidedError (an InputError, too) where rounding leaves this open, close to the limit.
     """
     names = [str(k) for k in range(len(bodies))] if names is None else names
     outlines = [_outline(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]

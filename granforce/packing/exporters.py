@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import struct
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from granforce.forces.balance import left_open_in
 from granforce.records import InputError, Packing, float_array, refuse_shapes, takes
 from granforce.system.files import written
+from granforce.system.plain import counted
 from granforce.types import Floats
 
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
@@ -72,11 +75,18 @@ def save_lammps(
     particles: ``dump custom`` with id, type, x, y and radius. contacts: ``dump local`` with atom1,
     atom2, distance and, on atom1, the normal force fx, fy and the tangential force px, py. forces
     (N_c, 2): f_n, f_t, by default the packing's own. A dump has no friction coefficient, no loads
-    (when it is read back, the loads balance the forces) and no gaps. Raises InputError if a file
-    cannot be written.
+    (when it is read back, the loads balance the forces), no gaps and no walls: these become grains,
+    with a warning. Raises InputError if a file cannot be written.
     """
     refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts
+    if held := int(left_open_in(packing).sum()):
+        warnings.warn(
+            f"{counted(held, 'wall or other grain', 'walls or other grains')} whose balance is not "
+            "required: in LAMMPS dumps these are ordinary grains; `granforce import lammps` gives "
+            "them loads and requires their balance, so S becomes smaller",
+            stacklevel=3,
+        )
     ids = np.arange(1, len(packing.r) + 1)
     on_i = np.column_stack([-forces[:, :1] * c.normal, -forces[:, 1:] * c.tangent])
     box = _bounds(packing)

@@ -41,6 +41,7 @@ from granforce.records import (
     positive,
     real,
     real_array,
+    refuse_options,
     takes,
     whole,
     worker_count,
@@ -134,6 +135,7 @@ def critical_force(
     Raises InputError for a contact without force in any state of S, for mu with an Ensemble, and if
     the search ends at a given limit load that is below the exact one.
     """
+    refuse_options(critical_force, protocol, Protocol._fields)
     S = ensemble_at(packing, mu=mu)
     loads = None if limit_load is None else [limit_load]
     (found,) = critical_forces(S, [contact], limit_loads=loads, **protocol)
@@ -161,6 +163,7 @@ def critical_forces(
     Raises UndecidedError if a limit load cannot be certified, or is given as NaN; InputError if the
     search ends at a given limit load that is below the exact one.
     """
+    refuse_options(critical_forces, protocol, Protocol._fields)
     S, protocol = ensemble, checked(Protocol(**protocol))
     precision = protocol.precision
     positions, workers = S.positions(contacts), worker_count(workers)

@@ -42,6 +42,7 @@ from granforce.records import (
     brief,
     float_array,
     positive,
+    refuse_options,
     takes,
 )
 from granforce.system import cancelling
@@ -140,6 +141,7 @@ def critical_load(
     Raises the errors of `load_factor`, and InputError if no load moves the bodies, and for a
     precision finer than that of the load factor.
     """
+    refuse_options(critical_load, protocol, Protocol._fields[1:])
     S, asked = with_idle(ensemble), checked(Protocol(**protocol))
     precision = positive(precision, "precision", most=MOST_LOAD_PRECISION)
     limit = _limit(S, load)

@@ -13,7 +13,7 @@ from granforce.explore.stress_outline import StressOutline
 from granforce.explore.volume import Volume
 from granforce.forces.ensemble import Ensemble
 from granforce.study.schema import extension, labelled
-from granforce.types import Floats
+from granforce.types import Floats, Integers
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
@@ -27,9 +27,6 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
     low, high = bounds.low, bounds.high
     place = S.positions(bounds.contacts)
     original = S.original[place]
-    tolerance = UNDETERMINED * S.force_scale
-    i, j = S.contacts.i[place], S.contacts.j[place]
-    cluster, _ = measures.undetermined_clusters(i, j, high - low, tolerance)
     some = bounds.bounded
     position, correlation = np.full(len(place), np.nan), np.nan
     if some.any():
@@ -45,7 +42,7 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
             "interval_gap": bounds.gap,
             "max_gap": bounds.max_gap,
             "position": position,
-            "cluster": cluster,
+            "cluster": clusters_of(S, bounds),
             "eta3": measures.eta3(low, high) if some.all() else np.nan,
             "correlation": correlation,
             **extension(S),
@@ -57,6 +54,14 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
         },
         {"counts": json.dumps(bounds.counts)},
     )
+
+
+def clusters_of(S: Ensemble, bounds: Intervals) -> Integers:
+    """The cluster of undetermined contacts (k,) of each contact, −1 for determined ones."""
+    place = S.positions(bounds.contacts)
+    ends = S.contacts.i[place], S.contacts.j[place]
+    extent = bounds.high - bounds.low
+    return measures.undetermined_clusters(*ends, extent, UNDETERMINED * S.force_scale)[0]
 
 
 def informative_dataset(

@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from inspect import signature
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -28,7 +29,15 @@ from granforce.forces.ensemble import Ensemble
 from granforce.glossary import RELAXATIONS
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
-from granforce.records import InputError, Packing, choice, real_array, whole, worker_count
+from granforce.records import (
+    InputError,
+    Packing,
+    choice,
+    real_array,
+    refuse_options,
+    whole,
+    worker_count,
+)
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, entry_name, get, load, row
 from granforce.study.keys import Parameters, canonical
@@ -80,8 +89,9 @@ def scan(
     Returns a list of rows, as `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed,
     packing_fraction, coordination, dimension h, eta1, eta2, eta3, …), and a list of (walk
     parameters, error message). Raises InputError for wrong arguments. Workers are new processes:
-    in a script, call it under ``if __name__ == "__main__":``.
+    in a script, which must be a file, call it under ``if __name__ == "__main__":``.
     """
+    refuse_options(scan, packing, [*signature(kinds.PACKING.parameters).parameters][3:])
     seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
     worker_count(workers)
     check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
@@ -146,11 +156,11 @@ def run(
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
     the same folder, to use instead of processes. dtypes: as for Store.save, for the states.
     Cells are started in order; a cell whose packing is among them waits for it, and is skipped
-    silently if that fails. progress(cells done, cells in all) counts quarters of cells and never
-    decreases; on_done(position in cells, whether it was stored) is called after each. Once enough()
-    is true no further cell is started; running ones are finished (not called with a scheduler,
-    which gets all cells at once). An interruption loses only running cells, and workers end with
-    this process; the KeyboardInterrupt says how many cells are saved.
+    silently if that fails. progress(done, total) counts quarters of the cells that are not stored
+    yet, and never decreases; on_done(position in cells, whether it was stored) is called after
+    each. Once enough() is true no further cell is started; running ones are finished (not called
+    with a scheduler, which gets all cells at once). An interruption loses only running cells, and
+    workers end with this process; the KeyboardInterrupt says how many cells are saved.
 
     Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """
@@ -194,7 +204,9 @@ def run(
                     _over_dask(client, some, scheduler, finished)
     except KeyboardInterrupt:
         saved = sum(entry_name(store, *cell) in store for cell in cells)
-        raise KeyboardInterrupt(f"saved {saved} of {len(cells)} cells") from None
+        # Workers of a cluster may still finish the cells they are computing.
+        least = "" if scheduler is None else "at least "
+        raise KeyboardInterrupt(f"saved {least}{saved} of {len(cells)} cells") from None
     return [(cells[k], failed[k]) for k in sorted(failed)]
 
 
@@ -311,8 +323,8 @@ def _one_pool(
             advanced(before + max(0.0, counter.value))
         if broken and counter.value == _NONE_BEGAN:
             raise InputError(
-                "worker processes ended before they began: in a script, call this under "
-                'if __name__ == "__main__":'
+                "worker processes ended before they began: call this in a script that is a file "
+                '(not read from stdin), under if __name__ == "__main__":'
             )
     except BaseException:
         # Workers would continue the current cell, whose result is lost anyway.

@@ -161,7 +161,7 @@ def _on_all(photoelastic: Photoelastic, S: Ensemble, values: Floats, elsewhere: 
 
 
 FRAME = Kind(
-    name="frame", version=1, title="frames", unit="frame", parameters=parameters, compute=_inferred
+    name="frame", version=2, title="frames", unit="frame", parameters=parameters, compute=_inferred
 )
 
 

@@ -27,7 +27,7 @@ from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store, open_store, refuse_newer
 from granforce.system.files import make_folder
 from granforce.system.plain import json_text, spaced
-from granforce.system.terminal import print_list, print_report
+from granforce.system.terminal import print_list, print_notes, print_report
 
 
 def study_(arguments: argparse.Namespace) -> int:
@@ -108,6 +108,7 @@ def docs(arguments: argparse.Namespace) -> None:
 
 
 def _build_docs(folder: Path) -> None:
+    print_notes(["building the documentation, which takes up to two minutes …"])
     settings = Path(__file__).parents[2] / "docs" / "mkdocs.yml"
     build = (sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict")
     done = subprocess.run(

@@ -47,7 +47,8 @@ def from_disks(
     sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held: behind each
     place that a disk touches is one more grain, whose balance is not required. gravity: g times the
     mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
-    nearly_touching [i, j, gap]: no contacts, but less than 100 tolerances apart.
+    nearly_touching [i, j, gap]: gaps within a factor of 100 of the tolerance, and far above those
+    of other contacts.
 
     Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
     network exists.

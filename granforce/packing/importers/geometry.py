@@ -13,13 +13,14 @@ from granforce.records import (
     Contacts,
     InputError,
     Packing,
+    brief_list,
     make_contacts,
     make_packing,
     positive,
     repeated,
 )
 from granforce.system.plain import counted
-from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP
+from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP, UNUSUAL_GAP
 from granforce.types import Floats, Integers, Mask
 
 # Contacts may overlap, or have a gap, up to this fraction of the smaller radius.
@@ -68,11 +69,13 @@ def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, F
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
-def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
+def doubtful(packing: Packing, tolerance: float | None) -> Packing:
     """The packing with notes in info on large overlaps, and on pairs near the tolerance.
 
-    info["nearly_touching"] lists [i, j, gap] of pairs that are no contacts though their gap is
-    below NEARLY tolerances (in largest radii); the gap is in the unit of x.
+    tolerance: which decided what touches, or None if contacts were listed. info["nearly_touching"]
+    lists [i, j, gap] of pairs that are no contacts though their gap is below NEARLY tolerances (in
+    largest radii), and of those that the tolerance makes contacts though their gap is far above
+    those of other contacts; the gap is in the unit of x.
     """
     c, largest, notes = packing.contacts, packing.r.max(), []
     overlap = -c.gap.min(initial=0.0) / largest
@@ -82,7 +85,7 @@ def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
             f"disks overlap by up to {overlap:.2g} of the largest radius (mean {mean:.2g}): they "
             "count as soft, each contact at the middle of its overlap"
         )
-    near = min(NEARLY * tolerance, 1.0)
+    near = min(NEARLY * (tolerance or LISTED_TOUCHING), 1.0)
     i, j, gap = apart(packing, near)
     if len(i):
         notes.append(
@@ -90,11 +93,29 @@ def doubtful(packing: Packing, tolerance: float = LISTED_TOUCHING) -> Packing:
             "largest radius, but no contacts; nearly_touching in the report by --json (in "
             "packing.info) lists them"
         )
+    info: dict[str, Any] = {} if tolerance is None else {"tolerance": float(tolerance)}
+    if tolerance is not None and len(doubted := _barely(c.gap / largest, tolerance)):
+        named = brief_list([f"{c.i[k]} and {c.j[k]}" for k in doubted])
+        notes.append(
+            f"{counted(len(doubted), 'contact is', 'contacts are')} in doubt: gaps up to "
+            f"{c.gap[doubted].max() / largest:.2g} of the largest radius, far above those of other "
+            f"contacts, but below the tolerance {tolerance:.2g}; a smaller --tolerance "
+            f"(tolerance=) leaves out grains {named} (counted from 0)"
+        )
+        i, j, gap = (
+            np.concatenate([one, more[doubted]]) for one, more in ((i, c.i), (j, c.j), (gap, c.gap))
+        )
     rows = zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
-    info: dict[str, Any] = {"nearly_touching": [list(row) for row in rows]}
+    info["nearly_touching"] = [list(row) for row in rows]
     if notes:
         info["notes"] = [*packing.info.get("notes", []), *notes]
     return packing._replace(info=packing.info | info)
+
+
+def _barely(gap: Floats, tolerance: float) -> Integers:
+    """Contacts whose gap (in largest radii) is near the tolerance and far above the median."""
+    usual = np.quantile(np.abs(gap), 0.5, method="lower") if len(gap) else 0.0
+    return np.flatnonzero(gap > max(tolerance / NEARLY, UNUSUAL_GAP * usual))
 
 
 def listed(

@@ -115,7 +115,8 @@ def read_lammps(
     neighbours, not contacts; pairs listed from both sides (newton off) count once.
 
     frame: the timestep, by default the last that is complete in both files. reverse: change the
-    sign of tangential forces. Grains are sorted by id. The box may be tilted in the plane (xy).
+    sign of tangential forces. Grains are sorted by id. Coordinates are shifted so that the lower
+    bounds of the box are 0. The box may be tilted in the plane (xy).
     Directions that are not periodic are open; unbalanced forces of grains become their load there.
     packing.info contains timestep, residual and violation (in ⟨f_n⟩), contacts_skipped
     and notes. most_grains: largest number of grains.

@@ -16,7 +16,7 @@ from granforce.packing.closing import apart, margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
 from granforce.system.plain import counted
-from granforce.tolerances import CARRYING, RIGID_OVERLAP
+from granforce.tolerances import CARRYING, NO_EQUILIBRIUM, RIGID_OVERLAP
 from granforce.types import Floats, Integers
 
 # Unbalance of the loads of an open set, in ⟨f_n⟩, that is attributed to digits lost in the file and
@@ -33,8 +33,8 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
 
     P = Σ f_n ℓ / (2V); a grain's load balances its contact forces, unless loads were given.
     reverse: change the sign of tangential forces. Residual and violation are added to
-    packing.info with the given entries, and a note if the other sign balances better. Raises
-    InputError if the forces do not press.
+    packing.info with the given entries, and notes if the forces are clearly no equilibrium, or the
+    other sign balances better. Raises InputError if the forces do not press.
     """
     if reverse:
         packing = packing._replace(forces=packing.forces * [1, -1])
@@ -44,12 +44,9 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     c, load = packing.contacts, packing.load[:, :2]
     inner = np.isfinite(load.sum(axis=1))
     gain = gain_by_reversing((c.i, c.j, c.normal), packing.forces, np.nan_to_num(load), inner)
+    notes = [*packing.info.get("notes", []), *info.get("notes", [])]
     if gain > WORTH_REVERSING:
-        info["notes"] = [
-            *packing.info.get("notes", []),
-            *info.get("notes", []),
-            worth_reversing(gain, reverse),
-        ]
+        notes.append(worth_reversing(gain, reverse))
     if np.isfinite(packing.volume):
         virial = float(normal @ packing.contacts.length)
         if virial <= 0:
@@ -57,7 +54,21 @@ def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
         packing = packing._replace(pressure=virial / (2 * packing.volume))
     elif not packing.load.any():
         packing = packing._replace(load=_left_over(packing))
-    return packing._replace(info={**packing.info, **info, **judged(packing)})
+    verdict = judged(packing)
+    if gain <= WORTH_REVERSING and verdict["residual"] > NO_EQUILIBRIUM:
+        notes.append(
+            f"the forces do not balance the grains, by up to {verdict['residual']:.2g} ⟨f_n⟩: "
+            "check whether f_n and f_t have the same unit, whether f_t has the sign described in "
+            "the documentation, and whether contacts or loads are missing"
+        )
+    if verdict["violation"] > NO_EQUILIBRIUM:
+        notes.append(
+            f"the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n by up to {verdict['violation']:.2g} "
+            f"⟨f_n⟩: check μ = {packing.mu:g}, the sign of f_n, and whether f_n and f_t have the "
+            "same unit"
+        )
+    info |= {"notes": notes} if notes else {}
+    return packing._replace(info={**packing.info, **info, **verdict})
 
 
 def with_edge(packing: Packing, advice: str = "") -> Packing:
@@ -130,7 +141,10 @@ def find(packing: Packing, **info: Any) -> Packing:
     if np.isnan(packing.pressure):
         packing, S = _under_loads(packing)
     else:
-        S = ensemble(packing)
+        try:
+            S = ensemble(packing)
+        except NotJammedError as error:
+            raise NotJammedError(f"{error}{_missed(packing)}") from None
     start = np.zeros_like(S.original)
     start[:, 0] = S.force_scale
     relaxed = nearest(S, start)
@@ -265,7 +279,9 @@ def _missed(packing: Packing) -> str:
     if not len(gap):
         return ""
     pairs = counted(len(gap), "pair nearly touches", "pairs nearly touch")
-    return larger_tolerance(f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius")
+    words = f"; {pairs}, with gaps from {gap.min():.2g} of the largest radius"
+    listed = "tolerance" not in packing.info
+    return f"{words}, but are not listed as contacts" if listed else larger_tolerance(words)
 
 
 def _settled(packing: Packing) -> Packing:
@@ -282,11 +298,11 @@ def _settled(packing: Packing) -> Packing:
         worst = worst[unbalanced[worst] > LOAD_MISFIT]
         named = ", ".join(str(whole.grains[k]) for k in worst)
         total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
-        walls = (
-            ""
-            if left_open_in(packing).any()
-            else ("; if walls hold the grains, give them (--walls floor, or walls=)")
-        )
+        walls = ""
+        if len(packing.info.get("walls", [])) == 1:
+            walls = "; only one wall is given: do grains need side walls (--walls box, or walls=)?"
+        elif not left_open_in(packing).any():
+            walls = "; if walls hold the grains, give them (--walls floor, or walls=)"
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
             f"friction; the largest unbalance is at grains {named} (counted from 0){walls}"

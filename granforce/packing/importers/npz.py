@@ -155,7 +155,10 @@ def _opened(source: Source, name: str, unpacked: float) -> Iterator[Any]:
         raise InputError(f"{name}: cannot be read ({error.strerror or error})") from None
     except Exception:
         # Reading a damaged archive may fail in zipfile, in zlib, or in numpy's header parser.
-        raise InputError(f"{name}: not an NPZ archive of plain arrays, or damaged") from None
+        raise InputError(
+            f"{name}: not an NPZ archive of plain arrays, or damaged; granforce import reads "
+            "tables and files of other programs (in Python: gf.read_table, gf.read_lammps, …)"
+        ) from None
 
 
 def _packing(arrays: dict[str, npt.NDArray[Any]]) -> Packing:

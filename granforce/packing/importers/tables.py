@@ -68,8 +68,8 @@ def read_table(
     equal normal forces at the given pressure (or loads) is computed; pressure is not used with f_n,
     f_t. walls ("floor", "box" or segments) and gravity are for tables without forces, as in
     `from_disks`. most_grains: largest number of grains. packing.info has notes on
-    overlaps and on pairs in doubt, which nearly_touching lists [i, j, gap]: no contacts, but less
-    than 100 tolerances apart.
+    overlaps and on pairs in doubt, which nearly_touching lists [i, j, gap]: gaps within a factor of
+    100 of the tolerance, and far above those of other contacts.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
@@ -104,7 +104,7 @@ def read_table(
         {"source": "table"},
         cell.tilt,
     )
-    packing = doubtful(packing, LISTED_TOUCHING if pairs else tolerance)
+    packing = doubtful(packing, None if pairs else tolerance)
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:

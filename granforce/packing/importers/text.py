@@ -6,6 +6,7 @@ import bz2
 import csv
 import gzip
 import io
+import itertools
 import lzma
 import math
 import os
@@ -243,8 +244,9 @@ def read_text(source: Source) -> tuple[str, str]:
 def read_csv(source: Source) -> Table:
     """A Table from text with a header line, separated by commas, semicolons, tabs or blanks.
 
-    Column names are converted to lower case; blank lines, comments above the header, and empty
-    fields at the end of all lines are skipped. Raises InputError.
+    Column names are converted to lower case; comments above the header, empty rows at the end, and
+    empty fields at the end of all lines are skipped. Raises InputError, also for empty rows between
+    others, where data may be missing.
     """
     name, text = read_text(source)
     lines = _from_the_header(text.splitlines())
@@ -255,11 +257,15 @@ def read_csv(source: Source) -> Table:
     rows, numbers = [], []
     try:
         for fields in reader:
-            if any(field.strip() for field in fields):
-                rows.append([field.strip() for field in fields])
-                numbers.append(reader.line_num)
+            rows.append([field.strip() for field in fields])
+            numbers.append(reader.line_num)
     except csv.Error as error:
         raise InputError(f"{name}, line {reader.line_num}: {error}; repair the line") from None
+    filled = [k for k, fields in enumerate(rows) if any(fields)]
+    for before, after in itertools.pairwise(filled):
+        if after > before + 1 and before > filled[0]:
+            raise InputError(f"{name}, line {numbers[before + 1]}: an empty row; fill or remove it")
+    rows, numbers = [rows[k] for k in filled], [numbers[k] for k in filled]
     if len(rows) < 2:
         raise InputError(f"{name}: a header line and at least one row are needed")
     header, *rows = _trimmed(rows)
