@@ -335,7 +335,11 @@ class Player {
   }
 
   /** An action succeeded. */
-  recover() { if (this.refused) this.say("") }
+  recover() {
+    if (!this.refused) return
+    this.say("")
+    this.buttons.typed = false // a refused force stays to be corrected only until then
+  }
 
   /** Declare the selected contact's force known, as it is on screen, or release a known one. */
   hold({ mixed }) {
