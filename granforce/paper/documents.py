@@ -205,7 +205,7 @@ def _counted(heads: list[str], lines: list[list[str]]) -> str:
         cells = [line[k] for line in lines if line[k] not in ("", _OUTSIDE)]
         marks = {found[1] if (found := _FEWER.search(cell)) else "" for cell in cells}
         if len(marks) == 1 and "" not in marks:
-            heads[k] += f" ({marks.pop()} packings)"
+            heads[k] += f" (n = {marks.pop()})"
             for line in lines:
                 line[k] = _FEWER.sub("", line[k])
     return markdown_table(heads, lines)

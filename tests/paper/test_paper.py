@@ -413,8 +413,8 @@ def test_a_column_of_fewer_packings_says_of_how_many(table):
     more = cells_of(documents.walks(table), 0.3)
     phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
     assert more["φ"] == f"{phi:.4f}"
-    ratio = more["paper's walk/nearest-network walk η2 (1 packings)"]
-    assert line["paper's walk η2 (1 packings)"] == more["paper's walk η2 (1 packings)"]
+    ratio = more["paper's walk/nearest-network walk η2 (n = 1)"]
+    assert line["paper's walk η2 (n = 1)"] == more["paper's walk η2 (n = 1)"]
     (swept,) = (row for row in table.part("sweeps_1e-3") if row["mu"] == 0.3)
     assert float(ratio.split()[0]) == pytest.approx(swept["eta2"] / walk[0], abs=2e-3)
 
@@ -429,7 +429,7 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     line = cells_of(documents.measures(table), 0)
     more = cells_of(documents.walks(table), 0)
     assert set(more.values()) >= {"outside S"}
-    assert line["paper's walk η2 (1 packings)"] == "outside S"
+    assert line["paper's walk η2 (n = 1)"] == "outside S"
     assert {row["mu"] for row in groups.drawn(table, "gauss_seidel")} <= {0.1, 0.3}
     told = {(c.statement, c.sampler): c for c in claims.judged(table)}
     vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
