@@ -72,13 +72,13 @@ _CONTENTS = {
     "walk": "nearest-network walks",
     "uniform": "uniform networks",
     "response": "critical forces and first motions",
-    "response_long": "the same with four times as many implicit steps",
-    "perturb": "the same with longer load steps",
+    "response_long": "critical forces, four times as many implicit steps",
+    "perturb": "critical forces, longer load steps",
     "sweeps_": "the paper's walk, to this residual",
-    "prepared_": "walks in packings made with other options",
-    "opened": "frictionless packings with a larger μ in the Coulomb condition: walks",
-    "opened_exact": "the same packings: exact intervals",
-    "widest_exact": "packings made at each μ, with the largest μ in the Coulomb condition",
+    "prepared_": "walks, packings made with other options",
+    "opened": "walks, frictionless packings with a larger μ in the Coulomb condition",
+    "opened_exact": "exact intervals, the same packings",
+    "widest_exact": "exact intervals, with the largest μ in the Coulomb condition",
     "stress": "stresses that the contacts can carry",
     "stress_uniform": "stresses of uniform networks",
     "frozen": "exact intervals inside a frozen boundary",
@@ -527,11 +527,8 @@ def _content(part: str) -> str:
     """What a part contains; the longest beginning of its name that is known."""
     begins = [name for name in _CONTENTS if part.startswith(name)]
     text = _CONTENTS[max(begins, key=len)] if begins else ""
-    return (
-        f"exact intervals of {text}"
-        if part.startswith("prepared") and part.endswith("_exact")
-        else text
-    )
+    bounds = part.startswith("prepared") and part.endswith("_exact")
+    return text.replace("walks", "exact intervals") if bounds else text
 
 
 def _version(rows: Rows, name: str) -> str:
