@@ -510,13 +510,17 @@ def test_a_claim_has_one_verdict_and_one_for_each_sampler():
         claim("c", "exact", verdicts.FAILED),
         claim("c", "uniform", verdicts.MISSING, float("nan")),
     ]
-    rows = [line.strip("| ").split(" | ") for line in documents.verdict_table(judged).splitlines()]
+    text = documents.verdict_table(judged)
+    heads = ["### Differ (1)", "### Depend on the sampler (1)", "### Reproduced (1)"]
+    assert [line for line in text.splitlines() if line.startswith("#")] == heads
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     heads = ["claim", "source", "verdict", "nearest-network walk", "exact"]
-    assert rows[0] == heads  # no column without numbers
-    assert [row[2] for row in rows[2:]] == [
-        f"**{word}**" for word in (verdicts.REPRODUCED, documents.MIXED, verdicts.FAILED)
+    assert rows[0] == rows[3] == rows[6] == heads  # no column without numbers
+    assert [row[2] for row in rows[2::3]] == [
+        f"**{word}**" for word in (verdicts.FAILED, documents.MIXED, verdicts.REPRODUCED)
     ]
-    assert rows[4][3:] == [verdicts.FEW, verdicts.FAILED]
+    assert rows[2][3:] == [verdicts.FEW, verdicts.FAILED]
+    assert "1 are reproduced, 1 differ and 1 depends" in documents.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]
