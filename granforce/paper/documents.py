@@ -586,7 +586,7 @@ def score(claims: Rows) -> str:
     parts = [f"{count['reproduced']} are reproduced", f"{count['differ']} differ"]
     parts += [f"{count['open']} are open (undecided or too few data)"] if count["open"] else []
     parts += [f"{mixed} depends on how networks are sampled"] if mixed else []
-    return f"Of {len(verdicts)} claims of the paper and of the letter before it, {listed(parts)}.\n"
+    return f"Of {len(verdicts)} claims of the paper and an earlier letter, {listed(parts)}.\n"
 
 
 def verdict_counts(claims: Rows) -> str:

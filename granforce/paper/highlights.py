@@ -292,8 +292,8 @@ def _volume(of: _Numbers) -> Highlight:
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
         raise KeyError(name)
     return Highlight(
-        "S is narrower at smaller friction, although it has more dimensions: its width, a typical "
-        f"one unlike the intervals, is {_quoted(small)} ⟨f_n⟩ at small, {_quoted(middle)} ⟨f_n⟩ at "
+        "S is narrower at smaller friction, although it has more dimensions: its typical width, "
+        f"unlike the intervals, grows with μ: it is {_quoted(small)} ⟨f_n⟩ at small, {_quoted(middle)} ⟨f_n⟩ at "
         f"intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
         "volumes",
         "volume",
