@@ -293,8 +293,8 @@ def _volume(of: _Numbers) -> Highlight:
         raise KeyError(name)
     return Highlight(
         "S is narrower at smaller friction, although it has more dimensions: its typical width, "
-        f"unlike the intervals, grows with μ: it is {_quoted(small)} ⟨f_n⟩ at small, {_quoted(middle)} ⟨f_n⟩ at "
-        f"intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
+        f"unlike the intervals, grows with μ: it is {_quoted(small)} ⟨f_n⟩ at small, "
+        f"{_quoted(middle)} ⟨f_n⟩ at intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
         "volumes",
         "volume",
     )
