@@ -29,20 +29,20 @@ def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layo
 
 def _relaxation(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "solver", "mu", "seconds")
-    words = {"title": "one relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
+    words = {"title": "One relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
     yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
 def _scaling(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
-    words = {"title": "one relaxation against size", "x": "N", "y": "time / s"}
+    words = {"title": "One relaxation, dependence on N", "x": "N", "y": "time / s"}
     yield _frame(series, backend, words, logx=True, logy=True)
 
 
 def _compaction(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
     series = _by(named, "name", "seconds", "overlap")
-    words = {"title": "compaction", "x": "time / s", "y": "mean overlap / r_max"}
+    words = {"title": "Compaction", "x": "time / s", "y": "mean overlap / r_max"}
     yield _frame(series, backend, words, legend="top_right", logx=True, logy=True)
 
 
@@ -50,20 +50,20 @@ def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
         series = _by(chosen, "method", "seconds", "extent_part")
-        words = {"title": f"walks against exact bounds, μ = {mu:g}", "x": "time / s"}
-        words["y"] = "seen part of exact ⟨ΔF_n⟩"
-        yield _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(-0.6, 1.1))
+        words = {"title": f"Intervals covered by walks, μ = {mu:g}", "x": "time / s"}
+        words["y"] = "fraction of the exact ⟨ΔF_n⟩"
+        yield _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(0, 1.1))
 
 
 def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "method", "h", "seconds_per_state")
-    words = {"title": "uniform sampling", "x": "h", "y": "processor time per effective state / s"}
+    words = {"title": "Uniform sampling", "x": "h", "y": "processor time per effective state / s"}
     yield _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
 def _uniform_growth(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state")
-    words = {"title": "uniform sampling against size", "x": "N"}
+    words = {"title": "Uniform sampling, dependence on N", "x": "N"}
     words["y"] = "processor time per effective state / s"
     yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
@@ -101,6 +101,9 @@ def _frame(
     y = [point[1] for points in series.values() for point in points]
     if room > 1:
         axes["ylim"] = min(y) / 2, room * max(y)
+    x = [point[0] for points in series.values() for point in points]
+    # Less than a decade: ticks of a logarithmic axis would overprint each other.
+    axes["logx"] = axes.get("logx", False) and max(x, default=1) >= 10 * min(x, default=1)
     for k, (name, points) in enumerate(series.items()):
         colour = style.COLOURS[k % len(style.COLOURS)]
         drawn.append(style.line(sorted(points), name, colour, backend))

@@ -131,11 +131,11 @@ def extents(
         series[mu] = _density(group, edges), label, style.COLOURS[k % 7], style.MARKERS[k % 5]
     axes = {"x": f"ΔF_n / {unit or '⟨ΔF_n⟩'}", "y": "P(ΔF_n)"}
     # As in the paper's insets.
-    words = "small μ", "intermediate μ", "large μ"
     ranges = [[mu for mu in series if (mu > _SMALL) + (mu > _MIDDLE) == k] for k in range(3)]
-    frames = [_densities(series, series, False, backend, title="Extent", **axes)]
-    for word, some in zip(words, ranges, strict=True):
+    frames = [_densities(series, series, False, backend, title="Distribution of ΔF_n", **axes)]
+    for some in ranges:
         if some:
+            word = f"μ = {min(some):g} to {max(some):g}" if len(some) > 1 else f"μ = {some[0]:g}"
             top = max(p for mu in some for _, p, _ in series[mu][0])
             room: dict[str, Any] = {
                 "legend": "top_right",
@@ -176,6 +176,7 @@ def correlations(
     *,
     compare: Mapping[str, Rows] | None = None,
     chance: Mapping[float, float] | None = None,
+    walk: str = "walk",
     backend: str = "bokeh",
 ) -> hv.Overlay:
     """Figure 6: corr(f_n, ΔF_n) against μ with the paper's error bars.
@@ -183,7 +184,7 @@ def correlations(
     rows: dicts with mu, correlation, correlation_low and correlation_high (the least and largest
     with any other sampled network in place of the original); means over rows of one μ. compare:
     {name: rows} with mu and correlation. chance: {μ: the largest |mean| that shuffled forces in as
-    many packings give by chance}, dotted.
+    many packings give by chance}, dotted. walk: name of the rows in the legend.
     """
     style.ready(backend)
     middle, low, high = (
@@ -192,7 +193,7 @@ def correlations(
     )
     reach = [(mu, middle[mu], middle[mu] - low[mu], high[mu] - middle[mu]) for mu in middle]
     drawn = [style.bars(reach, style.COLOURS[0], backend)]
-    sources = {"walk": rows, **(compare or {})}
+    sources = {walk: rows, **(compare or {})}
     for k, (label, dash) in enumerate(zip(sources, style.DASHES, strict=False)):
         points = [p[:2] for p in statistics.means(sources[label], "correlation") if p[0] > 0]
         drawn.append(style.line(points, label, style.COLOURS[k], backend, dash))

@@ -22,11 +22,13 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
     """
     style.ready(backend)
     forces = [("critical_force", "critical force", "solid")]
+    title = "Critical force"
     if limit:
+        title = "Critical force (solid), limit load (dashed)"
         forces.append(("limit_load", "limit load", "dashed"))
     exponents = [("decay_exponent", "in order of μ", "solid")]
     panels = [
-        (forces, "Critical force", "⟨F_crit⟩ / ⟨f_n⟩"),
+        (forces, title, "⟨F_crit⟩ / ⟨f_n⟩"),
         (exponents, "Decay of displacements", "α of |u| ~ r^−α"),
     ]
     looks = style.looks(sorted({row["mu"] for row in rows}))

@@ -32,7 +32,7 @@ def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
     """
     sources = [(word, rows, "solid") for word, rows in groups.items()]
-    names = (("acceptance", "accepted part", 1.0), ("mean_sweeps", "sweeps per state", 1.0))
+    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per state", 1.0))
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
@@ -79,7 +79,7 @@ def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bok
     sources = [("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed")]
     if larger:
         sources.append((f"the same, N = {larger[0]['n']}", larger, "dotted"))
-    names = (("undetermined_part", "undetermined part", 1.0), ("clusters", "clusters", 1.0))
+    names = (("undetermined_part", "undetermined fraction", 1.0), ("clusters", "clusters", 1.0))
     return _frames(sources, backend, names, "right")
 
 
@@ -128,7 +128,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     panels = (
         ("Shear stress", "shear stress / pressure", (("friction", rows), ("own_shear", rows))),
         (
-            "in parts of the largest",
+            "Fraction of the largest",
             "shear stress / largest",
             (("own_shear", original), ("largest_shear", states), ("mean_shear", states)),
         ),
@@ -183,7 +183,7 @@ def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layou
     ]
     if series:
         axes = {"x": "N", "y": "ln V / grain", "logx": True, "legend": "right"}
-        frames.append(style.graph(series, backend, title="against the number of disks", **axes))
+        frames.append(style.graph(series, backend, title="Dependence on N", **axes))
     return style.page(frames, backend, columns=2)
 
 

@@ -1,14 +1,15 @@
 """The benchmark's tables in documents, between <!-- bench: PART --> and <!-- end -->."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from granforce.paper import filled
-from granforce.paper.formatting import markdown_table
+from granforce.paper.formatting import markdown_table, typeset
 from granforce.records import InputError, brief
 from granforce.system.files import content_of
+from granforce.types import Rows
 
 KIND = "bench"
 # Heads of columns whose names in the rows are short; columns without a head have their name.
@@ -16,41 +17,39 @@ HEADS = {
     "mu": "μ",
     "differ": "largest difference",
     "off": "largest difference",
+    "solver": "method",
+    "seeds": "packings",
     "way": "method",
     "eta1": "η1",
-    "eta1_error": "standard error of η1",
     "eta2": "η2",
-    "eta2_error": "standard error of η2",
     "eta3": "η3",
-    "eta3_error": "standard error of η3",
     "eta3_part": "η3/exact",
     "mean_extent": "mean ΔF_n",
     "extent_part": "ΔF_n/exact",
-    "distance": "distance from centre",
-    "distance_error": "standard error of distance",
-    "original": "distance of original network",
-    "ratio_is_lower_bound": "lower bound",
-    "seconds_per_state": "seconds per effective state",
-    "effective": "effective states",
+    "states": "networks",
+    "ms_per_state": "ms per network",
+    "seconds_per_state": "CPU seconds per effective network",
+    "effective": "effective networks",
+    "setup_seconds": "set-up seconds",
     "r_hat": "R̂",
     "two_cores": "speed-up on two cores",
     "null_space_ratio": "null space/set-up",
     "z_mean": "difference of means",
     "z_square": "difference of squares",
     "chi_square": "χ²",
-    "above": "excess of minimum",
     "phi": "φ",
-    "peak_MB": "peak MB",
+    "setup": "set-up / s",
+    "relaxation": "one relaxation / s",
+    "bound": "one bound / s",
+    "max_gap": "largest gap",
+    "peak_MB": "memory / MB",
     "without": "seconds without",
     "sigma": "σ",
     "mu_over_true": "assumed/true μ",
     "raw_f_n": "f_n: measured",
     "likeliest_f_n": "f_n: most likely",
-    "mean_f_n": "f_n: mean",
     "raw_f_t": "f_t: measured",
     "likeliest_f_t": "f_t: most likely",
-    "mean_f_t": "f_t: mean",
-    "likeliest_all": "all: most likely",
     "raw_stress": "pressure: measured",
     "stress": "pressure: most likely",
     "cover": "coverage",
@@ -61,6 +60,64 @@ HEADS = {
     "told": "outliers: precision",
 }
 HIDDEN = ("counts",)  # columns of JSON that no table shows
+# Part → the columns of its tables, for parts with more than a page has room for.
+COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "relaxation": (("n", "mu", "solver", "seconds", "worst_residual", "reached", "ratio", "note"),),
+    "walks": (
+        (
+            "n",
+            "mu",
+            "solver",
+            "packings",
+            "states",
+            "eta1",
+            "eta2",
+            "eta3",
+            "acceptance",
+            "seconds",
+        ),
+    ),
+    "intervals": (("n", "mu", "method", "states", "seconds", "eta3", "eta3_part", "extent_part"),),
+    "uniform": (
+        ("n", "mu", "h", "method", "seconds_per_state", "ratio", "effective", "r_hat", "two_cores"),
+        ("n", "mu", "h", "method", "z_mean", "z_square", "setup_seconds", "null_space_ratio"),
+    ),
+    "inference": (
+        ("n", "mu", "unknowns", "method", "seconds", "ratio", "chi_square", "off", "residual"),
+    ),
+    "knowledge": (
+        ("n", "mu", "task", "programs", "method", "seconds", "ratio", "gap", "off", "residual"),
+    ),
+    "frames": (
+        (
+            *("n", "sigma", "missed", "mu_over_true", "raw_f_n", "likeliest_f_n", "raw_f_t"),
+            *("likeliest_f_t", "cover"),
+        ),
+        (
+            *("n", "sigma", "missed", "mu_over_true", "said_to_carry", "carry", "suspected"),
+            *("told", "chi"),
+        ),
+    ),
+    "compaction_frictions": (
+        ("n", "mu", "seeds", "failed", "seconds", "slowest", "phi", "z", "h"),
+    ),
+    "compaction_growth": (
+        ("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h", "exponent"),
+    ),
+}
+CONSTANT = ("n", "mu", "packings", "states", "unknowns")  # stated above a table if all rows agree
+# Part → a column without which a row shows nothing.
+NEEDED = {"uniform": "seconds_per_state"}
+# Part → the column whose worst value is stated, and which value that is.
+WORST: dict[str, tuple[str, Callable[..., Any]]] = {
+    "interval_methods": ("error", max),
+    "relaxation": ("worst_residual", max),
+    "starts": ("differ", max),
+    "intervals": ("extent_part", min),
+    "inference": ("off", max),
+    "knowledge": ("off", max),
+    "frames": ("told", min),
+}
 # Part → what ratios below 1 mean, and the column. In parts whose ratio is the time of a baseline
 # over that of the row, those rows are slower; in others the time of the row is over granforce's.
 SLOWER, FASTER = "Slower than the baseline", "Faster than granforce"
@@ -75,6 +132,13 @@ RATIOS = {
     "uniform": (FASTER, "ratio"),
     "inference": (FASTER, "ratio"),
 }
+# Part → other ratios, and what they mean below 1.
+BELOW = {
+    "uniform": {
+        "two_cores": "Slower on two cores (ratio below 1)",
+        "null_space_ratio": "Null space cheaper than the set-up (ratio below 1)",
+    },
+}
 SPEED_UP, RELATIVE_TIME = "speed-up", "relative time"  # heads of these columns
 # Part → its section, for parts that are often not measured.
 SECTIONS = {
@@ -86,6 +150,7 @@ SECTIONS = {
         "result.\n\n"
     )
 }
+_WORDS = {"hit_and_run": "coordinate hit-and-run", "granforce, 1 threads": "granforce, 1 thread"}
 NAMES = ("solver", "method", "way", "skipped")  # columns that name a row
 
 
@@ -104,7 +169,24 @@ def renew(paths: Sequence[Path], results: Mapping[str, Any]) -> None:
     """Write the tables into files with marks."""
     sizes = {"sizes": "small (--quick)"} if results.get("quick") else {}
     shown = {**results, "environment": sizes | results.get("environment", {})}
-    filled.renew(paths, KIND, lambda path, part: _table(part, shown.get(part)))
+    filled.renew(
+        paths,
+        KIND,
+        lambda path, part: typeset(
+            _extent(results) if part == "quick" else _table(part, shown.get(part))
+        ),
+    )
+
+
+def _extent(results: Mapping[str, Any]) -> str:
+    """Whether the run was a quick one, in a sentence."""
+    cores = results["environment"].get("cores", "?")
+    if results.get("quick"):
+        return (
+            f"It was a quick run (`--quick`) on {cores} cores: small packings and few repetitions, "
+            "so the numbers are only indicative.\n"
+        )
+    return f"It was a full run on {cores} cores.\n"
 
 
 def _table(part: str, rows: Any) -> str:
@@ -115,18 +197,50 @@ def _table(part: str, rows: Any) -> str:
         libraries = {name: version for name, version in rows["libraries"].items() if version}
         values = {name: value for name, value in rows.items() if name != "libraries"} | libraries
         return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
-    remark = _remark(part, rows)
-    names = list(dict.fromkeys(name for row in rows for name in row))
+    remark = _remark(part, rows) + _below(part, rows) + _worst(part, rows)
+    if part in NEEDED:
+        rows = [row for row in rows if row.get(NEEDED[part]) is not None]
+    every = tuple(dict.fromkeys(name for row in rows for name in row))
+    chosen = COLUMNS.get(part, (every,))
+    constant = [
+        name
+        for name in CONSTANT
+        if part in COLUMNS and len(rows) > 1 and len({str(row.get(name)) for row in rows}) == 1
+        if name in every and any(name in names for names in chosen)
+    ]
+    above = ", ".join(f"{_head(part, name)} = {_cell(rows[0][name])}" for name in constant)
+    tables = [
+        _columns(part, rows, [name for name in names if name not in constant]) for names in chosen
+    ]
+    above = f"In all rows, {above}.\n\n" if above else ""
+    return SECTIONS.get(part, "") + above + "\n".join(tables) + remark
+
+
+def _columns(part: str, rows: Rows, names: Sequence[str]) -> str:
+    """A table of the named columns that have any value."""
     names = [
         name
         for name in names
         if name not in HIDDEN and any(row.get(name) not in (None, "") for row in rows)
     ]
-    heads = [HEADS.get(name, name.replace("_", " ")) for name in names]
-    if part in RATIOS:
-        heads[names.index(RATIOS[part][1])] = _ratio_head(part)
-    rows = [[_cell(row.get(name)) for name in names] for row in rows]
-    return SECTIONS.get(part, "") + markdown_table(heads, rows) + remark
+    heads = [_head(part, name) for name in names]
+    return markdown_table(heads, [[_shown(row, name) for name in names] for row in rows])
+
+
+def _head(part: str, name: str) -> str:
+    if part in RATIOS and name == RATIOS[part][1]:
+        return _ratio_head(part)
+    return HEADS.get(name, name.replace("_", " "))
+
+
+def _shown(row: Mapping[str, Any], name: str) -> str:
+    """A cell: with its standard error, of how many, or as a lower bound, where rows have these."""
+    text = _cell(row.get(name))
+    if f"{name}_error" in row:
+        return f"{text} ± {_cell(row[f'{name}_error'])}"
+    if name == "reached" and "runs" in row:
+        return f"{text} of {row['runs']}"
+    return f"≥ {text}" if name == "ratio" and row.get("ratio_is_lower_bound") else text
 
 
 def _ratio_head(part: str) -> str:
@@ -139,16 +253,44 @@ def _remark(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
         return ""
     words, column = RATIOS[part]
     below = [
-        f"{next(row[name] for name in NAMES if name in row)} {_place(row)} ({_cell(row[column])})"
+        f"{next(_cell(row[name]) for name in NAMES if name in row)}, {_place(row)} "
+        f"({_cell(row[column])})"
         for row in rows
         if row.get(column) is not None and row[column] < 1
     ]
     return f"\n{words} ({_ratio_head(part)} below 1): {'; '.join(below)}.\n" if below else ""
 
 
+def _below(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """A paragraph on rows in which other ratios are below 1, for each of these."""
+    text = ""
+    for column, words in BELOW.get(part, {}).items():
+        below = [row for row in rows if row.get(column) is not None and row[column] < 1]
+        if below:
+            places = "; ".join(f"{_place(row)} ({_cell(row[column])})" for row in below)
+            text += f"\n{words}: {places}.\n"
+    return text
+
+
+def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """The row with the worst value of the part's most telling column, in a sentence."""
+    if part not in WORST:
+        return ""
+    column, worst = WORST[part]
+    known = [row for row in rows if row.get(column) is not None]
+    if not known:
+        return ""
+    row = worst(known, key=lambda row: row[column])
+    word = "Largest" if worst is max else "Smallest"
+    head = _head(part, column).removeprefix("largest ").removeprefix("worst ")
+    name = next((f"{_cell(row[name])}, " for name in NAMES if name in row), "")
+    return f"\n{word} {head}: {_cell(row[column])} ({name}{_place(row)}).\n"
+
+
 def _place(row: Mapping[str, Any]) -> str:
     words = {"n": "n = ", "mu": "μ = ", "packing": "", "task": "", "what": ""}
-    return ", ".join(f"{word}{row[name]}" for name, word in words.items() if name in row)
+    words |= {"sigma": "σ = ", "missed": "missed = ", "mu_over_true": "assumed/true μ = "}
+    return ", ".join(f"{word}{_cell(row[name])}" for name, word in words.items() if name in row)
 
 
 def _cell(value: Any) -> str:
@@ -156,4 +298,4 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, bool):
         return "yes" if value else ""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{value:.3g}" if isinstance(value, float) else _WORDS.get(str(value), str(value))

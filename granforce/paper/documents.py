@@ -1,7 +1,8 @@
 """The study's tables in documents, written between two marks, so that no number is copied by hand.
 
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
-against μ), "others" (other measures at each μ), "highlights" (findings, one sentence each),
+against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
+"score" (how many claims are reproduced, in a sentence), "highlights" (findings, one sentence each),
 "headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (the
 verdict on each claim), "details" (the numbers behind them), "findings" (numbers beyond the claims),
 "sweeps" (the residual of the paper's walk, and its excess over S), "preparation" (how results
@@ -9,6 +10,7 @@ depend on the packing), "counts" (number of packings in each part), "certificate
 the exact bounds, convergence of uniform samples).
 """
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,7 +40,7 @@ from granforce.paper.claims.verdicts import (
     UNDECIDED,
     UNMEASURED,
 )
-from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, with_error
+from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
@@ -47,6 +49,8 @@ from granforce.types import Rows
 KIND = "study"
 
 _SWEPT_EXTENT = "paper's walk 0.15 η3"
+_OUTSIDE = "outside S"
+_FEWER = re.compile(r" \((\d+)\)(?=$|,)")  # number of packings, if it is not the expected one
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
 HEADLINES = 4  # highlights in the README
@@ -62,8 +66,46 @@ _HEADS = {
     "": "packings alone",
 }
 MIXED = "depends on the sampler"
+# What the parts contain whose names begin like this; see `plan`.
+_CONTENTS = {
+    "exact": "exact intervals",
+    "walk": "nearest-network walks",
+    "uniform": "uniform networks",
+    "response": "critical forces and first motions",
+    "response_long": "critical forces, four times as many implicit steps",
+    "perturb": "critical forces, longer load steps",
+    "sweeps_": "the paper's walk, to this residual",
+    "prepared_": "walks, packings made with other options",
+    "opened": "walks, frictionless packings with a larger μ in the Coulomb condition",
+    "opened_exact": "exact intervals, the same packings",
+    "widest_exact": "exact intervals, with the largest μ in the Coulomb condition",
+    "stress": "stresses that the contacts can carry",
+    "stress_uniform": "stresses of uniform networks",
+    "frozen": "exact intervals inside a frozen boundary",
+    "volume": "volume of S",
+    "repeat_": "repeated and longer walks",
+    "size": "nearest-network walks, other numbers of disks",
+    "size_sweeps": "the paper's walk, other numbers of disks",
+    "size_exact": "exact intervals, other numbers of disks",
+    "tails": "uniform networks of large packings, for the distribution of f_n",
+}
+# How packings are made, in words; see `plan.variations`.
+_VARIANTS = {
+    "": "default",
+    "prepared_half_steps": "half Δt",
+    "prepared_double_steps": "double Δt",
+    "prepared_accuracy": "10 times the accuracy, 4 times the sweeps",
+    "prepared_sweeps": "4 times the sweeps",
+}
 # Of the verdicts on a claim by sampler, the first of these is the verdict on the claim.
 _VERDICTS = (REPRODUCED, DIFFERS, FAILED, UNDECIDED, FEW, UNMEASURED, MISSING)
+# Outcome → verdicts, in the order of the tables of claims.
+_OUTCOMES = {
+    "differ": (FAILED, DIFFERS),
+    "depend on the sampler": (MIXED,),
+    "open": (UNDECIDED, FEW, UNMEASURED, MISSING),
+    "reproduced": (REPRODUCED,),
+}
 
 
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
@@ -73,7 +115,10 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     """
     known = {
         "measures": lambda: measures(table),
-        "others": lambda: others(table, claims, findings),
+        "walks": lambda: walks(table),
+        "others": lambda: others(table),
+        "further": lambda: further(table),
+        "score": lambda: score(claims),
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "verdicts": lambda: verdict_counts(claims),
@@ -89,34 +134,54 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     def text_of(path: Path, name: str) -> str:
         if name not in known:
             raise InputError(f"{path}: unknown table {name!r}; choose one of {', '.join(known)}")
-        return known[name]()
+        return typeset(known[name]())
 
     filled.renew(paths, KIND, text_of)
 
 
 def measures(table: StudyTable) -> str:
-    """φ, z, h and η against μ as a table, from the same packings in every column.
+    """z, h and η against μ as a table, from the same packings in every column.
 
     The packings are those with exact intervals; a column with fewer of them states their number.
-    The last column is the ratio of the two walks, packing by packing.
     """
     exact = table.part(SAMPLERS["exact"])
-    every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
-    swept, nearest = (table.part(SAMPLERS[name]) for name in ("gauss_seidel", "nearest"))
-    ratios = _over(swept, nearest, "eta2")
-    sources = {name: _drawn_by(table, name) for name in ("gauss_seidel", "nearest", "uniform")}
     columns = (
-        ("φ", exact, "packing_fraction", 1.0, "{:.4f}"),
         ("z", exact, "coordination", 1.0, "{:.3f}"),
         ("h", exact, "dimension", 1.0, "{:.0f}"),
         ("exact 0.15 η3", exact, "eta3", 0.15, None),
-        ("nearest-network walk η2", sources["nearest"], "eta2", 1.0, None),
-        ("uniform η2", sources["uniform"], "eta2", 1.0, None),
-        ("paper's walk η1", sources["gauss_seidel"], "eta1", 1.0, None),
-        ("paper's walk η2", sources["gauss_seidel"], "eta2", 1.0, None),
-        (_SWEPT_EXTENT, sources["gauss_seidel"], "eta3", 0.15, None),
-        ("paper's walk/nearest-network walk η2", ratios, "ratio", 1.0, None),
+        *(
+            (f"{word} η2", _drawn_by(table, name), "eta2", 1.0, None)
+            for name, word in (
+                ("nearest", _HEADS["nearest"]),
+                ("uniform", _HEADS["uniform"]),
+                ("gauss_seidel", "paper's walk"),
+            )
+        ),
     )
+    return _against_friction(table, columns)
+
+
+def walks(table: StudyTable) -> str:
+    """φ, and η of the paper's walk against μ, as a table; packings as in `measures`.
+
+    The last column is the ratio of the two walks, packing by packing.
+    """
+    swept, nearest = (table.part(SAMPLERS[name]) for name in ("gauss_seidel", "nearest"))
+    judged = _drawn_by(table, "gauss_seidel")
+    columns = (
+        ("φ", table.part(SAMPLERS["exact"]), "packing_fraction", 1.0, "{:.4f}"),
+        ("paper's walk η1", judged, "eta1", 1.0, None),
+        ("paper's walk η2", judged, "eta2", 1.0, None),
+        (_SWEPT_EXTENT, judged, "eta3", 0.15, None),
+        ("paper's walk/nearest-network walk η2", _over(swept, nearest, "eta2"), "ratio", 1.0, None),
+    )
+    return _against_friction(table, columns)
+
+
+def _against_friction(table: StudyTable, columns: Sequence[tuple[Any, ...]]) -> str:
+    """A table of columns (head, rows, name, factor, form), with a line for each μ."""
+    exact = table.part(SAMPLERS["exact"])
+    every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
     swept_part = SAMPLERS["gauss_seidel"]
     beyond, known = outside(table, swept_part), excesses(table, swept_part)
     lines = []
@@ -124,21 +189,32 @@ def measures(table: StudyTable) -> str:
         line = [f"{mu:g}", str(len(seeds))]
         for head, rows, name, factor, form in columns:
             if mu in beyond and head.startswith("paper's walk"):
-                line.append("outside S")
+                line.append(_OUTSIDE)
                 continue
             chosen = [row for row in rows if row["mu"] == mu and row["seed"] in seeds]
             line.append(_cell(chosen, name, factor, form, len(seeds)))
             if head == _SWEPT_EXTENT and mu in known and known[mu][0] > _FAR * known[mu][1]:
                 line[-1] += f", excess {_excess(*known[mu])}"
         lines.append(line)
-    return markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
+    return _counted(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def others(table: StudyTable, claims: Rows, findings: Rows) -> str:
-    """Intervals seen by walks, states of contacts, and the width of S against μ, as a table.
+def _counted(heads: list[str], lines: list[list[str]]) -> str:
+    """The table; a column of fewer packings, equally many in each line, says so in its head."""
+    for k in range(2, len(heads)):
+        cells = [line[k] for line in lines if line[k] not in ("", _OUTSIDE)]
+        marks = {found[1] if (found := _FEWER.search(cell)) else "" for cell in cells}
+        if len(marks) == 1 and "" not in marks:
+            heads[k] += f" (n = {marks.pop()})"
+            for line in lines:
+                line[k] = _FEWER.sub("", line[k])
+    return markdown_table(heads, lines)
 
-    Means ± standard errors over packings; ratios are of the same packing. Below the table: whether
-    α is the exponent of a law.
+
+def others(table: StudyTable) -> str:
+    """Critical forces, decay of the first motion, and the width of S against μ, as a table.
+
+    Means ± standard errors over packings; ratios are of the same packing.
     """
     answers = [
         row | {"part": row["critical_force"] / row["limit_load"]}
@@ -147,57 +223,42 @@ def others(table: StudyTable, claims: Rows, findings: Rows) -> str:
     ]
     walk, uniform, exact = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform", "exact"))
     columns = (
-        ("nearest-network walk/uniform η2", _over(walk, uniform, "eta2"), "ratio", None),
-        ("nearest-network walk/exact η3", _over(walk, exact, "eta3"), "ratio", None),
-        ("uniform/exact η3", _over(uniform, exact, "eta3"), "ratio", None),
-        ("F_crit, ⟨f_n⟩", answers, "critical_force", None),
-        ("F_crit/limit load", answers, "part", None),
-        ("α", answers, "decay_exponent", None),
-        ("width of S, ⟨f_n⟩", table.part("volume"), "extent", None),
-        ("ln V per grain", table.part("volume"), "log_volume_per_grain", None),
-        (
-            "undetermined fraction, frozen surroundings",
-            table.part("frozen"),
-            "undetermined_part",
-            None,
-        ),
-        ("largest shear stress/pressure", table.part("stress"), "friction", None),
+        ("nearest-network walk/exact η3", _over(walk, exact, "eta3"), "ratio"),
+        ("uniform/exact η3", _over(uniform, exact, "eta3"), "ratio"),
+        ("F_crit, ⟨f_n⟩", answers, "critical_force"),
+        ("F_crit/limit load", answers, "part"),
+        ("α", answers, "decay_exponent"),
+        ("width of S, ⟨f_n⟩", table.part("volume"), "extent"),
     )
-    frictions = sorted({row["mu"] for _, rows, *_ in columns for row in rows if row["mu"] > 0})
+    return _measured_at_each(columns)
+
+
+def further(table: StudyTable) -> str:
+    """What `others` has no room for, as a table."""
+    walk, uniform = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform"))
+    columns = (
+        ("nearest-network walk/uniform η2", _over(walk, uniform, "eta2"), "ratio"),
+        ("ln V per grain", table.part("volume"), "log_volume_per_grain"),
+        ("undetermined fraction, frozen boundary", table.part("frozen"), "undetermined_part"),
+        ("largest shear stress/pressure", table.part("stress"), "friction"),
+    )
+    return _measured_at_each(columns)
+
+
+def _measured_at_each(columns: Sequence[tuple[str, Rows, str]]) -> str:
+    """A table of columns (head, rows, name) with a line for each μ."""
+    grouped = [_by_friction(rows) for _, rows, _ in columns]
+    most = max((len(rows) for groups in grouped for rows in groups.values()), default=0)
     lines = []
-    for mu in frictions:
-        of_mu = [[row for row in rows if row["mu"] == mu] for _, rows, *_ in columns]
-        most = max(map(len, of_mu))
+    for mu in sorted(set().union(*grouped)):
+        of_mu = [groups.get(mu, []) for groups in grouped]
         cells = [
-            _cell(rows, name, 1.0, form, most)
-            for rows, (_, _, name, form) in zip(of_mu, columns, strict=True)
+            _cell(rows, name, 1.0, None, most)
+            for rows, (_, _, name) in zip(of_mu, columns, strict=True)
         ]
-        lines.append([f"{mu:g}", str(most), *cells])
-    text = markdown_table(["μ", "packings", *(head for head, *_ in columns)], lines)
-    return text + _decay(claims, findings)
-
-
-def _decay(claims: Rows, findings: Rows) -> str:
-    """Whether |u|(r) is known to be a power law, and how α depends on load steps, in sentences."""
-    verdicts = [row for row in claims if row["statement"].startswith("the first motion")]
-    if not verdicts or not np.isfinite(verdicts[0]["value"]):
-        return ""
-    (law,) = verdicts
-    sentences = [
-        "α is the exponent of the best fit |u| ~ r^−α to the first motion, whether or not a power "
-        "law fits best. The verdict on whether it fits better than an exponential is "
-        f"*{law['verdict']}*."
-    ]
-    steps = "α with load steps of 0.4"
-    ratios = [
-        row for row in findings if row["statement"].startswith(steps) and row["verdict"] != FEW
-    ]
-    values = [f"{_number(row)} at {row['statement'].rpartition(', ')[2]}" for row in ratios]
-    if values:
-        sentences.append(
-            f"With load steps four times as long, α changes by a factor of {listed(values)}."
-        )
-    return "\n" + " ".join(sentences) + "\n"
+        if any(cells):
+            lines.append([f"{mu:g}", str(max(map(len, of_mu))), *cells])
+    return _counted(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
 def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
@@ -224,13 +285,12 @@ def sweeps(table: StudyTable) -> str:
                 _power(residual),
                 f"{mu:g}",
                 str(len(rows)),
-                _cell(rows, "reached_part", 1.0, "{:.2f}", len(rows)),
                 _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
                 _excess(*known[mu]) if mu in known else "",
             ]
             compared = [row for row in ratios if row["mu"] == mu]
             eta = (
-                ["outside S"] * 2
+                [_OUTSIDE] * 2
                 if mu in beyond
                 else [
                     _cell(rows, "eta2", 1.0, None, len(rows)),
@@ -238,13 +298,13 @@ def sweeps(table: StudyTable) -> str:
                 ]
             )
             lines.append([*cells, *eta])
-    heads = ("residual", "μ", "packings", "fraction reached", "sweeps per state", "excess")
+    heads = ("residual", "μ", "packings", "sweeps per network", "excess")
     text = markdown_table([*heads, "η2", "relative to the nearest-network walk"], lines)
     return f"{_swept(table)}\n{text}"
 
 
 def _swept(table: StudyTable) -> str:
-    """Which residuals there are, and whether walks reached their states, in sentences."""
+    """Which residuals there are, and whether walks have all their states, in sentences."""
     words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
     if not words:
         return "No walk by sweeps is part of this study.\n"
@@ -252,10 +312,13 @@ def _swept(table: StudyTable) -> str:
     rows = table.part(*plans.SWEEPS)
     least = min(row["reached_part"] for row in rows)
     if least >= 1:
-        return text + "Every walk reached all its states.\n"
+        return (
+            text + "Every walk has as many networks as requested; attempts that ended without one "
+            "were repeated.\n"
+        )
     where = sorted({row["mu"] for row in rows if row["reached_part"] < 1})
     return (
-        text + "Some walks did not reach all their states, at μ = "
+        text + "Some walks have fewer networks than requested, at μ = "
         f"{listed([f'{mu:g}' for mu in where])}; "
         f"a walk is judged if it has at least the fraction {WHOLE_WALK:g} of them.\n"
     )
@@ -310,7 +373,7 @@ def preparation(table: StudyTable) -> str:
                         text += f" ({_difference(apart)})"
                 cells.append(text)
             if counted != {0}:
-                word = name.removeprefix("prepared_").replace("_", " ") or "default"
+                word = _VARIANTS.get(name, name.removeprefix("prepared_").replace("_", " "))
                 lines.append([f"{mu:g}", word, str(max(counted)), *cells])
     heads = ["μ", "options", "packings", *(head for head, *_ in columns)]
     text = markdown_table(heads, lines)
@@ -344,10 +407,10 @@ def _tested(differences: Sequence[_Apart]) -> str:
         text += f"; {same} left out, as all pairs differ by the same amount"
     together = int((p < level / max(1, len(p))).sum())
     last = (
-        f"Significant after Bonferroni's correction for their number: {together}."
+        f"After Bonferroni's correction, {together} remain significant."
         if together
-        else "None is significant after Bonferroni's correction for their number: no dependence on "
-        "options is shown."
+        else f"None of the {len(p)} remains significant after Bonferroni's correction: these data "
+        "show no dependence on the options."
     )
     return f"{text}. {last}"
 
@@ -371,8 +434,8 @@ def _widest(table: StudyTable, variants: Sequence[str]) -> str:
     mu = max(spans, key=lambda mu: spans[mu][1] / spans[mu][0])
     tested = listed([f"{mu:g}" for mu in spans])
     return (
-        f" The mean h varies most at μ = {mu:g}: from {spans[mu][0]:.2g} to {spans[mu][1]:.2g}. "
-        f"Options were varied only at μ = {tested}.\n"
+        f" Between options, the mean h varies most at μ = {mu:g}, from {spans[mu][0]:.2g} to "
+        f"{spans[mu][1]:.2g}. Options were varied only at μ = {tested}.\n"
     )
 
 
@@ -426,19 +489,18 @@ def finding_table(findings: Rows) -> str:
             others.append([statement, number])
     words = [word for word, _ in RANGES]
     lines = [[name, *(numbers.get(word, "") for word in words)] for name, numbers in ranged.items()]
-    first = markdown_table(["finding", *(f"{word} μ" for word in words)], lines) if lines else ""
-    second = markdown_table(["finding", "number"], others) if others else ""
+    first = markdown_table(["quantity", *(f"{word} μ" for word in words)], lines) if lines else ""
+    second = markdown_table(["quantity", "value"], others) if others else ""
     return "\n".join(part for part in (first, second) if part)
 
 
 def _number(finding: dict[str, Any]) -> str:
     if not np.isfinite(finding["value"]):
         return ""
-    if finding["verdict"] == FEW:
-        return f"{finding['value']:.3g}: {FEW}"
     known = np.isfinite(finding["low"])
     ends = f" ({finding['low']:.3g} … {finding['high']:.3g})" if known else ""
-    return f"{finding['value']:.3g}{ends}"
+    few = f": {FEW}" if finding["verdict"] == FEW else ""
+    return f"{finding['value']:.3g}{ends}{few}"
 
 
 def counts(table: StudyTable) -> str:
@@ -455,9 +517,18 @@ def counts(table: StudyTable) -> str:
             each = sorted({len(seeds) for seeds in seeds_at.values()})
             span = f"{each[0]}" if len(each) == 1 else f"{each[0]} to {each[-1]}"
             versions = [_version(some, name) for name in ("version", "packing_version")]
-            lines.append([part, str(n), str(len(seeds_at)), span, *versions])
-    heads = ("part", "disks", "μ", "packings at each", "version", "version of packings")
+            lines.append([part, _content(part), str(n), str(len(seeds_at)), span, *versions])
+    heads = ("part", "content", "disks", "values of μ", "packings at each")
+    heads += ("version", "version of packings")
     return markdown_table(heads, lines)
+
+
+def _content(part: str) -> str:
+    """What a part contains; the longest beginning of its name that is known."""
+    begins = [name for name in _CONTENTS if part.startswith(name)]
+    text = _CONTENTS[max(begins, key=len)] if begins else ""
+    bounds = part.startswith("prepared") and part.endswith("_exact")
+    return text.replace("walks", "exact intervals") if bounds else text
 
 
 def _version(rows: Rows, name: str) -> str:
@@ -493,9 +564,8 @@ def certificates(table: StudyTable) -> str:
     if not bounded:
         return ""
     text = (
-        f"The largest duality gap of all exact intervals is "
-        f"{max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩, in {len(bounded)} computations of "
-        "all contacts of a packing."
+        f"In {len(bounded)} computations of exact intervals, each for all contacts of a packing, "
+        f"the largest duality gap is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
     )
     uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
     if uniform:
@@ -506,6 +576,17 @@ def certificates(table: StudyTable) -> str:
             f"size {min(row['least_bulk_size'] for row in uniform):.0f}."
         )
     return text + "\n"
+
+
+def score(claims: Rows) -> str:
+    """How many claims are reproduced, differ and are open, in a sentence."""
+    verdicts = [_together(by_sampler) for by_sampler in _by_claim(claims).values()]
+    count = {word: sum(map(verdicts.count, words)) for word, words in _OUTCOMES.items()}
+    mixed = verdicts.count(MIXED)
+    parts = [f"{count['reproduced']} are reproduced", f"{count['differ']} differ"]
+    parts += [f"{count['open']} are open (undecided or too few data)"] if count["open"] else []
+    parts += [f"{mixed} depends on how networks are sampled"] if mixed else []
+    return f"Of {len(verdicts)} claims of the paper and an earlier letter, {listed(parts)}.\n"
 
 
 def verdict_counts(claims: Rows) -> str:
@@ -526,13 +607,21 @@ def verdict_counts(claims: Rows) -> str:
 
 
 def verdict_table(claims: Rows) -> str:
-    """The verdict on each claim, all samplers together, and by each: one row per claim."""
+    """The verdict on each claim, all samplers together, and by each: a table for each outcome."""
     heads = [name for name in _used(claims) if name]
-    rows = []
+    columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
+    grouped: dict[str, list[list[str]]] = {}
     for (statement, source, _), by_sampler in _by_claim(claims).items():
         cells = [by_sampler[name]["verdict"] if name in by_sampler else "" for name in heads]
-        rows.append([statement, source, f"**{_together(by_sampler)}**", *cells])
-    return markdown_table(["claim", "source", "verdict", *(_HEADS[name] for name in heads)], rows)
+        verdict = _together(by_sampler)
+        grouped.setdefault(verdict, []).append([statement, source, f"**{verdict}**", *cells])
+    parts = []
+    for outcome, verdicts in _OUTCOMES.items():
+        rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]
+        if rows:
+            head = f"### {outcome[0].upper()}{outcome[1:]} ({len(rows)})"
+            parts.append(f"{head}\n\n{markdown_table(columns, rows)}")
+    return "\n".join(parts)
 
 
 def _together(by_sampler: dict[str, dict[str, Any]]) -> str:
@@ -566,15 +655,18 @@ def detail_table(claims: Rows) -> str:
     """
     heads = _used(claims)
     rows = []
-    for (statement, source, criterion), by_sampler in _by_claim(claims).items():
+    for (statement, _, criterion), by_sampler in _by_claim(claims).items():
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
-        rows.append([statement, source, criterion, *cells])
+        (measured, *_) = (claim["measured"] for claim in by_sampler.values())
+        measured = measured.partition(", at the deciding μ")[0]
+        rows.append([statement, measured, criterion, *cells])
     columns = [_HEADS[name] for name in heads]
-    text = markdown_table(["claim", "source", "criterion", *columns], rows)
+    text = markdown_table(["claim", "number", "criterion", *columns], rows)
     unjudged = {claim["sampler"]: _split(claim["why"])[1] for claim in claims}
     notes = [
-        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: {unjudged[name]}."
+        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S, at μ = "
+        f"{listed(unjudged[name].removeprefix(OUTSIDE).split(', '))}."
         for name in heads
         if unjudged.get(name)
     ]
@@ -590,9 +682,9 @@ def _split(why: str) -> tuple[str, str]:
 def _verdict(claim: dict[str, Any]) -> str:
     why, _ = _split(claim["why"])
     why = f" ({why})" if why else ""
-    if not np.isfinite(claim["value"]):
+    if not np.isfinite(claim["value"]) or claim["verdict"] == UNMEASURED:
         return claim["verdict"] + why
-    known = np.isfinite(claim["low"]) and claim["verdict"] != FEW
+    known = np.isfinite(claim["low"])
     ends = [f"{claim['low']:.3g} … {claim['high']:.3g}"] if known else []
     ends += [f"n = {claim['packings']}"] if claim.get("packings") else []
     ends += [f"μ = {claim['mu']:g}"] if claim.get("mu") is not None else []

@@ -21,7 +21,7 @@ FORMATS = ("html", "png", "svg")
 
 _POINTS = "points are means over packings, bars standard errors"
 _TAILS = (
-    "linear, and semi-logarithmic for small, intermediate and large friction; bars are standard "
+    "linear, and semi-logarithmic for three ranges of friction; bars are standard "
     "errors over packings; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the upper "
     "quartile"
 )
@@ -49,7 +49,7 @@ CAPTIONS = {
     "as many packings with shuffled forces give.",
     "samplers": "Indeterminacy η1, η2 and 0.15 η3 of states drawn in several ways, against the "
     f"friction coefficient μ; {_POINTS}.",
-    "effort": "Accepted part of the attempts, and sweeps per accepted state, of walks by "
+    "effort": "Acceptance rate of the attempts, and sweeps per accepted state, of walks by "
     f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
     "figure1_exact": "As Figure 1 for the nearest-network walk; dashed, 0.15 η3 of the exact "
     "intervals; dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
@@ -66,12 +66,12 @@ CAPTIONS = {
     f"exact intervals (dashed), against the number N of disks; {_POINTS}.",
     "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
     "of packings made with μ; bars are standard errors over packings.",
-    "frozen": "Part of the contacts without a unique force, and number of their clusters, where "
+    "frozen": "Fraction of contacts without a unique force, and number of their clusters, where "
     "only the pressure is prescribed and where the forces of the surroundings are held; bars are "
     "standard errors over packings.",
     "stresses": "Shear stress over pressure against the friction coefficient μ: the largest of any "
     "network in S (exact), and that of the original network, which was made under pressure alone; "
-    "and this and that of uniform states in parts of the largest in the same packing; "
+    "and this and that of uniform states as fractions of the largest in the same packing; "
     f"{_POINTS}.",
     "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, and ln V per grain of the "
     "backbone against the friction coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V "
@@ -91,6 +91,7 @@ _SWEPT = {
 _DRAWN = {name: _SWEPT[part] for name, part in SAMPLERS.items() if part in _SWEPT} | {
     "nearest": "nearest-network walk"
 }
+_WALKS = {"gauss_seidel": "paper's walk", "nearest": "nearest-network walk"}
 _RELAXED = {
     "gauss_seidel": "the paper's walk, by Gauss–Seidel sweeps that end at 10⁻³ ⟨f_n⟩",
     "nearest": "the nearest-network walk",
@@ -151,12 +152,18 @@ def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
     walk = drawn(table, sampler)
     if walk:
         drawings["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
-        drawings["figure6"] = _later(figures.correlations, walk, chance=_chance(walk))
+        words = _WALKS[sampler]
+        drawings["figure6"] = _later(figures.correlations, walk, chance=_chance(walk), walk=words)
     groups = _some(_loose(_in_S(table, part)))
     if groups:
         options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
         drawings["figure4"] = _later(figures.extents, groups, **options)
-    answers = [row for row in table.answers(part) if np.isfinite(row.get("decay_exponent", np.nan))]
+    beyond = outside(table, part)
+    answers = [
+        row
+        for row in table.answers(part)
+        if np.isfinite(row.get("decay_exponent", np.nan)) and row["mu"] not in beyond
+    ]
     if answers:
         drawings["figure2"] = _later(figures.perturbation, answers)
         drawings["figure2_limit"] = _later(figures.perturbation, answers, limit=True)
@@ -195,7 +202,9 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
         sources = {"exact": exact, "volume": table.part("volume")}
         drawings["figure1_exact"] = _later(figures.indeterminacy, walk, compare=sources)
         both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
-        drawings["figure6_exact"] = _later(figures.correlations, walk, compare=both)
+        drawings["figure6_exact"] = _later(
+            figures.correlations, walk, compare=both, walk=_WALKS["nearest"]
+        )
     if walk and uniform:
         drawings["figure1_uniform"] = _later(
             figures.indeterminacy, walk, compare={"uniform": uniform}

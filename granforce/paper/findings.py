@@ -51,6 +51,7 @@ WORDS = {
     "exact": "exact",
 }
 WALKS = ("nearest", "gauss_seidel")
+SHEARED = "fraction of the largest shear stress that"
 
 
 def measured(table: StudyTable) -> list[Claim]:
@@ -189,13 +190,12 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     yield from _by_range(groups, f"largest {statement}")
     yield from _by_range(_values(rows, "own_shear"), f"{statement} of the original network")
     for some, name, word in (
-        (rows, "own_shear", "of the original network"),
-        (uniform, "mean_shear", "of uniform states, mean"),
-        (uniform, "largest_shear", "of uniform states, largest"),
+        (rows, "own_shear", "the original network has"),
+        (uniform, "mean_shear", "uniform networks have on average"),
+        (uniform, "largest_shear", "uniform networks have at most"),
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction")
-        statement_of = f"{statement} {word}, over the largest of the packing"
-        yield from _by_range(parts, statement_of, FRACTION)
+        yield from _by_range(parts, f"{SHEARED} {word}", FRACTION)
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:

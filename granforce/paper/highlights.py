@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.measures import statistics
+from granforce.packing.compaction import SETTLED_FROM
 from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
 from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED
-from granforce.paper.findings import WORDS
+from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable
 from granforce.types import Rows
@@ -22,6 +23,7 @@ STRONG = "correlation of f_n with the exact ΔF_n, intermediate μ"
 WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 # Friction at which packings are compared with those of the largest friction.
 USUAL = 0.1
+PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 STATES = ("nearest", "gauss_seidel", "uniform")
 
 
@@ -81,38 +83,38 @@ class _Numbers:
         """All μ with exact intervals."""
         return sorted({row["mu"] for row in self.table.part(SAMPLERS["exact"])})
 
-    @property
-    def peak(self) -> float:
-        """The μ of the table at which exact η3 is largest."""
-        extents = statistics.grouped(self.table.part(SAMPLERS["exact"]), "eta3")
-        return max(extents, key=lambda mu: extents[mu].mean())
-
 
 def _quoted(row: dict[str, Any]) -> str:
     return between(row["value"], row["low"], row["high"])
 
 
 def _maximum(of: _Numbers) -> Highlight:
-    least, most, place = LEAST_DYNAMIC, of.frictions[-1], of.row(PEAK)
+    place = of.row(PEAK)
     turns = of.row("η3(μ) is not monotonic", "exact")["verdict"] == REPRODUCED
     within = MIDDLE[0] <= place["low"] and place["high"] <= MIDDLE[1]
-    first = (
-        f"The exact intervals are longest {'at intermediate friction, ' if within else ''}at "
-        f"μ = {_quoted(place)}"
-        if turns
-        else "Whether the exact intervals are longest at intermediate friction is undecided"
+    middle = "at intermediate friction"
+    if not turns:
+        first = f"Whether the exact intervals are longest {middle} is undecided"
+    elif within:
+        first = f"The exact intervals are longest {middle}"
+    else:
+        first = "The exact intervals are longest at one friction coefficient"
+    step = (
+        f" The default compaction protocol changes at μ = {SETTLED_FROM:g}, within the confidence "
+        "interval of this maximum."
+        if place["low"] <= SETTLED_FROM <= place["high"]
+        else ""
     )
     return Highlight(
-        f"{first}: 0.15 η3 is {of.mean('exact', 'eta3', of.peak, 0.15)} at μ = {of.peak:g}, "
-        f"compared with {of.mean('exact', 'eta3', least, 0.15)} at μ = {least:g} and "
-        f"{of.mean('exact', 'eta3', most, 0.15)} at μ = {most:g}. {_others_turn(of)}",
+        f"{first}: relative to the forces, they are longest at μ = {_quoted(place)}; the paper's "
+        f"are longest near {PAPERS_PEAK:g}.{step}",
         "samplers",
         "exact-intervals",
     )
 
 
-def _others_turn(of: _Numbers) -> str:
-    """Whether η2 of sampled states has a maximum, too."""
+def _rising_eta2(of: _Numbers) -> Highlight:
+    """Whether η2 of sampled networks has a maximum, too."""
     verdicts = of.verdicts("η2(μ) is not monotonic", STATES)
     names = {
         word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
@@ -123,12 +125,18 @@ def _others_turn(of: _Numbers) -> str:
         )
         if any(map(chosen, verdicts.values()))
     }
-    sentences = {
-        "does": "η2 also rises and falls again for {}.",
-        "does not": "η2 does not for {}.",
-        "undecided": "Whether η2 has such a maximum for {} is undecided.",
+    if "does" not in names:
+        raise KeyError("η2")
+    rest = {
+        "does not": "; for {} it does not",
+        "undecided": "; for {} this is undecided",
     }
-    return " ".join(sentences[word].format(known) for word, known in names.items())
+    others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
+    return Highlight(
+        f"η2 also has a maximum: with μ, it rises and falls again for {names['does']}{others}.",
+        "figure1_uniform",
+        "measures",
+    )
 
 
 def _free_forces(of: _Numbers) -> Highlight:
@@ -137,25 +145,11 @@ def _free_forces(of: _Numbers) -> Highlight:
     if 2 * dimensions[most].mean() > dimensions[USUAL].mean():
         raise KeyError("dimension")
     return Highlight(
-        f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks it has "
-        f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g} and "
-        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.{_prepared(of, most)}",
+        f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
+        f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
+        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.",
         "figure1_exact",
         "ensemble",
-    )
-
-
-def _prepared(of: _Numbers, mu: float) -> str:
-    """The range of h over ways to prepare packings, in a sentence; empty if there is only one."""
-    parts = [p for p in of.table.parts() if p.startswith("prepared_") and p.endswith("_exact")]
-    groups = [statistics.grouped(of.table.part(part), "dimension") for part in parts]
-    means = [group[mu].mean() for group in groups if mu in group]
-    if not means:
-        return ""
-    few = min(len(group[mu]) for group in groups if mu in group)
-    return (
-        f" With other compaction options, the mean over {few} packings at μ = {mu:g} ranges from "
-        f"{min(means):.2g} to {max(means):.2g}."
     )
 
 
@@ -169,7 +163,7 @@ def _coverage(of: _Numbers) -> Highlight:
     quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
     return Highlight(
         f"{of.table.plan['states']} networks show only part of each interval: at intermediate μ, "
-        f"the ratio of their η3 to the exact one is {quoted}.",
+        f"the fraction of the exact η3 that they cover is {quoted}.",
         "samplers",
         "exact-intervals",
     )
@@ -183,14 +177,14 @@ def _strong(of: _Numbers) -> Highlight:
         else "Whether strong contacts have longer intervals is undecided"
     )
     second = (
-        "relative to their force, their intervals are shorter"
+        "but shorter ones relative to their force"
         if relative["high"] < 0
-        else "whether they are shorter relative to the force is undecided"
+        else "and whether they are shorter relative to the force is undecided"
     )
     return Highlight(
-        f"{first}: at intermediate μ, the correlation of f_n with the exact ΔF_n is "
-        f"{_quoted(absolute)}. {second[0].upper()}{second[1:]}: the rank correlation of f_n with "
-        f"ΔF_n/f_n is {_quoted(relative)}.",
+        f"{first}, {second}: at intermediate μ, the force f_n of a contact in the original network "
+        f"has a correlation of {_quoted(absolute)} with the exact ΔF_n, and a rank correlation of "
+        f"{_quoted(relative)} with ΔF_n/f_n.",
         "figure6_exact",
         "measures",
     )
@@ -201,16 +195,10 @@ def _wider(of: _Numbers) -> Highlight:
     middle, small = of.row(f"{base}, intermediate μ"), of.row(f"{base}, small μ")
     if min(middle["low"], small["low"]) <= 1:
         raise KeyError(base)
-    swept = of.known({"": f"η1 of {WORDS['gauss_seidel']} over η1 of {WORDS['uniform']}, {MID}"})
-    papers = "".join(
-        f" η1 of {WORDS['gauss_seidel']} is {_quoted(row)} times that of {WORDS['uniform']} at "
-        "intermediate μ."
-        for row in swept.values()
-    )
     return Highlight(
-        f"{_sentence(WORDS['nearest'])} is not uniform in S: its networks are {_quoted(middle)} "
-        f"times as far from the centre as uniform ones at intermediate μ, and {_quoted(small)} "
-        f"times as far at small μ.{papers}",
+        f"{_sentence(WORDS['nearest'])} does not sample S uniformly: its networks are "
+        f"{_quoted(middle)} times as far from the centre of S as {WORDS['uniform']} at "
+        f"intermediate μ, and {_quoted(small)} times as far at small μ.",
         "distances",
         "uniform-sampling",
     )
@@ -225,30 +213,21 @@ def _sentence(words: str) -> str:
 
 def _alike(of: _Numbers) -> Highlight:
     claim = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
-    verdicts, texts = set(), []
-    for ratio in ("η1/η3", "η2/η3"):
-        constant = of.claims(f"{claim}: {ratio} is constant", ("nearest", "gauss_seidel"))
-        if not constant:
-            raise KeyError(ratio)
-        verdicts |= {row["verdict"] for row in constant.values()}
-        values = listed(
-            [
-                f"{of.judged(f'{claim}: value of {ratio}', name)} for {WORDS[name]}"
-                for name in constant
-            ]
-        )
-        varies = listed([f"{row['value']:.2g}" for row in constant.values()])
-        texts.append(f"{ratio} averages {values}, and varies by factors of {varies} with μ")
-    if verdicts == {REPRODUCED}:
-        first = "The three measures are proportional to each other"
-    elif verdicts & {DIFFERS, FAILED}:
-        first = "The three measures are not all proportional to each other"
+    ratios = ("η2/η3", "η1/η3")
+    constant = {ratio: of.row(f"{claim}: {ratio} is constant", "nearest") for ratio in ratios}
+    verdicts = {ratio: row["verdict"] for ratio, row in constant.items()}
+    if set(verdicts.values()) == {REPRODUCED}:
+        first = "η1, η2 and η3 are proportional to each other"
+    elif set(verdicts.values()) & {DIFFERS, FAILED}:
+        first = "η1, η2 and η3 are not all proportional to each other"
     else:
-        first = "Whether the three measures are proportional to each other is undecided"
+        first = "Whether η1, η2 and η3 are proportional to each other is undecided"
+    texts = listed(
+        [f"{ratio} varies by a factor of {_quoted(row)}" for ratio, row in constant.items()]
+    )
     return Highlight(
-        f"{first}: for μ ≥ {LEAST_DYNAMIC:g}, {'; '.join(texts)}. η2 ≈ √2 η1 follows from the "
-        "definitions alone.",
-        "figure1",
+        f"{first}: for {WORDS['nearest']} and μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
+        "figure1_exact",
         "measures",
     )
 
@@ -258,22 +237,15 @@ def _critical(of: _Numbers) -> Highlight:
     small, middle, large = (of.row(claim.format(w)) for w in ("small", "intermediate", "large"))
     if middle["high"] >= 1:
         raise KeyError(claim)
-    pushed = {row["contacts"] for row in of.table.responses()}
-    longer = of.known(
-        {
-            "": "⟨F_crit⟩ with load steps of 0.4 of the remaining distance over that with 0.1 "
-            "(other contacts), intermediate μ"
-        }
-    )
-    steps = "".join(
-        f" With load steps four times as long, F_crit is {_quoted(row)} times as large at "
-        "intermediate μ."
-        for row in longer.values()
+    far = middle["high"] < small["low"] and large["high"] < small["low"]
+    first = (
+        "Except at small friction, contacts give way well below their limit loads"
+        if far
+        else "At intermediate friction, contacts give way below their limit loads"
     )
     return Highlight(
-        "At intermediate friction, contacts give way below their limit loads: F_crit over the "
-        f"limit load, averaged over {max(pushed):g} contacts of each packing, is {_quoted(small)} "
-        f"at small, {_quoted(middle)} at intermediate and {_quoted(large)} at large μ.{steps}",
+        f"{first}: the mean critical force is {_quoted(small)} of the mean limit load at small, "
+        f"{_quoted(middle)} at intermediate and {_quoted(large)} at large μ.",
         "figure2_limit",
         "local-perturbation",
     )
@@ -283,24 +255,25 @@ def _stability(of: _Numbers) -> Highlight:
     claim = "F_crit rises with η"
     words = {"exact": "exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
     rows = of.claims(claim, list(words))
-    if not rows:
+    rising = {name: row for name, row in rows.items() if row["low"] > 0}
+    others = [words[name] for name in rows if name not in rising]
+    if not rising:
         raise KeyError(claim)
-    texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in rows.items()])
-    verdicts = {row["verdict"] for row in rows.values()}
-    if verdicts == {REPRODUCED}:
-        first = "The critical force rises with indeterminacy"
-    elif verdicts <= {DIFFERS, FAILED}:
-        first = "The critical force does not follow indeterminacy closely"
-    else:
-        first = "The critical force is not shown to rise with every measure of indeterminacy"
+    named = listed([words[name] for name in rising])
+    texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in rising.items()])
+    rest = f"; with {listed(others)}, no rise is shown" if others else ""
+    closely = all(row["verdict"] == REPRODUCED for row in rising.values())
     return Highlight(
-        f"{first}: over all μ, its rank correlation is {texts}.", "figure2", "local-perturbation"
+        f"The critical force rises with {named}{'' if closely else ', but not closely'}: over all "
+        f"μ, its rank correlation is {texts}{rest}.",
+        "figure2",
+        "local-perturbation",
     )
 
 
 def _shear(of: _Numbers) -> Highlight:
     base = "shear stress over pressure"
-    part = of.row(f"{base} of the original network, over the largest of the packing, {MID}")
+    part = of.row(f"{SHEARED} the original network has, {MID}")
     if part["high"] >= 1:
         raise KeyError(base)
     return Highlight(
@@ -319,35 +292,32 @@ def _volume(of: _Numbers) -> Highlight:
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
         raise KeyError(name)
     return Highlight(
-        "S is narrower at smaller friction, although it has more dimensions: its width per free "
-        f"dimension, from its volume, is {_quoted(large)} ⟨f_n⟩ at large, {_quoted(middle)} ⟨f_n⟩ "
-        f"at intermediate and {_quoted(small)} ⟨f_n⟩ at small μ.",
+        "S is narrower at smaller friction, although it has more dimensions: its typical width, "
+        f"unlike the intervals, grows with μ: it is {_quoted(small)} ⟨f_n⟩ at small, "
+        f"{_quoted(middle)} ⟨f_n⟩ at intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
         "volumes",
         "volume",
     )
 
 
 def _size(of: _Numbers) -> Highlight:
-    sizes = sorted({row["n"] for row in of.table.part("size_exact", "exact")})
     slope = of.row(f"slope of log exact η3 against log N, μ = {USUAL:g}")
-    growth = (sizes[-1] / sizes[0]) ** slope["value"]
     words = "rises" if slope["low"] > 0 else "falls" if slope["high"] < 0 else ""
     first = (
         f"Exact η3 {words} with the number of disks N"
         if words
-        else "Whether exact η3 depends on the number of disks N is undecided"
+        else "The data are too few to tell whether exact η3 depends on the number of disks N"
     )
     return Highlight(
-        f"{first}: at μ = {USUAL:g}, the slope of log η3 against log N is {_quoted(slope)}, a "
-        f"factor of {growth:.2g} from {sizes[0]} to {sizes[-1]} disks.",
+        f"{first}: at μ = {USUAL:g}, the slope of log η3 against log N is {_quoted(slope)}.",
         "sizes",
         "exact-intervals",
     )
 
 
 SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
-    *(_maximum, _free_forces, _coverage, _strong, _wider, _alike, _critical, _stability, _shear),
-    *(_volume, _size),
+    *(_maximum, _free_forces, _coverage, _strong, _rising_eta2, _wider, _alike, _critical),
+    *(_stability, _shear, _volume, _size),
 )
 
 

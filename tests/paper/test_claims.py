@@ -117,7 +117,7 @@ def weak_first(mu, rng):
         ),
         (
             claims.pairs,
-            "distances between pairs of states are sharply peaked",
+            "distances between pairs of networks are sharply peaked",
             {"pair_spread": lambda mu: 0.5},
         ),
         (
@@ -196,7 +196,7 @@ def weak_first(mu, rng):
         ),
         (
             claims.centre,
-            "the original network lies closer to the centre than sampled states",
+            "the original network lies closer to the centre than sampled ones",
             {"original_distance": lambda mu: 2.0},
         ),
     ],

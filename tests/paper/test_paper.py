@@ -377,8 +377,8 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     found = [finding._asdict() for finding in findings.measured(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
-    names = ("measures", "others", "sweeps", "preparation", "counts", "claims", "findings")
-    names += ("verdicts", "certificates")
+    names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
+    names += ("claims", "findings", "score", "verdicts", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = filled.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
@@ -409,11 +409,12 @@ def test_a_column_of_fewer_packings_says_of_how_many(table):
     error = walk.std(ddof=1) / np.sqrt(2)
     mean, _, told = line["nearest-network walk η2"].partition(" ± ")
     assert (float(mean), float(told)) == pytest.approx((walk.mean(), error), rel=0.06)
-    phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
-    assert line["φ"] == f"{phi:.4f}"
     # The paper's walk is of the first one: its ratio is to the other walk in the same packing.
-    ratio = line["paper's walk/nearest-network walk η2"]
-    assert line["paper's walk η2"].endswith(" (1)") and ratio.endswith(" (1)")
+    more = cells_of(documents.walks(table), 0.3)
+    phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
+    assert more["φ"] == f"{phi:.4f}"
+    ratio = more["paper's walk/nearest-network walk η2 (n = 1)"]
+    assert line["paper's walk η2 (n = 1)"] == more["paper's walk η2 (n = 1)"]
     (swept,) = (row for row in table.part("sweeps_1e-3") if row["mu"] == 0.3)
     assert float(ratio.split()[0]) == pytest.approx(swept["eta2"] / walk[0], abs=2e-3)
 
@@ -426,7 +427,9 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
         assert row["excess"] >= 0
     assert max(row["excess"] for row in table.part("walk") if row["mu"] > 0) < 1e-8
     line = cells_of(documents.measures(table), 0)
-    assert line["paper's walk η2"] == line["paper's walk 0.15 η3"] == "outside S"
+    more = cells_of(documents.walks(table), 0)
+    assert set(more.values()) >= {"outside S"}
+    assert line["paper's walk η2 (n = 1)"] == "outside S"
     assert {row["mu"] for row in groups.drawn(table, "gauss_seidel")} <= {0.1, 0.3}
     told = {(c.statement, c.sampler): c for c in claims.judged(table)}
     vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
@@ -446,7 +449,7 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
             *_, line = documents.sweeps(table._replace(rows=rows)).splitlines()
             assert told in line
         rows[0] |= {"part": "sweeps_1e-3", "excess": 0.5, "skipped_part": 0.0}
-        assert ", excess 0.25 |" in documents.measures(table._replace(rows=rows))
+        assert ", excess 0.25 |" in documents.walks(table._replace(rows=rows))
 
 
 def test_what_packings_depend_on_is_told_in_standard_errors(table):
@@ -456,7 +459,7 @@ def test_what_packings_depend_on_is_told_in_standard_errors(table):
         for line in text.splitlines()
         if line.startswith("| 0.1 |")
     }
-    assert lines.keys() == {"default", *(n.replace("_", " ") for n in plans.variations(0.1))}
+    assert len(lines) == 1 + len(plans.variations(0.1)) and "default" in lines
     some, usual = (
         np.array([row["dimension"] for row in table.part(part, n=20) if row["mu"] == 0.1])
         for part in ("prepared_box_mass_30_exact", "exact")
@@ -507,13 +510,17 @@ def test_a_claim_has_one_verdict_and_one_for_each_sampler():
         claim("c", "exact", verdicts.FAILED),
         claim("c", "uniform", verdicts.MISSING, float("nan")),
     ]
-    rows = [line.strip("| ").split(" | ") for line in documents.verdict_table(judged).splitlines()]
+    text = documents.verdict_table(judged)
+    heads = ["### Differ (1)", "### Depend on the sampler (1)", "### Reproduced (1)"]
+    assert [line for line in text.splitlines() if line.startswith("#")] == heads
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     heads = ["claim", "source", "verdict", "nearest-network walk", "exact"]
-    assert rows[0] == heads  # no column without numbers
-    assert [row[2] for row in rows[2:]] == [
-        f"**{word}**" for word in (verdicts.REPRODUCED, documents.MIXED, verdicts.FAILED)
+    assert rows[0] == rows[3] == rows[6] == heads  # no column without numbers
+    assert [row[2] for row in rows[2::3]] == [
+        f"**{word}**" for word in (verdicts.FAILED, documents.MIXED, verdicts.REPRODUCED)
     ]
-    assert rows[4][3:] == [verdicts.FEW, verdicts.FAILED]
+    assert rows[2][3:] == [verdicts.FEW, verdicts.FAILED]
+    assert "1 are reproduced, 1 differ and 1 depends" in documents.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]

@@ -151,7 +151,7 @@ def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
         if row.get("eta3", 0) > 0 and exact.get("eta3", 0) > 0
     ]
     yield at_each(
-        "η3 does not depend on how states are drawn",
+        "η3 does not depend on how networks are sampled",
         f"η3 over exact η3 of the same packing, μ ≥ {LEAST_DYNAMIC:g}",
         items(rows, "part_seen"),
         good=(0.9, 1.1),

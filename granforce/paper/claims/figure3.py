@@ -24,7 +24,7 @@ from granforce.paper.tables import StudyTable
 def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
-        "distances between pairs of states are sharply peaked",
+        "distances between pairs of networks are sharply peaked",
         f"their standard deviation over their mean, μ ≥ {LEAST_DYNAMIC:g}",
         items(dynamic(drawn(table, sampler)), "pair_spread"),
         good=(-np.inf, 0.2),
@@ -71,7 +71,7 @@ def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
         if row["dimension"] > 0 and row.get("mean_distance", 0) > 0
     ]
     yield at_each(
-        "the original network lies closer to the centre than sampled states",
+        "the original network lies closer to the centre than sampled ones",
         "its distance over their mean distance",
         positive_friction(items(rows, name)),
         good=(-np.inf, 1),
