@@ -1,9 +1,11 @@
 // A table of all contacts: present forces, possible forces, known forces. It reads from the player,
 // not the server, and only while it is open; rows hidden by a filter are dim in the packing.
 
+import { unsigned } from "../../../packing/drawing/chain_style.js"
+
 const ROWS = 200 // of a page
 const AGAIN_MS = 250 // between two updates during motion
-const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3).replace(/^-(?=[0.]*$)/, "") : "–") // no −0.000
+const NUMBER = (value) => (Number.isFinite(value) ? unsigned(value.toFixed(3)) : "–")
 const interval = (of) => [
   ["least", (on, c) => on[of].low?.[c], NUMBER],
   ["largest", (on, c) => on[of].high?.[c], NUMBER],
