@@ -171,8 +171,10 @@ TERMS = {
     ),
     "limit_load": Term(
         "limit load",
-        "The largest pair of opposite forces on one contact for which a balanced network "
-        "exists: the contact cannot bear more, whatever its history.",
+        "The largest pair of opposite forces, along the normal of one contact, that pushes its "
+        "grains apart and for which a balanced network exists, whatever the history. The pair "
+        "counts in the balance like fₙ, but not for the friction of the contact: the limit load is "
+        "the largest fₙ − |fₜ|/μ, at most the largest fₙ.",
     ),
     "critical_force": Term(
         "critical force",
