@@ -53,8 +53,8 @@ GRID = {
     },
     # Instead of plots that would belong to another packing; see player.js.
     "& .panels::before": {
-        "content": "var(--waiting, none)", "position": "absolute", "top": "64px", "left": "24px",
-        "color": "var(--quiet)",
+        "content": "var(--waiting, none)", "position": "sticky", "top": "64px", "height": 0,
+        "paddingLeft": "24px", "whiteSpace": "nowrap", "zIndex": 2, "color": "var(--quiet)",
     },
     "& .status.urgent": {"position": "sticky", "bottom": 0, "zIndex": 5},
     "@media (min-width: 900px)": {
