@@ -288,7 +288,7 @@ def _read_selection(given: dict[str, str]) -> Selection:
     if relax != "accelerated":  # as links of earlier versions call it
         relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
     mu = friction(typed(given.pop("mu")))
-    packed = friction(typed(given.pop("packed", mu)))
+    packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
     rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
