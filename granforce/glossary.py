@@ -226,9 +226,9 @@ TERMS = {
     ),
     "now": Term("now", "The network on screen."),
     "rattler": Term(
-        "rattler",
-        "A loose disk or block that carries no force; it is drawn pale and left out of the "
-        "equations.",
+        "loose disk",
+        "A disk or block that carries no force, also called a rattler; it is drawn pale and left "
+        "out of the equations.",
     ),
     "unloaded": Term(
         "unloaded contact", "The bodies touch, but no balanced network has a force at this contact."

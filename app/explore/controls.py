@@ -69,9 +69,9 @@ class Controls:
         self.packed = pmui.TextInput(
             label="Friction during packing", value=SAME, size="small", **FIELD | {"width": 180}
         )
-        self.states = self._number("States", 1, LIMITS.states, 100)
+        self.states = self._number("Networks", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = Select(label="States from", options=by_words(kinds), **LIST)
+        self.kind = Select(label="Networks from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
         self.series = Select(label="Precomputed results", **LIST | {"width": 480})
         self.go = pmui.Button(label="Compute", color="primary", visible=False, margin=0, sx=PLAIN)

@@ -109,7 +109,7 @@ def explore_page(document: Document, query: str) -> Any:
     Stream(state, packing.player, document)
     hears, state.hand.tell = packing.player.hears, packing.player.tell
     hears["wide"] = lambda wide: looks.param.update(wide=wide)
-    hears["keep"] = lambda keep: state.keep_all()
+    hears["keep"] = lambda number: state.keep_all(number)
     hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
     side = pn.Column(packing.player, css_classes=["side"], **WIDE)
     if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":

@@ -118,7 +118,7 @@ export class Look {
 
   grain(k, { mixed }) {
     const { walk } = this, grain = walk.grain[k]
-    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`], ["contacts", walk.touching[k]]]
+    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (loose)" : ""}`], ["contacts", walk.touching[k]]]
     if (this.one === "body") return rows
     rows.splice(1, 0, ["radius", walk.r[k].toFixed(3)])
     const { pressure, shear, angle } = this.stressOn(grain, mixed)

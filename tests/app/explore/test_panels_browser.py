@@ -262,8 +262,8 @@ def test_everything_can_be_taken_along(visit, tmp_path):
     assert rows[0].startswith("contact,i,j,f_n_original") and len(rows) > DISKS
     packing = gf.load_packing(io.BytesIO(take("Packing (NPZ)").read_bytes()))
     assert len(packing.r) == DISKS
-    assert take("States (NetCDF)").read_bytes()[:3] == b"CDF"
-    assert take("States (Zarr, zipped)").read_bytes()[:2] == b"PK"
+    assert take("Networks (NetCDF)").read_bytes()[:3] == b"CDF"
+    assert take("Networks (Zarr, zipped)").read_bytes()[:2] == b"PK"
     assert '"command": "granforce walk' in take("Parameters (JSON)").read_text()
 
 

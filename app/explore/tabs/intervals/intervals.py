@@ -51,7 +51,7 @@ class View(TabView):
         # Whether bars are exact, and how many extend beyond the axis.
         self._drawn: tuple[bool, int] | None = None
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
-        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196})
+        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 208})
         self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
         self.choices = [
             self.drawn,
