@@ -133,8 +133,8 @@ forth between two, at the player's speed. The HTML page needs no server and no n
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
 if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
 columns. Networks: the packing and <b>all</b> networks with their measures, units and parameters;
-those that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above it. The
-address of the page reopens this view; <code>granforce walk packing.npz</code> continues
+those that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above
+it. The address of the page reopens this view; <code>granforce walk packing.npz</code> continues
 with the packing.
 """
 
