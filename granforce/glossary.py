@@ -171,8 +171,10 @@ TERMS = {
     ),
     "limit_load": Term(
         "limit load",
-        "The largest pair of opposite forces on one contact for which a balanced network "
-        "exists: the contact cannot bear more, whatever its history.",
+        "The largest pair of opposite forces, along the normal of one contact, that pushes its "
+        "grains apart and for which a balanced network exists, whatever the history. The pair "
+        "counts in the balance like fₙ, but not for the friction of the contact: the limit load is "
+        "the largest fₙ − |fₜ|/μ, at most the largest fₙ.",
     ),
     "critical_force": Term(
         "critical force",
@@ -224,9 +226,9 @@ TERMS = {
     ),
     "now": Term("now", "The network on screen."),
     "rattler": Term(
-        "rattler",
-        "A loose disk or block that carries no force; it is drawn pale and left out of the "
-        "equations.",
+        "loose disk",
+        "A disk or block that carries no force, also called a rattler; it is drawn pale and left "
+        "out of the equations.",
     ),
     "unloaded": Term(
         "unloaded contact", "The bodies touch, but no balanced network has a force at this contact."

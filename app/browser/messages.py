@@ -31,7 +31,7 @@ FROM_BROWSER = {
     "Player": (
         {"tab": int},  # 1, 2, …
         {"wide": bool},
-        {"keep": True},  # store all networks of the walk
+        {"keep": int},  # store all networks of the walk, then show that of this number
         {"hand": {"anew": True}},  # the page was redrawn and shows no pull yet
         {"hand": {"grab": int}},
         {"hand": {"hold": [int, float]}},  # a contact, and its f_n in ⟨f_n⟩

@@ -11,7 +11,7 @@ from ..background.jobs import reading
 from ..background.limits import LIMITS, MOST_SEED
 from ..results import study_data
 from ..results.library import SOURCES
-from ..results.selection import KINDS, SOLVERS, Selection, differing, select, unusual
+from ..results.selection import KINDS, SOLVERS, Selection, differing, select, typed, unusual
 from ..state.app_state import AppState
 from ..widgets.copy_button import CopyButton
 from ..widgets.disclosure import Disclosure
@@ -69,9 +69,9 @@ class Controls:
         self.packed = pmui.TextInput(
             label="Friction during packing", value=SAME, size="small", **FIELD | {"width": 180}
         )
-        self.states = self._number("States", 1, LIMITS.states, 100)
+        self.states = self._number("Networks", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = Select(label="States from", options=by_words(kinds), **LIST)
+        self.kind = Select(label="Networks from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
         self.series = Select(label="Precomputed results", **LIST | {"width": 480})
         self.go = pmui.Button(label="Compute", color="primary", visible=False, margin=0, sx=PLAIN)
@@ -131,7 +131,7 @@ class Controls:
 
     def _typed(self, text: str) -> None:
         try:
-            self.mu.mu = friction(text.replace(",", "."))
+            self.mu.mu = friction(typed(text.replace(",", ".")))
         except InputError as error:
             self.work.message = str(error)
 
@@ -150,7 +150,7 @@ class Controls:
     def _selection(self) -> Selection:
         now, packing = self.state.selection, self.state.selection.packing
         packing_mu = self.packed.value.strip()
-        packed_mu = None if packing_mu in ("", SAME) else friction(packing_mu)
+        packed_mu = None if packing_mu in ("", SAME) else friction(typed(packing_mu))
         details = {
             "kind": self.kind.value,
             "relax": self.relax.value,

@@ -53,8 +53,8 @@ GRID = {
     },
     # Instead of plots that would belong to another packing; see player.js.
     "& .panels::before": {
-        "content": "var(--waiting, none)", "position": "absolute", "top": "64px", "left": "24px",
-        "color": "var(--quiet)",
+        "content": "var(--waiting, none)", "position": "sticky", "top": "64px", "height": 0,
+        "paddingLeft": "24px", "whiteSpace": "nowrap", "zIndex": 2, "color": "var(--quiet)",
     },
     "& .status.urgent": {"position": "sticky", "bottom": 0, "zIndex": 5},
     "@media (min-width: 900px)": {
@@ -109,7 +109,7 @@ def explore_page(document: Document, query: str) -> Any:
     Stream(state, packing.player, document)
     hears, state.hand.tell = packing.player.hears, packing.player.tell
     hears["wide"] = lambda wide: looks.param.update(wide=wide)
-    hears["keep"] = lambda keep: state.keep_all()
+    hears["keep"] = lambda number: state.keep_all(number)
     hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
     side = pn.Column(packing.player, css_classes=["side"], **WIDE)
     if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":

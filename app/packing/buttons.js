@@ -104,6 +104,12 @@ export class Buttons {
       this.typed = !force.validity.valid // stays to be corrected
       actions.pull()
     })
+    // A refused force stays to be corrected only as long as the focus does.
+    this.part("hold-tools").addEventListener("focusout", ({ currentTarget, relatedTarget }) => {
+      if (currentTarget.contains(relatedTarget)) return
+      this.typed = false
+      this.writeForce()
+    })
     this.part("uncertainty").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
   }
 
@@ -130,8 +136,11 @@ export class Buttons {
     const field = this.part("force")
     field.min = low - HALF_DIGIT
     field.max = high + HALF_DIGIT
-    if (!this.typed) field.value = value.toFixed(3)
+    this.present = value
+    if (!this.typed) this.writeForce()
   }
+
+  writeForce() { this.part("force").value = this.present?.toFixed(3) ?? "" }
 
   /** The typed force of the selected contact; NaN if it is outside its bounds. */
   get force() {

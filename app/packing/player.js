@@ -335,11 +335,7 @@ class Player {
   }
 
   /** An action succeeded. */
-  recover() {
-    if (!this.refused) return
-    this.say("")
-    this.buttons.typed = false // a refused force stays to be corrected only until then
-  }
+  recover() { if (this.refused) this.say("") }
 
   /** Declare the selected contact's force known, as it is on screen, or release a known one. */
   hold({ mixed }) {
@@ -348,7 +344,10 @@ class Player {
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
-    if (!known && Number.isNaN(this.buttons.force)) return this.hand.refuse()
+    if (!known && Number.isNaN(this.buttons.force)) {
+      this.buttons.part("force").focus()
+      return this.hand.refuse()
+    }
     this.tell({ known: known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] } })
   }
 

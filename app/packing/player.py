@@ -88,6 +88,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "friction": replay.friction,
         "free": replay.summary["dimension"],
         "states": replay.summary["states"],
+        "seconds": replay.summary.get("seconds", 0.0),  # that the walk took
         "box": [float(side) if np.isfinite(side) else -1.0 for side in replay.box],
         "tilt": replay.tilt,
         "window": list(replay.window),

@@ -17,7 +17,7 @@ function iconButton(name, title, act) {
 
 export class PlayerBar {
   /**
-   * actions: back(), play(), step(), scrub(position), and keep(): store all networks.
+   * actions: back(), play(), step(), scrub(position), and keep(number): store all networks, then show this one.
    * say(words): show a line.
    */
   constructor(actions, say) {
@@ -29,7 +29,7 @@ export class PlayerBar {
     this.speedInput = createElement("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
     this.rate = createElement("span", { className: "rate" })
     this.stored = createElement("span", { className: "stored", role: "status" })
-    this.keep = button("Keep all", () => actions.keep(), { className: "keep", title: "compute and store every network" })
+    this.keep = button("Keep all", () => actions.keep(this.missed?.asked ?? this.replay.walk.number[this.replay.frame]), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
     const along = createElement("label", { className: "at" }), speed = createElement("label", { title: "networks per second" })
     const more = createElement("span", { className: "more" })
@@ -96,6 +96,7 @@ export class PlayerBar {
     this.missed = null
     this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)
+    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (about ${duration(replay.walk.seconds)})` : "Keep all"
     this.showRate()
   }
 
@@ -110,6 +111,9 @@ export class PlayerBar {
     if (!this.number.matches(":focus")) this.number.value = replay.walk.number[replay.frame]
   }
 }
+
+/** Seconds in words. */
+function duration(seconds) { return seconds < 100 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min` }
 
 /** 2 → "2nd". */
 function ordinal(count) {

@@ -282,7 +282,7 @@ def colours(state: AppState, pulled: str) -> dict[str, str]:
 def _full(looks: Looks, most: float) -> str:
     """The ΔF_n of full colour, and whether it differs between packings."""
     why = "" if looks.full else " (this packing)"
-    return f"≥ {most:.2f} ⟨fₙ⟩{why}"
+    return f"≥ {most:.2f} ⟨fₙ⟩{why}" if most else "0: every force is determined"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:

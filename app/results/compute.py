@@ -212,5 +212,5 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
 
 
 def _counted(job: Job, done: float, total: float | None, begin: float = PACKING_SHARE) -> None:
-    job.stage = f"{done} of {total} states"
+    job.stage = f"{done} of {total} networks"
     job.tell(done, total, part=(begin, 1))

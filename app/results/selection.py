@@ -274,13 +274,21 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
         raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
 
 
+def typed(text: str) -> Any:
+    """The number in a text; another text as it is, for a check that refuses it by name."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 def _read_selection(given: dict[str, str]) -> Selection:
     kind = choice(given.pop("source", "walk"), KINDS, "source")
     relax = given.pop("relax", "nearest")
     if relax != "accelerated":  # as links of earlier versions call it
         relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
-    mu = friction(given.pop("mu"))
-    packed = friction(given.pop("packed", mu))
+    mu = friction(typed(given.pop("mu")))
+    packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
     rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}

@@ -243,7 +243,7 @@ def report_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
 
 _ROWS = (
     ("disks or bodies", "grains", ",d", ""),
-    ("rattlers", "rattlers", ",d", ""),
+    ("loose disks", "rattlers", ",d", ""),
     ("contacts listed", "contacts", ",d", ""),
     ("contacts that can carry", "backbone_contacts", ",d", ""),
     ("coordination z", "coordination", ".3f", ""),

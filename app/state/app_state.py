@@ -327,9 +327,12 @@ class AppState(param.Parameterized):
         """Whether more networks of the walk on screen could be stored."""
         return self.cell is not None and self.cell.stored < self.cell.selection.stored
 
-    def keep_all(self) -> None:
-        """Compute the networks of the walk on screen that were not stored, keeping the view."""
-        cell = self.cell
+    def keep_all(self, number: int) -> None:
+        """Compute the networks of the walk on screen that were not stored, keeping the view.
+
+        number: of the network to show then, unless another one was chosen meanwhile.
+        """
+        cell, frame = self.cell, self.looks.frame
         if not self.keepable or self.missing or self.work.computation.running:
             return
         self.work.message = ""
@@ -337,7 +340,8 @@ class AppState(param.Parameterized):
         def done(shown: Shown) -> None:
             self._list(self.library.cells())
             if self.cell == cell:
-                self._show(shown, self._by_numbers())
+                wanted = {"frame": Numbered(number)} if self.looks.frame == frame else {}
+                self._show(shown, self._by_numbers() | wanted)
 
         self.work.computation.start(compute.all_states(self.library, cell), done)
 

@@ -64,7 +64,7 @@ def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
 
     def work(job: Job) -> Loads:
         params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
-        stage = "failure load of every contact"
+        stage = "limit load of every contact"
         dataset = load_or_compute(library, job, stage, kinds.LIMIT_LOADS, params)
         scale = dataset["force_scale"].item()
         return Loads(
@@ -86,7 +86,9 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
             contacts=[int(replay.backbone[contact])],
         )
         stage = "contact dynamics under a growing load"
-        dataset = load_or_compute(library, job, stage, kinds.PERTURBATION, params)
+        dataset = load_or_compute(  # of one contact, whose part done is not known
+            library, job, stage, kinds.PERTURBATION, params, progress=lambda done, total: None
+        )
         low = dataset["critical_low"].values[0].item()
         job.begin("networks under smaller loads")
         under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)

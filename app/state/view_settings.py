@@ -39,8 +39,8 @@ SORTS = {
     "original": "force as packed",
     "extent": "interval ΔFₙ, seen",
     "exact": "interval ΔFₙ, exact",
-    "position": "place as packed in its exact interval",
-    "shortened": "how much the known forces shortened it",
+    "position": "place in exact interval",
+    "shortened": "reduction by held forces",
 }
 DRAWN = {"all": "all", "some": "a few"}
 # Options of single tabs.

@@ -343,16 +343,19 @@ def test_older_links_name_contacts_and_networks_by_their_places(visited):
 
 
 def test_all_networks_of_a_walk_can_be_kept_and_the_view_stays(state):
-    """A store holds some of them; the others are computed, and take no second place in η(μ)."""
+    """A store holds some of them; the others are computed, and take no second place in η(μ).
+
+    The one that was asked for is then shown.
+    """
     before, number, cells = state.replay.normal[5], state.replay.number, len(state.cells())
     state.looks.param.update(frame=5, contact=9, reference=2)
     assert state.keepable and len(number) == KEPT + 1
-    state.keep_all()
+    state.keep_all(int(number[5]) + 1)
     wait_for(state)
     looks, replay = state.looks, state.replay
     assert list(replay.number) == list(range(STATES + 1)) and not state.keepable
-    assert (looks.frame, looks.contact, looks.reference) == (number[5], 9, number[2])
-    np.testing.assert_allclose(replay.normal[looks.frame], before, atol=1e-6)
+    assert (looks.frame, looks.contact, looks.reference) == (number[5] + 1, 9, number[2])
+    np.testing.assert_allclose(replay.normal[number[5]], before, atol=1e-6)
     assert len(state.cells()) == cells and state.work.message == ""
 
 

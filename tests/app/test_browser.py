@@ -133,7 +133,7 @@ def test_hovering_tells_grain_and_contact(page):
         "(scene.geometry.touching.findIndex((n, k) => n === 0 && scene.geometry.kind[k] === 1))",
     )
     page.mouse.move(*at(page, x, y))
-    page.get_by_text(f"{grain} (rattler)").wait_for()
+    page.get_by_text(f"{grain} (loose)").wait_for()
     assert f"{r:.3f}" in tip.inner_text()
 
 

@@ -188,7 +188,7 @@ def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
 
 def test_number_fields_take_typing_after_enter(visit):
     page = visit()
-    field = how_it_is_made(page).get_by_role("spinbutton", name="States")
+    field = how_it_is_made(page).get_by_role("spinbutton", name="Networks")
     field.click()
     for number in (31, 32, 100_050 // 10):
         page.keyboard.press("Control+A")

@@ -26,7 +26,10 @@ TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
     "export": ("Export", export.View),
 }
 LOOK = {
-    "& .MuiTabs-root": {"minHeight": "36px", "margin": "0 10px"},
+    "& .MuiTabs-root": {
+        "minHeight": "36px", "padding": "0 10px", "background": "var(--paper)",
+        "@media (min-width: 900px)": {"position": "sticky", "top": 0, "zIndex": 2},
+    },
     "& .MuiTab-root": {
         "minWidth": 0, "minHeight": "36px", "padding": "6px 2px",
         "marginRight": "clamp(4px, 2.6vw - 18px, 20px)",

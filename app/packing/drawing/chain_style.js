@@ -5,6 +5,9 @@ import { plain } from "../../browser/to_object.js"
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const THIN = 0.15 // factor on the width of a chain excluded by a filter
 
+/** A formatted number without the sign of a rounded zero. */
+export const unsigned = (text) => text.replace(/^-(?=[0.]*$)/, "")
+
 export class Look {
   constructor(model, walk) {
     this.model = model
@@ -102,8 +105,8 @@ export class Look {
     const rows = [
       ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
-      ["tangential force fₜ", t.toFixed(3)],
-      ["fₜ/(μ fₙ)", this.mobilised(c, n, t)?.toFixed(2) ?? "–"],
+      ["tangential force fₜ", unsigned(t.toFixed(3))],
+      ["fₜ/(μ fₙ)", unsigned(this.mobilised(c, n, t)?.toFixed(2) ?? "–")],
       [`force ${walk.origin}`, walk.normal[c].toFixed(3)],
     ]
     const pins = plain(this.model.pins ?? {}), pin = [...(pins.contacts ?? [])].indexOf(c)
@@ -115,7 +118,7 @@ export class Look {
 
   grain(k, { mixed }) {
     const { walk } = this, grain = walk.grain[k]
-    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`], ["contacts", walk.touching[k]]]
+    const rows = [[this.one, `${grain}${walk.kind[k] % 2 ? " (loose)" : ""}`], ["contacts", walk.touching[k]]]
     if (this.one === "body") return rows
     rows.splice(1, 0, ["radius", walk.r[k].toFixed(3)])
     const { pressure, shear, angle } = this.stressOn(grain, mixed)

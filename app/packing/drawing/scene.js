@@ -10,6 +10,7 @@ import { PIXELS, Sheet } from "./svg_context.js"
 
 const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
 const GRAB = 6 // px from a chain that still count as the chain
+const TIP = 14 // px between the pointer and the hover box
 const ZOOM = [0.02, 4] // smallest and largest fraction of the whole view
 const ZOOM_HINT = "Ctrl + wheel zooms; after a click here the wheel alone does."
 
@@ -28,6 +29,7 @@ export class Scene {
     this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
     this.selected = null
     this.pair = [] // contacts whose forces are the axes of force space, across and up
+    this.under = null // what the hover box describes: a segment `link` or a disk, −1: neither
     this.pointed = -1 // the disk under the pointer, whose forces are drawn
     this.frozen = false // whether the drawing is animated and cannot be pointed at
     this.offset = null
@@ -39,6 +41,7 @@ export class Scene {
 
   show(geometry) {
     this.pointed = -1
+    this.closeTip()
     const moved = !this.geometry || `${geometry.window}` !== `${this.geometry.window}`
     this.geometry = geometry
     const { x0 } = geometry
@@ -201,6 +204,7 @@ export class Scene {
     this.begin(chains)
     this.stroke(order.slice(0, drawn), style.colours)
     this.drawMarks()
+    this.fillTip() // other forces
     if (!this.painted++) performance.mark("packing painted") // time until the page showed a packing
   }
 
@@ -298,7 +302,7 @@ export class Scene {
   }
 
   drag(fingers, id, before, now) {
-    this.tip.classList.remove("on")
+    this.closeTip()
     const [dx, dy] = [now[0] - before[0], now[1] - before[1]]
     const other = [...fingers].find(([key]) => key !== id)?.[1]
     if (other) {
@@ -329,16 +333,33 @@ export class Scene {
   }
 
   hover(px, py) {
-    if (!this.geometry || !this.describe || this.frozen) return this.tip.classList.remove("on")
-    const k = this.linkAt(px, py), disk = k < 0 ? this.diskAt(px, py) : -1
+    if (!this.geometry || !this.describe || this.frozen) return this.closeTip()
+    const link = this.linkAt(px, py), disk = link < 0 ? this.diskAt(px, py) : -1
     this.point(disk)
-    const rows = k >= 0 ? this.describe.contact(k) : disk >= 0 ? this.describe.grain(disk) : null
-    this.tip.classList.toggle("on", rows !== null)
-    this.root.style.cursor = k >= 0 ? "pointer" : "grab"
-    if (!rows) return
+    this.root.style.cursor = link >= 0 ? "pointer" : "grab"
+    if (link < 0 && disk < 0) return this.closeTip()
+    this.under = { link, disk }
+    this.tip.classList.add("on")
+    this.fillTip()
+    this.placeTip(px, py)
+  }
+
+  closeTip() {
+    this.under = null
+    this.tip.classList.remove("on")
+  }
+
+  /** Describe what is under the pointer, as on screen. */
+  fillTip() {
+    if (!this.under) return
+    const { link, disk } = this.under, rows = link < 0 ? this.describe.grain(disk) : this.describe.contact(link)
     this.tip.innerHTML = rows.map(([name, value]) => `<i>${name}</i><b>${value}</b>`).join("")
-    const right = px > this.size / 2, low = py > this.size / 2
-    this.tip.style.inset = `${low ? "auto" : `${py + 14}px`} ${right ? `${this.size - px + 14}px` : "auto"} ` +
-      `${low ? `${this.size - py + 14}px` : "auto"} ${right ? "auto" : `${px + 14}px`}`
+  }
+
+  /** Next to the pointer, on the side with more room, and within the picture. */
+  placeTip(px, py) {
+    const { tip, size } = this
+    const from = (at, long) => Math.max(0, Math.min(size - long, at > size / 2 ? at - TIP - long : at + TIP))
+    tip.style.transform = `translate(${from(px, tip.offsetWidth)}px, ${from(py, tip.offsetHeight)}px)`
   }
 }

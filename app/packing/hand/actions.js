@@ -35,7 +35,7 @@ export function actions(player) {
     }),
     between: loaded((replay) => player.between(replay)),
     split: loaded(() => { model.split = !model.split }),
-    keep: () => model.send_msg({ keep: true }),
+    keep: (number) => model.send_msg({ keep: number }),
     tab: (number) => model.send_msg({ tab: number }),
   }
 }

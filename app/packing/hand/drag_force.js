@@ -49,7 +49,7 @@ export class Grab {
     this.moved = this.flung = false
     this.place = place
     player.scene.selected = contact
-    player.scene.tip.classList.remove("on")
+    player.scene.closeTip()
     this.tell({ grab: contact }) // the server also selects it
     player.paint()
   }

@@ -45,5 +45,5 @@ export function listen(scene) {
   }
   root.addEventListener("pointerup", end)
   root.addEventListener("pointercancel", end)
-  root.addEventListener("pointerleave", () => { scene.tip.classList.remove("on"); scene.point(-1) })
+  root.addEventListener("pointerleave", () => { scene.closeTip(); scene.point(-1) })
 }

@@ -280,6 +280,64 @@ def test_the_chain_under_the_pointer_is_the_nearest_and_none_at_a_centre(run):
     assert (on, beside, between, disk, outside) == (1, -1, -1, 1, -1)
 
 
+def test_the_hover_box_follows_the_forces_and_stays_within_the_picture(run):
+    shown, inside, left = run(
+        "packing/drawing/scene",
+        f"""({{ Scene }}, {{ walk }}) => {{
+            {SCENE}
+            const {{ root, tip }} = scene, box = () => tip.getBoundingClientRect()
+            document.body.append(root)
+            root.style = "position: relative; width: 600px; height: 600px"
+            tip.style = "position: absolute; top: 0; left: 0; width: 500px; height: 40px"
+            let force = 1
+            scene.describe = {{ contact: () => [["force", force]], grain: () => [["disk", 1]] }}
+            scene.finer(600)
+            scene.drawDisks()
+            scene.stale = false
+            const style = {{ width: [0.2, 0.2], bin: [0, 0], colours: ["blue"] }}
+            scene.drawChains(style)
+            scene.hover(...scene.toPixel(0.7, 0.02))
+            const shown = [tip.textContent], whole = root.getBoundingClientRect()
+            const inside = box().left >= whole.left && box().right <= whole.right
+            force = 2
+            scene.drawChains(style)
+            shown.push(tip.textContent)
+            scene.show(walk) // other networks: nothing is under the pointer yet
+            return [shown, inside, tip.classList.contains("on")]
+        }}""",
+        walk=PRESSED,
+    )
+    assert shown == ["force1", "force2"]
+    assert inside and not left
+
+
+def test_a_refused_force_leaves_its_field_with_the_focus(run):
+    during, between, after = run(
+        "packing/buttons",
+        """({ Buttons }) => {
+            const actions = { pull: () => {}, hold: () => {} }, root = document.createElement("div")
+            const buttons = new Buttons({ root }, actions, { look: () => {}, open: () => {} })
+            document.body.append(buttons.root)
+            const field = buttons.part("force"), shown = []
+            buttons.showForce(0.5, [0, 1])
+            field.focus()
+            field.value = 9
+            for (const name of ["input", "change"]) field.dispatchEvent(new Event(name))
+            const show = () => shown.push([field.value, Number.isNaN(buttons.force)])
+            buttons.showForce(0.6, [0, 1])
+            show()
+            buttons.part("hold").focus()
+            buttons.showForce(0.6, [0, 1])
+            show()
+            buttons.bar.playButton.focus()
+            show()
+            return shown
+        }""",
+    )
+    assert during == between == ["9", True]  # it cannot be held either
+    assert after == ["0.600", False]
+
+
 def test_the_line_of_the_selected_contact_is_outlined_and_not_covered(run):
     line, mark, outline = run(
         "packing/drawing/scene",

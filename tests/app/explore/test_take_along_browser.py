@@ -95,7 +95,7 @@ def test_all_states_are_exported_not_only_those_kept(visit, tmp_path):
     # Then all are stored: other tests look at those that are kept at μ = 0.1.
     selection = f"?n={DISKS}&seed=1&mu=1&source=walk&states={STATES}&relax=nearest_piqp"
     page = visit(f"{selection}&tab=export&frame=3", 1280, 1000)
-    path = taken(page, "States (NetCDF)", tmp_path)
+    path = taken(page, "Networks (NetCDF)", tmp_path)
     with xr.open_dataset(io.BytesIO(path.read_bytes()), engine="scipy") as whole:
         states = whole["states"].values / whole["force_scale"].item()
     assert len(states) == STATES > KEPT

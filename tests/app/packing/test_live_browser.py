@@ -54,8 +54,8 @@ def visit(visit):
 
 def ask_for_many_states(page):
     """So many that the walk cannot end before the browser has seen it grow."""
-    how_it_is_made(page).get_by_label("States").first.fill("20000")
-    page.get_by_label("States").first.press("Enter")
+    how_it_is_made(page).get_by_label("Networks").first.fill("20000")
+    page.get_by_label("Networks").first.press("Enter")
 
 
 # Seen while it is computed

@@ -113,8 +113,8 @@ GROUPS = {
     "Share with others": {"html": Kind("This view as a page (HTML)", Snapshot.html, True)},
     "Data on screen": {
         "csv": Kind("Contacts (CSV)", Snapshot.csv),
-        "netcdf": Kind("States (NetCDF)", Snapshot.netcdf, True),
-        "zarr": Kind("States (Zarr, zipped)", Snapshot.zarr, True),
+        "netcdf": Kind("Networks (NetCDF)", Snapshot.netcdf, True),
+        "zarr": Kind("Networks (Zarr, zipped)", Snapshot.zarr, True),
     },
     "To continue elsewhere": {
         "npz": Kind("Packing (NPZ)", Snapshot.npz),
@@ -132,9 +132,9 @@ colour bar, scales and a caption. The movie plays from the first network to the 
 forth between two, at the player's speed. The HTML page needs no server and no network connection.
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,
 if computed, the exact bounds. Forces are in mean forces, as on screen; the first lines explain the
-columns. States: the packing and <b>all</b> states with their measures, units and parameters; states
-that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above it. The
-address of the page reopens this view; <code>granforce walk packing.npz</code> continues
+columns. Networks: the packing and <b>all</b> networks with their measures, units and parameters;
+those that were not stored are computed again. To save a plot as PNG or SVG, use the buttons above
+it. The address of the page reopens this view; <code>granforce walk packing.npz</code> continues
 with the packing.
 """
 

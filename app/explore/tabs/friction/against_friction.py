@@ -18,6 +18,7 @@ COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
 HERE = "this packing"
+HERE_COLUMNS = ("x", "y", "label", "colour", "marker")
 
 
 class Line(NamedTuple):
@@ -29,7 +30,7 @@ class Line(NamedTuple):
 
 
 class AgainstFriction:
-    """Lines of the study against μ; `mark` puts rings at the packing on screen."""
+    """Lines of the study against μ; `mark` adds open symbols for the packing on screen."""
 
     def __init__(self, name: str, label: str, lines: Sequence[Line], **options: Any) -> None:
         """name: of the file to save the figure in; label: of the value axis."""
@@ -39,13 +40,15 @@ class AgainstFriction:
         fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
         self.figure = fig
         self.points: list[GlyphRenderer] = []
-        self.here = ColumnDataSource({"x": [], "y": []}, name=f"{name}_here")
+        self.lines = lines
+        self.here = ColumnDataSource(dict.fromkeys(HERE_COLUMNS, ()), name=f"{name}_here")
         for k, line in enumerate(lines):
             self._draw(k, line)
-        fig.scatter(
-            "x", "y", source=self.here, size=13, fill_alpha=0, line_color=DOT, line_width=2,
-            legend_label=HERE,
+        rings = fig.scatter(
+            "x", "y", marker="marker", line_color="colour", source=self.here, size=13,
+            fill_alpha=0, line_width=2, legend_label=HERE,
         )  # fmt: skip
+        fig.add_tools(hover([rings], (HERE, "μ = @x{0.[00000]}"), ("@label", "@y{0.0000}")))
         self._entry = fig.legend[0].items[-1]
         self._entry.visible = False
 
@@ -59,11 +62,16 @@ class AgainstFriction:
             draw_means(self.figure, line.label, columns, k, rows, line_dash=line.dash)
         )
 
-    def mark(self, here: Sequence[tuple[float, float]]) -> None:
-        """Put rings at `here`, (μ, value)."""
-        x, y, _ = shown([(mu, value, 0.0) for mu, value in here])
-        self.here.data = {"x": x, "y": y}
-        self._entry.visible = len(x) > 0  # no entry without a mark
+    def mark(self, mu: float = 0.0, *values: float) -> None:
+        """Mark a packing: a value for each line, in its look, or a single one; none: no packing."""
+        looks = [*zip((line.label for line in self.lines), COLOURS, MARKERS, strict=False)]
+        if len(values) < len(self.lines):
+            looks = [("value", DOT, "circle")]
+        each = [(value, look) for value, look in zip(values, looks, strict=False) if mu > 0]
+        rows = [(mu, value, *look) for value, look in each if np.isfinite(value)]
+        columns = zip(*rows, strict=True) if rows else ((),) * len(HERE_COLUMNS)
+        self.here.data = dict(zip(HERE_COLUMNS, map(list, columns), strict=True))
+        self._entry.visible = len(rows) > 0  # no entry without a mark
 
     def choosable(self, choose: Callable[[float], object]) -> None:
         """choose(μ): called when a point is clicked."""

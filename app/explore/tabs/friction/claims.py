@@ -2,10 +2,9 @@
 
 import html
 import re
-from collections import Counter
 from collections.abc import Iterable
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,27 +56,39 @@ def summary(about: Iterable[str]) -> str:
 
     Methods without a verdict do not count.
     """
-    verdicts: dict[str, set[str]] = {}
-    for claim in chain.from_iterable(map(study_data.claims, about)):
-        decided = {claim["verdict"]} & DECIDED
-        verdicts.setdefault(claim["statement"], set()).update(decided)
-    found = list(verdicts.values())
-    all_agree = found.count({"reproduced"})
-    some = sum("reproduced" in one for one in found) - all_agree
-    undecided = found.count(set())
+    count = _counted(chain.from_iterable(map(study_data.claims, about)))
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
-        f"<b>This study reproduces {all_agree} of the paper's {len(found)} claims by every method "
-        f"that reached a verdict, and {some} by some methods only.</b> "
-        f"{len(found) - all_agree - some - undecided} differ or are not reproduced, and "
-        f"{undecided} are undecided ({PAPER}). Each cell: verdict, value, 95 % interval over "
+        f"<b>This study reproduces {count.by_all} of the paper's {sum(count)} claims by every "
+        f"method that reached a verdict, and {count.by_some} by some methods only.</b> "
+        f"{count.by_none} differ or are not reproduced, and {count.undecided} are undecided "
+        f"({PAPER}). Each cell: verdict, value, 95 % interval over "
         f"packings; hover over it for the criterion. {marks}."
     )
 
 
-def _counted(claims: list[dict[str, Any]]) -> str:
-    counts = Counter(claim["verdict"] for claim in claims)
-    return ", ".join(f"{counts[word]} {word}" for word in VERDICTS if counts[word])
+class Count(NamedTuple):
+    """Numbers of claims by how many of the methods with a verdict reproduce them."""
+
+    by_all: int
+    by_some: int
+    by_none: int
+    undecided: int
+
+    def __str__(self) -> str:
+        names = "reproduced", "by some methods only", "not reproduced", "undecided"
+        return ", ".join(f"{n} {name}" for n, name in zip(self, names, strict=True) if n)
+
+
+def _counted(claims: Iterable[dict[str, Any]]) -> Count:
+    verdicts: dict[str, set[str]] = {}
+    for claim in claims:
+        decided = {claim["verdict"]} & DECIDED
+        verdicts.setdefault(claim["statement"], set()).update(decided)
+    found = list(verdicts.values())
+    by_all, undecided = found.count({"reproduced"}), found.count(set())
+    by_some = sum("reproduced" in one for one in found) - by_all
+    return Count(by_all, by_some, len(found) - by_all - by_some - undecided, undecided)
 
 
 def _cell(claim: dict[str, Any]) -> str:

@@ -91,10 +91,10 @@ class View(TabView):
     def _clear(self) -> None:
         """Remove the rings and figures of another packing."""
         if self.indeterminacy is not None:
-            self.indeterminacy.etas.mark([])
-            self.indeterminacy.z.mark([])
+            self.indeterminacy.etas.mark()
+            self.indeterminacy.z.mark()
         if self.correlations is not None:
-            self.correlations.drawn.mark([])
+            self.correlations.drawn.mark()
         self.scatter = None
         for figures in self.folded[:2]:
             figures.objects = []

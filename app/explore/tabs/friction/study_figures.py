@@ -29,6 +29,7 @@ SAMPLERS = {
 }
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
+PEAK = "(μ) is largest near μ = "  # in a claim, before the paper's value
 BINS = 30
 ROOM = 1.5  # of the largest η: leaves room for the inset above the rising curve
 
@@ -56,8 +57,8 @@ class Indeterminacy:
 
     def mark(self, here: Row) -> None:
         """Mark the packing on screen."""
-        self.etas.mark([(here["mu"], factor * here[name]) for name, _, factor in MEASURES])
-        self.z.mark([(here["mu"], here["coordination"])])
+        self.etas.mark(here["mu"], *(factor * here[name] for name, _, factor in MEASURES))
+        self.z.mark(here["mu"], here["coordination"])
 
     def sentence(self) -> str:
         """The μ at which each η is largest, and why it falls again, as HTML."""
@@ -69,10 +70,28 @@ class Indeterminacy:
             f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> "
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
-            f"As in the paper's Figure 1. Points: means over {packings(walks)} packings of 400 "
-            "disks, with standard errors; ring: the packing on screen. Click a point to open or "
-            "compute such a packing."
+            f"{_in_the_paper()}Points: means over {packings(walks)} packings of 400 "
+            "disks, with standard errors; open symbols: the packing on screen. Click a point to "
+            "open or compute such a packing."
         )
+
+
+def _in_the_paper() -> str:
+    """The μ of the maxima in the paper's Figure 1 and in these walks, as a sentence or nothing."""
+    peaks = [
+        claim
+        for claim in study_data.claims("eta")
+        if PEAK in claim["statement"] and claim["sampler"] == "nearest"
+    ]
+    if not peaks:
+        return ""
+    ours, paper = [peak["value"] for peak in peaks], peaks[0]["statement"].partition(PEAK)[2]
+    least, most = min(peak["low"] for peak in peaks), max(peak["high"] for peak in peaks)
+    return (
+        "In the paper's Figure 1 η also rises and falls, with its maxima near "
+        f"μ = {paper}; parabolas fitted to these points have them at {min(ours):.2f} to "
+        f"{max(ours):.2f} (95 %: {least:.2f} to {most:.2f}). "
+    )
 
 
 def _maxima(lines: Iterable[Line]) -> str:
@@ -96,7 +115,7 @@ def samplers(here: Row) -> Figure:
         for part, label in SAMPLERS.items()
     ]
     drawn = AgainstFriction("samplers", "0.15 η₃", lines, height=280)
-    drawn.mark([(here["mu"], 0.15 * here["eta3"])])
+    drawn.mark(here["mu"], 0.15 * here["eta3"])
     legend_above(drawn.figure, 3)
     return drawn.figure
 
@@ -166,7 +185,7 @@ class Correlations:
 
     def mark(self, here: Row) -> None:
         """Mark the packing on screen."""
-        self.drawn.mark([(here["mu"], here.get("correlation", np.nan))])
+        self.drawn.mark(here["mu"], here.get("correlation", np.nan))
 
     def sentence(self) -> str:
         """The range of the walk's correlation, as HTML; empty without a study."""
@@ -178,7 +197,7 @@ class Correlations:
         return (
             "<b>Are the strong contacts the undetermined ones?</b> (Figure 6) The "
             f"{term('correlation')} of fₙ as packed with ΔFₙ seen lies between "
-            f"{min(values):.2f} and {max(values):.2f} for nearest-network walks; it is largest, "
+            f"{min(values):.3f} and {max(values):.3f} for nearest-network walks; it is largest, "
             f"{with_error(most, error)}, at μ = {mu:g}. 1: the strongest contacts are the least "
             "determined; 0: unrelated."
         )

@@ -1,9 +1,11 @@
 // A table of all contacts: present forces, possible forces, known forces. It reads from the player,
 // not the server, and only while it is open; rows hidden by a filter are dim in the packing.
 
+import { unsigned } from "../../../packing/drawing/chain_style.js"
+
 const ROWS = 200 // of a page
 const AGAIN_MS = 250 // between two updates during motion
-const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3).replace(/^-(?=[0.]*$)/, "") : "–") // no −0.000
+const NUMBER = (value) => (Number.isFinite(value) ? unsigned(value.toFixed(3)) : "–")
 const interval = (of) => [
   ["least", (on, c) => on[of].low?.[c], NUMBER],
   ["largest", (on, c) => on[of].high?.[c], NUMBER],
@@ -40,7 +42,7 @@ export function render({ model, view }) {
   const part = (name) => root.querySelector(name), body = part("tbody")
   const sorted = { by: FORCE, down: true }
   const player = () => page.get_model_by_name("player")?.player
-  let from = 0, pending = 0, shown = [], headed = ""
+  let from = 0, pending = 0, shown = [], headed = "", asked = false // asked: opened by the visitor, not by a link
 
   /** The data for the columns. */
   function now() {
@@ -129,11 +131,16 @@ export function render({ model, view }) {
   for (const name of [".find", ".least"]) part(name).addEventListener("input", fill)
   part(".earlier").addEventListener("click", () => turn(-ROWS))
   part(".later").addEventListener("click", () => turn(ROWS))
+  part("summary").addEventListener("click", () => { asked = !root.open })
   root.addEventListener("toggle", () => {
     const on = player()
     model.open = root.open
     if (!on) return
-    if (root.open) { on.listeners.add(soon); fill() } else { on.listeners.delete(soon); if (on.look) dim(null, 0) }
+    if (root.open) {
+      on.listeners.add(soon)
+      fill()
+      if (asked) root.scrollIntoView({ block: "start", behavior: "smooth" })
+    } else { on.listeners.delete(soon); if (on.look) dim(null, 0) }
   })
   const open = () => { root.open = model.open }
   model.on("open", open)

@@ -1,7 +1,7 @@
 """η1, η2 and 0.15 η3 of the stored networks, as their number grows."""
 
 import numpy as np
-from bokeh.models import ColumnDataSource, Range1d, Span
+from bokeh.models import ColumnDataSource, Range1d
 
 from ....results import progress_feed
 from ....results.replays import Replay
@@ -10,17 +10,16 @@ from ....widgets.plot_style import SERIES, legend_above
 from .bars_figure import set_range
 
 FACTORS = {"eta3": 0.15}
+EXACT = "0.15 η₃ exact: no number of networks exceeds it"
 LABELS = {"eta1": "η₁", "eta2": "η₂", "eta3": "0.15 η₃"}
 
 
 class GrowthFigure:
-    """Curves over all stored networks; the player extends them during a walk. Dashed: ends."""
+    """Curves over all stored networks, and exact 0.15 η3; the player extends them during a walk."""
 
     def __init__(self) -> None:
         self.growth = ColumnDataSource({name: [] for name in ("state", *LABELS)}, name="growth")
-        self.finals = [
-            Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
-        ]
+        self.exact = ColumnDataSource({"state": [], "eta3": []})
         self.figure = fig = figure(
             "eta_so_far", None, "", "indeterminacy η", height=210, tools="",
             x_range=Range1d(0, 1), y_range=Range1d(0, 1, name="growth_range"),
@@ -31,12 +30,15 @@ class GrowthFigure:
                 "state", name, source=self.growth, line_width=2, color=colour, legend_label=label
             )
             line.tags = MOVES
-        for span in self.finals:
-            fig.add_layout(span)
+        fig.line(
+            "state", "eta3", source=self.exact, line_width=2, line_dash="dashed",
+            color=SERIES[list(LABELS).index("eta3")], legend_label=EXACT,
+        )  # fmt: skip
+        self._entry = fig.legend[0].items[-1]
         legend_above(fig)
 
-    def show(self, replay: Replay, growing: bool) -> None:
-        """Curves of a Replay, or of a walk in progress with unknown end."""
+    def show(self, replay: Replay, growing: bool, exact: float | None) -> None:
+        """Curves of a Replay, or of a walk in progress with unknown end; exact: 0.15 η3 of S."""
         number = progress_feed.numbers(replay.summary) if growing else replay.number
         stored = f"{len(number) - 1} of {replay.summary['states']}"
         self.figure.xaxis.axis_label = f"network; η over the stored ones up to it ({stored})"
@@ -49,12 +51,11 @@ class GrowthFigure:
             name: values.astype(np.float32) for name, values in columns.items()
         }
         set_range(self.figure.x_range, 0, max(1, int(number[-1])))
-        for span in self.finals:
-            span.visible = not growing
+        bound = [] if exact is None else [exact, exact]
+        self.exact.data = {"state": [0, int(number[-1])][: len(bound)], "eta3": bound}
+        self._entry.visible = bool(bound)
         if growing:
             return
-        # Of the states shown, like the curves: the states of the whole walk span more.
         ends = [float(np.nan_to_num(values[-1])) for values in columns.values()]
-        for span, end in zip(self.finals, ends, strict=True):
-            span.location = end
-        set_range(self.figure.y_range, 0, 1.25 * max(ends) if max(ends) > 1e-9 else 1)
+        top = max(ends + bound)
+        set_range(self.figure.y_range, 0, 1.25 * top if top > 1e-9 else 1)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 
@@ -45,11 +46,12 @@ class View(TabView):
         )  # fmt: skip
         self.drawing = BarsFigure(self._choose)
         self.growth = GrowthFigure()
-        self._grown: Replay | None = None  # whose growth is drawn
+        # Whose growth is drawn, and with which exact 0.15 η3.
+        self._grown: tuple[Replay | None, float | None] = (None, None)
         # Whether bars are exact, and how many extend beyond the axis.
         self._drawn: tuple[bool, int] | None = None
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
-        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 196})
+        self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 208})
         self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
         self.choices = [
             self.drawn,
@@ -111,9 +113,10 @@ class View(TabView):
             select.options = by_words({key: worded(replay, name) for key, name in labels.items()})
         self._drawn = bool(exact), beyond
         self._explain()
-        if replay is not self._grown:
-            self._grown = replay
-            self.growth.show(replay, state.growing)
+        eta3 = None if state.growing else _exact_eta3(state.exact)
+        if replay is not self._grown[0] or eta3 != self._grown[1]:
+            self._grown = replay, eta3
+            self.growth.show(replay, state.growing, eta3)
 
     def _explain(self, *events: Any) -> None:
         """Say what is drawn."""
@@ -157,6 +160,12 @@ def _dot(state: AppState) -> str:
     """The network whose forces are dots; only a pulled one is certain to have the held forces."""
     ignores = state.knowledge.known and not state.hand.pulls
     return "dot: now, in a network of all of S" if ignores else "dot: now"
+
+
+def _exact_eta3(exact: Any) -> float | None:
+    """0.15 η3 of all of S, from which networks are drawn even if forces are held."""
+    value = np.nan if exact is None else 0.15 * exact["eta3"].item()
+    return value if np.isfinite(value) else None
 
 
 def _across(every: int, drawn: int, words: str) -> str:

@@ -5,7 +5,7 @@ import { ask } from "../../../browser/send.js"
 
 const STEPS = 400 // of the slider
 const RISE_S = 5 // from zero to the end, by the button
-const ROOM = 1.25 // factor on the scale if its end lies beyond it
+const ROOM = 1.25 // of the scale beyond the limit load, for its label
 const TICKS = 8 // approximate number of ticks
 const THUMB = 8 // px from the slider's ends to the centre of its thumb there
 
@@ -28,7 +28,8 @@ export function render({ model, view }) {
   }
 
   function set(value) {
-    load = Math.min(value, end())
+    const top = end()
+    load = value > top - Number(range.step) / 2 ? top : value // the last step may be rounded away
     if (load > 0) find()
     show()
     if (load < end() || gave) return
@@ -54,7 +55,7 @@ export function render({ model, view }) {
     player()?.listeners.add(look)
     by = player()?.pushed
     shows = true
-    by?.take(model.path, load, load / Number(range.max))
+    by?.take(model.path, load, load / most())
     shows = false
   }
 
@@ -65,22 +66,26 @@ export function render({ model, view }) {
     scale()
   }
 
+  /** End of the scale; the slider ends where the packing starts to move. */
+  const most = () => (known() ? ROOM * Math.max(end(), model.limit) : model.most)
+
   function scale() {
-    range.max = known() ? Math.max(model.most, ROOM * Math.max(end(), model.limit)) : model.most
+    range.max = known() ? end() : model.most
     range.step = range.max / STEPS
+    range.style.width = `calc(${2 * THUMB}px + (100% - ${2 * THUMB}px) * ${range.max / most()})`
     range.disabled = model.contact === null
     drawScale()
     set(load)
   }
 
-  const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / range.max})`
+  const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / most()})`
   const mark = (kind, value, words) => `<span class="${kind}" style="left:${along(value)}">${words}</span>`
 
   /** Numbers, and the critical force once it is known. */
   function drawScale() {
-    const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
+    const top = most(), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => top / size <= TICKS) ?? top
     let drawn = ""
-    for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
+    for (let k = 0; k * step <= top * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
     if (known()) drawn += mark("critical", end(), "▲ F<sub>crit</sub>") + mark("limit", model.limit, "▲ limit load")
     line.innerHTML = drawn
   }

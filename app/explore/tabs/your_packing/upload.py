@@ -10,7 +10,7 @@ from granforce.records import InputError, brief, friction, make_cell, positive
 
 from ....background.limits import LIMITS
 from ....results import photoelastic_frames, uploads
-from ....results.selection import Selection
+from ....results.selection import Selection, typed
 from ....state.app_state import AppState
 from ....widgets.file_drop import Dropper
 from ....widgets.parts import PRIMARY, by_words, note
@@ -142,7 +142,7 @@ class View:
     def _options(self) -> dict[str, Any]:
         kind = uploads.family(self.files)
         options: dict[str, Any] = (
-            {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+            {} if kind == "npz" else {"mu": friction(typed(self.mu.value_input or self.mu.value))}
         )
         if kind in ("pegs", "solved"):
             options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
@@ -153,11 +153,12 @@ class View:
                     "enter the two sides of the box, such as 30, 30, and its tilt, if any; leave "
                     "it empty for an open packing"
                 )
-            options["box"] = [positive(side, "a side of the box") for side in sides[:2]] or None
+            box = [positive(typed(side), "a side of the box") for side in sides[:2]]
+            options["box"] = box or None
             options["tilt"] = (
                 make_cell(options["box"], _number(sides[2])).tilt if sides[2:] else 0.0
             )
-            options["pressure"] = positive(self.pressure.value, "the pressure")
+            options["pressure"] = positive(typed(self.pressure.value), "the pressure")
         return options
 
     def _show(
