@@ -284,6 +284,16 @@ def test_a_stress_that_can_be_prescribed_is_reported(cache, capsys):
     assert "--prescribe stress" in capsys.readouterr().err
 
 
+def test_known_forces_of_another_packing_are_refused(cache, capsys):
+    assert main(["pack", "-n", "20", "--mu", "0.3", "--seed", "1", "--out", "one.npz"]) == 0
+    assert main(["pack", "-n", "20", "--mu", "0.3", "--seed", "2", "--out", "other.npz"]) == 0
+    assert main(["intervals", "one.npz", "--contacts", "0,1,2", "--out", "few.csv"]) == 0
+    assert main(["intervals", "one.npz", "--contacts", "0", "--known", "few.csv"]) == 0
+    capsys.readouterr()
+    assert main(["intervals", "other.npz", "--contacts", "0", "--known", "few.csv"]) == 2
+    assert "does it belong to another packing?" in capsys.readouterr().err
+
+
 def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys):
     Path("known.csv").write_text("contact,f_n [mean]\n0,1\n")
     assert main("intervals -n 20 --mu 0.3 --known known.csv".split()) == 2

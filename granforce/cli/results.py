@@ -124,6 +124,8 @@ def prepared(
             raise InputError(
                 "--prescribe pressure needs a periodic box with a pressure: leave it out"
             )
+        if getattr(arguments, "known", None) is not None:
+            importers.read_known(arguments.known, packing)  # refuses those of another packing
         named = kinds.imported_parameters(packing)
     parameters = name(named)
     check_outputs(*outputs)
