@@ -6,6 +6,8 @@ from urllib.parse import parse_qsl, urlencode
 from granforce.packing import scenes
 from granforce.records import InputError, friction
 
+from ..results.selection import typed
+
 FIRST, MANY, OWN = "groove", "many", "own"
 LARGE = (MANY, "arch", "wall")  # shown by Explore
 SMALL = (*(name for name in scenes.SCENES if name != MANY), "ladder", "stones")
@@ -34,7 +36,7 @@ def request_of(query: str) -> Request:
     if name not in (*SMALL, *LARGE, OWN):
         name = FIRST
     try:
-        mu = friction(given["mu"])
+        mu = friction(typed(given["mu"]))
     except (KeyError, InputError):
         mu = None
     if "scene" in given and name not in LARGE[1:]:
