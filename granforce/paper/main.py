@@ -119,7 +119,7 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     if arguments.n is not None:
         plan = plan._replace(frozen_large=4 * plan.n, tails_n=4 * plan.n)
     if arguments.mu is not None:
-        plan = _at(plan, _numbers("mu", arguments.mu, friction))
+        plan = _at(plan, _numbers("mu", arguments.mu, lambda mu: friction(float(mu))))
     if arguments.sizes is not None:
         sizes = _numbers("sizes", arguments.sizes, lambda n: number_of_disks(int(n)))
         plan = plan._replace(sizes=sizes)

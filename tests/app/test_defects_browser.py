@@ -8,7 +8,6 @@ from serving import (
     MODEL,
     ask,
     at_rest,
-    column,
     free_port,
     how_it_is_made,
     no_more,
@@ -20,7 +19,7 @@ from serving import (
     shows,
     until,
 )
-from small_store import KEPT, ROOT
+from small_store import ROOT
 
 # 1: Back and Forward
 
@@ -378,19 +377,6 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
 
 
 # What is said must be so
-
-
-def test_curves_of_the_shown_states_end_at_their_targets(page):
-    page.wait_for_function(f"() => {MODEL}('growth')?.get_column('eta1')?.length === {KEPT + 1}")
-    page.locator("input.scrub").fill(str(KEPT))
-    ends = [column(page, "growth", name)[-1] for name in ("eta1", "eta2", "eta3")]
-    targets = page.evaluate(
-        """() => [...Bokeh.documents[0].all_models]
-            .filter((m) => m.type === "Span" && m.line_dash === "dashed" ||
-                m.type === "Span" && m.line_dash.length > 0)
-            .filter((m) => m.visible).map((m) => m.location)"""
-    )
-    assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
 
 
 def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(visit):

@@ -208,7 +208,11 @@ def test_parameters_are_judged_where_they_are_named(name, given, options):
 def test_names_are_the_same_however_a_number_is_written():
     plain = kinds.WALK.parameters(kinds.PACKING.parameters(20, 0.3, 1), 6, keep=3)
     made = kinds.PACKING.parameters(
-        20.0, "0.3", np.int64(1), pressure=1, dt="0.03", box_mass=np.float32(100), sweeps=150.0
+        *(20.0, np.float64(0.3), np.int64(1)),
+        pressure=1,
+        dt=np.float64(0.03),
+        box_mass=np.float32(100),
+        sweeps=150.0,
     )
     assert canonical(kinds.WALK.parameters(made, np.int32(6), keep=3.0)) == canonical(plain)
     radii = kinds.PACKING.parameters(3, 0.3, 1, radii=np.array([1, 0.5, 1]))["radii"]

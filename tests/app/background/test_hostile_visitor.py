@@ -41,7 +41,9 @@ def page(context):
 
 def computing(page):
     """Wait until states are being computed for the page, or for another one that it waits for."""
-    page.get_by_text("of 20000 networks").or_(page.get_by_text("already under way")).first.wait_for()
+    page.get_by_text("of 20000 networks").or_(
+        page.get_by_text("already under way")
+    ).first.wait_for()
 
 
 def reloaded(page):

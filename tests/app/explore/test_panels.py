@@ -33,6 +33,7 @@ from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
 from app.explore.tabs.friction.claims import VERDICTS
 from app.explore.tabs.intervals import intervals as intervals_view
+from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
@@ -943,3 +944,14 @@ def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):
     assert '"outlines": [[' in page
     state.replay.summary["rattlers"] = 2
     assert ">loose bodies<" in results_line.tables(state, None, False)
+
+
+def test_the_exact_eta3_is_a_named_line_beside_its_growth(state):
+    drawing = GrowthFigure()
+    drawing.show(state.replay, False, None)
+    (*_, entry), end = drawing.figure.legend[0].items, state.replay.number[-1]
+    assert not entry.visible and drawing.exact.data["eta3"] == []
+    drawing.show(state.replay, False, 0.3)
+    assert entry.visible and entry.label.value.startswith("0.15 η₃ exact")
+    assert drawing.exact.data == {"state": [0, end], "eta3": [0.3, 0.3]}
+    assert drawing.figure.y_range.end > 0.3
