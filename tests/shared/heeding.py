@@ -41,7 +41,7 @@ def interrupted(running):
     out, err = running.communicate(timeout=300)
     assert running.returncode == 130
     assert out == ""
-    assert "Traceback" not in err
+    assert "Traceback" not in err, err
     assert re.search(
         r"interrupted; saved [1-9]\d* of \d+ cells; run the same command again to continue\n$", err
     )
