@@ -37,8 +37,8 @@ EQUILIBRIUM = 1e-6
 # Residual of an admissible network: a finished packing's own, and every state of a walk.
 BALANCED = 1e-10
 
-# Residual and violation of the cones (in ⟨f_n⟩) beyond which imported forces are clearly no
-# equilibrium: simulations that have come to rest, and files with three digits, stay below.
+# Residual and violation of the cones (in ⟨f_n⟩) above which imported forces are reported as not in
+# equilibrium. Simulations at rest, and files with three digits, have smaller values.
 NO_EQUILIBRIUM = 0.05
 
 # Largest violation of the cones in an admissible state: f_n below 0 or |f_t| above μ f_n, in ⟨f_n⟩.

@@ -12,6 +12,7 @@ import xarray as xr
 from granforce import measures
 from granforce.explore.random_walk import UNBOUNDED_WALK
 from granforce.explore.uniform import FEWEST_EFFECTIVE, MIXED
+from granforce.forces.knowledge import Known, refuse_others
 from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
@@ -109,10 +110,12 @@ def prepared(
     kind: Kind,
     name: Callable[[Parameters], Parameters],
     *outputs: str | None,
+    known: Known | None = None,
 ) -> tuple[Store, Parameters]:
     """The store, containing the packing, and the parameters name(its parameters).
 
-    All errors that the command line alone can show are raised before a packing is made.
+    known: forces to be checked against the packing. All errors that the command line alone can show
+    are raised before a packing is made.
     """
     worker_count(arguments.workers, "--workers")
     if arguments.packing is None:
@@ -124,18 +127,23 @@ def prepared(
             raise InputError(
                 "--prescribe pressure needs a periodic box with a pressure: leave it out"
             )
-        if getattr(arguments, "known", None) is not None:
-            importers.read_known(arguments.known, packing)  # refuses those of another packing
+        _refuse_others(known, packing)
         named = kinds.imported_parameters(packing)
     parameters = name(named)
     check_outputs(*outputs)
     store = store_of(arguments)
     store.refuse_file(study.entry_name(store, kind, parameters))
     if packing is None:
-        get_packing(store, named)
+        packing, _ = get_packing(store, named)
+        _refuse_others(known, packing)
     else:
         kinds.keep_packing(store, named, packing, hold=True)
     return store, parameters
+
+
+def _refuse_others(known: Known | None, packing: Packing) -> None:
+    if known is not None:
+        refuse_others(known, packing.contacts)
 
 
 def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
@@ -175,6 +183,7 @@ def found(
         kind,
         lambda packing: kind.parameters(packing, mu=arguments.ensemble_mu, **named),
         *outputs,
+        known=named.get("known"),
     )
     with Bar(kind.title, kind.unit) as progress:
         keywords = {"workers": arguments.workers, "progress": progress, **(options or {})}

@@ -63,6 +63,8 @@ def ensemble(
             "loads on the grains"
         )
     bounds = None if known is None else knowledge.bounds_of(known, count)
+    if known is not None:
+        knowledge.refuse_others(known, contacts)
     conditions = _Conditions(
         mu, held, balance.prescribed_stress(packing, prescribed, stress, held), bounds
     )

@@ -14,7 +14,7 @@ from scipy import sparse
 from granforce import notebook
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError, are_whole
+from granforce.records import Contacts, InputError, NotJammedError, are_whole
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT, REVERSED
 from granforce.types import Floats, Integers, Mask
 
@@ -31,6 +31,7 @@ class Known(NamedTuple):
     # (k, 2) force, or (k,) or one number for f_n alone; −inf, or left out, where nothing is known
     low: Floats = np.array(-np.inf)
     high: Floats = np.array(np.inf)  # the same, inf where nothing is known; low for an exact value
+    grains: Integers | None = None  # (k, 2) that these contacts should join; None: not checked
 
     @property
     def sides(self) -> tuple[Floats, Floats]:
@@ -69,6 +70,20 @@ class Polygons(NamedTuple):
     def wholly(self) -> Mask:
         """(N_c,) bool: contacts with both components pinned."""
         return np.all(self.pinned, axis=1)
+
+
+def refuse_others(known: Known, contacts: Contacts) -> None:
+    """InputError if known contacts, if they exist, join other grains than they should."""
+    if known.grains is None:
+        return
+    number = np.asarray(known.contacts)
+    there = number < len(contacts.i)
+    joined = np.column_stack([contacts.i, contacts.j])[number[there]]
+    if not np.array_equal(known.grains[there], joined):
+        raise InputError(
+            "a table of known forces names other grains of its contacts; does it belong to another "
+            "packing?"
+        )
 
 
 def bounds_of(known: Known | None, count: int) -> Floats:

@@ -37,9 +37,11 @@ def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
     if isinstance(known, Known):
         contacts = np.atleast_1d(known.contacts)
         bounds = np.stack(known.sides, axis=-1).reshape(-1, 4)
-        known = [[c, *row] for c, row in zip(contacts, bounds.tolist(), strict=True)]
+        given: Sequence[Any] = [[c, *row] for c, row in zip(contacts, bounds.tolist(), strict=True)]
+    else:
+        given = known
     try:
-        rows = [[contact, *bounds] for contact, *bounds in known]
+        rows = [[contact, *bounds] for contact, *bounds in given]
     except (TypeError, ValueError):
         rows = [[]]
     if any(len(row) != 5 for row in rows):

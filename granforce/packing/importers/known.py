@@ -6,8 +6,8 @@ import numpy as np
 
 from granforce.forces.knowledge import Known
 from granforce.packing.importers.text import Source, Table, make_table, read_csv
-from granforce.records import InputError, Packing
-from granforce.types import Floats, Integers
+from granforce.records import InputError
+from granforce.types import Floats
 
 _COMPONENTS = "f_n", "f_t"
 _COLUMNS = [f"{name}{side}" for name in _COMPONENTS for side in ("", "_low", "_high")]
@@ -18,20 +18,18 @@ _EARLIER = {
 }
 
 
-def read_known(source: Source, packing: Packing | None = None) -> Known:
+def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
     f_n, f_t: exact values; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as written by `granforce
     intervals --out` (earlier versions: f_n_min, f_n_max, f_t_min, f_t_max). Forces are in the
-    packing's unit, which names may end with: ``f_n [packing]``. Empty fields and other columns are
-    ignored. source: a path or an open file; packing: the one that they are of, against which
-    columns `i` and `j`, if there are any, are checked. Raises InputError naming the offending line,
-    for a column in another unit, and for contacts that join other grains.
+    packing's unit, which names may end with: ``f_n [packing]``. Columns `i` and `j`, if there are
+    any, are the grains of each contact, checked where the Known is used. Empty fields and other
+    columns are ignored. source: a path or an open file. Raises InputError naming the offending
+    line, and for a column in another unit.
     """
     table = _renamed(read_csv(source).in_packing_unit([*_COLUMNS, *_EARLIER]))
     contacts = table.whole("contact")
-    if packing is not None and {"i", "j"} <= set(table.header):
-        _check_grains(table, contacts, packing)
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
     any_bounds = False
@@ -48,18 +46,8 @@ def read_known(source: Source, packing: Packing | None = None) -> Known:
                     side[given, k] = values
     if not any_bounds:
         raise InputError(f"{table.name}: none of the columns {', '.join(_COLUMNS)}")
-    return Known(contacts, low, high)
-
-
-def _check_grains(table: Table, contacts: Integers, packing: Packing) -> None:
-    count = len(packing.contacts.i)
-    there = contacts < count  # others are refused with the ensemble
-    named = np.column_stack([table.whole("i"), table.whole("j")])[there]
-    joined = np.column_stack([packing.contacts.i, packing.contacts.j])[contacts[there]]
-    if not np.array_equal(named, joined):
-        raise InputError(
-            f"{table.name}: its contacts join other grains; does it belong to another packing?"
-        )
+    ends = [table.whole(name) for name in "ij"] if {"i", "j"} <= set(table.header) else []
+    return Known(contacts, low, high, np.column_stack(ends) if ends else None)
 
 
 def _renamed(table: Table) -> Table:

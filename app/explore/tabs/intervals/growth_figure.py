@@ -10,7 +10,7 @@ from ....widgets.plot_style import SERIES, legend_above
 from .bars_figure import set_range
 
 FACTORS = {"eta3": 0.15}
-EXACT = "0.15 η₃ exact: no number of networks exceeds it"
+EXACT = "0.15 η₃ exact"
 LABELS = {"eta1": "η₁", "eta2": "η₂", "eta3": "0.15 η₃"}
 
 
