@@ -150,7 +150,7 @@ SECTIONS = {
         "result.\n\n"
     )
 }
-_WORDS = {"hit_and_run": "coordinate hit-and-run", "granforce, 1 threads": "granforce, 1 thread"}
+_WORDS = {"hit_and_run": "coordinate hit-and-run"}
 NAMES = ("solver", "method", "way", "skipped")  # columns that name a row
 
 
