@@ -65,6 +65,7 @@ NAMES: dict[str, tuple[str, float, float | None]] = {
     "box_mass": ("the box mass", 10, 10_000),
     "sweeps": ("the number of sweeps", 1, 10_000),
     "accuracy": ("the accuracy of a step", 1e-6, 1),
+    "drag_below": ("the unbalance below which drag begins", 1e-6, 1),
 }
 # At these bounds a packing takes up to about ten times as long as usual; at the others, a thousand
 # times and more.
@@ -73,6 +74,7 @@ SHARED_NAMES = NAMES | {
     "box_mass": ("the box mass", 10, 300),
     "sweeps": ("the number of sweeps", 1, 1000),
     "accuracy": ("the accuracy of a step", 1e-3, 1),
+    "drag_below": ("the unbalance below which drag begins", 1e-3, 1),
 }
 
 

@@ -25,7 +25,7 @@ SOLVERS = {
 }
 KINDS = {"walk": "random walk", "uniform": "uniform in S"}
 # Command-line options of a packing, apart from N, μ and seed.
-OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
+OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "drag_below", "box")
 WORDS = {"accuracy": "step-accuracy"}  # those with other names on the command line
 # Approximate limit for stored states; measures always use all states.
 KEPT_BYTES = 64e6

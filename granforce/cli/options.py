@@ -200,6 +200,11 @@ def _add_compaction(command: Parser, shown: bool) -> None:
             "largest violation of the contact laws at the end of a step, relative to the speed of "
             "the fastest grain (default 0.01)",
         ),
+        (
+            *("--drag-below", float, None),
+            "drag replaces inertia once no grain's momentum changes by more than this in a step, "
+            "in ⟨f_n⟩ (default 0.02, less above 2000 disks; not used for μ ≤ 10⁻⁴)",
+        ),
     )
     group = command.add_argument_group("expert settings of the compaction") if shown else command
     for name, kind, usual, words in settings:

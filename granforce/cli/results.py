@@ -84,6 +84,7 @@ def packing_options(arguments: argparse.Namespace) -> dict[str, Any]:
         "box_mass": arguments.box_mass,
         "sweeps": arguments.sweeps,
         "accuracy": arguments.step_accuracy,
+        "drag_below": arguments.drag_below,
         "box": arguments.box,
     }
 

@@ -113,6 +113,7 @@ def pack(
     box_mass: float = 100.0,
     sweeps: int | None = None,
     accuracy: float = 0.01,
+    drag_below: float | None = None,
     box: str = "square",
     max_steps: int = 100_000,
     progress: Progress | None = None,
@@ -126,8 +127,11 @@ def pack(
     radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
     farther than STRIDE. accuracy: largest violation of the laws of Signorini and Coulomb after a
     step, as a velocity relative to the fastest carrying grain; sweeps: maximum per step. For
-    the defaults of dt and sweeps see `default_steps`. box: "square", or "isotropic", whose sides
-    and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear too.
+    the defaults of dt and sweeps see `default_steps`. drag_below: drag takes the place of inertia
+    once no grain's momentum changes by more than this in a step, in ⟨f_n⟩; only for μ above
+    NEARLY_FRICTIONLESS, and by default NEARLY_BALANCED, less from SEVERAL disks on. box: "square",
+    or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
+    jammed against shear too.
     progress(steps done, None) is called repeatedly, as the total is unknown, and watch(Glimpse) at
     least every WATCH_EVERY steps; neither changes a bit of the result. cancel() returning True
     raises Cancelled.
@@ -145,6 +149,7 @@ def pack(
     dt, box_mass = moderate(dt, "dt"), moderate(box_mass, "box_mass")
     accuracy = positive(accuracy, "accuracy", most=COARSEST)
     sweeps, max_steps = whole(sweeps, "sweeps", 1), whole(max_steps, "max_steps", 1)
+    drag_below = check_drag(drag_below, mu)
     check_box(box)
     rng = np.random.default_rng(seed)
     r = draw_radii(radii, n, rng)
@@ -154,6 +159,7 @@ def pack(
     settling = sweeps // SETTLING if mu >= SETTLED_FROM else 0
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), settling, accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
+    slow = NEARLY_BALANCED * min(1.0, (SEVERAL / n) ** 2) if drag_below is None else drag_below
     counters = np.zeros(4, dtype=np.int64)
     work = dict.fromkeys(WORK, 0)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
@@ -165,7 +171,7 @@ def pack(
         if progress is not None:
             progress(step, None)
         cancelling.check("compaction")
-        motion, finished, certificate = _finish(motion, mu, unbalance, work, look)
+        motion, finished, certificate = _finish(motion, mu, unbalance <= slow, work, look)
         if finished is not None and certificate is not None:
             break
         if step >= max_steps:
@@ -180,6 +186,7 @@ def pack(
         "radii": radii if isinstance(radii, str) else "list",
         **settings,
         **({} if box == "square" else {"box": box}),
+        **({} if drag_below is None else {"drag_below": drag_below}),
         "steps": step,
         "sweeps_done": int(counters[dynamics.SWEEPS]),
         "contact_updates": int(counters[dynamics.UPDATES]),
@@ -225,6 +232,18 @@ def default_steps(mu: float, dt: float | None, sweeps: int | None) -> tuple[floa
     """
     usual = (LONGEST, SWEEPS) if mu < SETTLED_FROM else (LONGEST_SETTLED, SWEEPS_SETTLED)
     return usual[0] if dt is None else dt, usual[1] if sweeps is None else sweeps
+
+
+def check_drag(drag_below: float | None, mu: float) -> float | None:
+    """The unbalance below which drag begins, None for the default; InputError if it is invalid."""
+    if drag_below is None:
+        return None
+    if mu <= NEARLY_FRICTIONLESS:
+        raise InputError(
+            f"drag_below is not used at μ ≤ {NEARLY_FRICTIONLESS:g}, where linear programs finish "
+            "the packing; leave it out"
+        )
+    return positive(drag_below, "drag_below", most=1.0)
 
 
 def check_box(box: str) -> str:
@@ -391,15 +410,13 @@ def _fastest_strain(motion: dynamics.Motion) -> float:
 def _finish(
     motion: dynamics.Motion,
     mu: float,
-    unbalance: float,
+    slow: bool,
     work: dict[str, Any],
     look: Callable[[dynamics.Motion, float], object] | None,
 ) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
     """The finished packing in natural units with its test of rest, or None if it still moves."""
     if mu > NEARLY_FRICTIONLESS:
-        if unbalance > NEARLY_BALANCED * min(1.0, (SEVERAL / len(motion.r)) ** 2):
-            return motion, None, None
-        return come_to_rest(motion, mu, work, look)
+        return come_to_rest(motion, mu, work, look) if slow else (motion, None, None)
     if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
         return motion, None, None
     packing = shrink_to_isostatic(motion, mu, work)

@@ -96,6 +96,7 @@ _VARIANTS = {
     "prepared_double_steps": "double Δt",
     "prepared_accuracy": "10 times the accuracy, 4 times the sweeps",
     "prepared_sweeps": "4 times the sweeps",
+    "prepared_late_drag": "drag a hundred times later",
 }
 # Of the verdicts on a claim by sampler, the first of these is the verdict on the claim.
 _VERDICTS = (REPRODUCED, DIFFERS, FAILED, UNDECIDED, FEW, UNMEASURED, MISSING)

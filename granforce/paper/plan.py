@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from granforce.numerics.lanes import LANES
-from granforce.packing.compaction import default_steps
+from granforce.packing.compaction import NEARLY_BALANCED, default_steps
 from granforce.perturb.critical_force import MOST_STEPS
 from granforce.records import InputError
 from granforce.study import kinds, scan
@@ -71,6 +71,7 @@ def variations(mu: float) -> dict[str, dict[str, Any]]:
         "box_mass_300": {"box_mass": 300.0},
         "accuracy": {"accuracy": 0.001, "sweeps": 4 * sweeps},
         "sweeps": {"sweeps": 4 * sweeps},
+        "late_drag": {"drag_below": NEARLY_BALANCED / 100},
     }
 
 

@@ -764,6 +764,7 @@ BEYOND = {
     "accuracy": ("0", "1e-7", "1.5", "inf", "nan", "-0.01"),
     "dt": ("0", "2", "1e-4", "1e308", "inf", "nan", "-0.01"),
     "box_mass": ("5", "1e5", "1e308", "nan"),
+    "drag_below": ("0", "-1", "1.1", "1e-7", "nan"),
     "pressure": ("0", "1e-300", "1e300", "inf", "nan"),
     "radii": (
         "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1", "uniform:1,2,3,", "uniform:",
@@ -843,7 +844,7 @@ def test_limits_are_read_and_wrong_ones_refused():
 
 
 # What makes a computation longer, and nothing else, further than a shared server has it.
-COSTS = {"sweeps": 10_000, "accuracy": 1e-6, "dt": 0.01, "box_mass": 10_000}
+COSTS = {"sweeps": 10_000, "accuracy": 1e-6, "dt": 0.01, "box_mass": 10_000, "drag_below": 1e-6}
 
 
 @pytest.mark.parametrize("name", COSTS)

@@ -390,3 +390,14 @@ def test_steps_by_friction_unless_something_else_is_asked_for():
     assert default_steps(10.0, 0.1, 600) == (0.1, 600)
     made, asked = pack(30, 1.0, 1), pack(30, 1.0, 1, dt=0.03, sweeps=150)
     assert np.array_equal(made.forces, asked.forces) and made.info["dt"] == 0.03
+
+
+def test_drag_can_begin_later():
+    """At the default nothing changes; later, there are more time steps, and the packing rests."""
+    usual, same = pack(60, 3, 5), pack(60, 3, 5, drag_below=0.02)
+    assert np.array_equal(usual.x, same.x) and np.array_equal(usual.forces, same.forces)
+    late = pack(60, 3, 5, drag_below=2e-4)
+    assert late.info["steps"] > usual.info["steps"] and rest(late).at_rest
+    assert late.info["drag_below"] == 2e-4 and "drag_below" not in usual.info
+    with pytest.raises(InputError, match="drag_below is not used at μ ≤ 0.0001"):
+        pack(60, 1e-4, 5, drag_below=0.02)

@@ -35,6 +35,7 @@ PACKING = {
     "--pressure": [*POSITIVE, "1e300", "1e-300"],
     "--dt": [*POSITIVE, "1e300", "1e-300"],
     "--step-accuracy": POSITIVE,
+    "--drag-below": [*POSITIVE, "1.1"],
     "--box-mass": [*POSITIVE, "1e300", "1e-300"],
     "--box": ["", "round", "1 1"],
     "--sweeps": [*WHOLE, LONG],

@@ -84,7 +84,7 @@ def functions():
     return {
         "pack": (gf.pack, {"n": 8, "mu": 0.3, "seed": 1, "radii": "uniform:0.5,1", "pressure": 1.0,
                            "dt": 0.05, "box_mass": 100.0, "sweeps": 100, "accuracy": 0.01,
-                           "box": "square", "max_steps": 3000}),
+                           "drag_below": 0.02, "box": "square", "max_steps": 3000}),
         "scene": (gf.scene, {"name": "groove", "mu": 0.5}),
         "make_packing": (gf.make_packing, {
             "x": packing.x, "r": packing.r, "box": packing.box, "contacts": contacts,

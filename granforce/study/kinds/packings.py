@@ -13,6 +13,7 @@ from granforce.packing.compaction import (
     COARSEST,
     Glimpse,
     check_box,
+    check_drag,
     default_steps,
     draw_radii,
     number_of_disks,
@@ -42,6 +43,7 @@ def _packing_parameters(
     box_mass: float = 100.0,
     sweeps: int | None = None,
     accuracy: float = 0.01,
+    drag_below: float | None = None,
     box: str = "square",
 ) -> Parameters:
     """The parameters of a packing in the store; arguments as for `pack`.
@@ -52,6 +54,7 @@ def _packing_parameters(
     drawn = draw_radii(radii, n, np.random.default_rng(0))
     mu = friction(mu)
     dt, sweeps = default_steps(mu, dt, sweeps)
+    drag_below = check_drag(drag_below, mu)
     return {
         "n": n,
         "mu": mu,
@@ -63,8 +66,9 @@ def _packing_parameters(
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy", most=COARSEST),
         "version": packing_version(mu),
-        # Only if not square, so that keys of packings in square boxes stay valid.
+        # Only if not the default, so that keys of other packings stay valid.
         **({} if check_box(box) == "square" else {"box": box}),
+        **({} if drag_below is None else {"drag_below": drag_below}),
     }
 
 
