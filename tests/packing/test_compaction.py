@@ -399,5 +399,5 @@ def test_drag_can_begin_later():
     late = pack(60, 3, 5, drag_below=2e-4)
     assert late.info["steps"] > usual.info["steps"] and rest(late).at_rest
     assert late.info["drag_below"] == 2e-4 and "drag_below" not in usual.info
-    with pytest.raises(InputError, match="drag_below is not used at μ ≤ 0.0001"):
+    with pytest.raises(InputError, match=r"drag_below is not used at μ ≤ 0.0001"):
         pack(60, 1e-4, 5, drag_below=0.02)
