@@ -49,8 +49,8 @@ def _study() -> tables.StudyTable | None:
 
 
 @cache
-def claims(about: str) -> list[dict[str, Any]]:
-    """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict.
+def claims(about: str | None = None) -> list[dict[str, Any]]:
+    """The paper's claims about one of ABOUT, or all: dicts with statement, value, low, verdict, …
 
     Values that could not be measured are NaN, null in the file.
     """
@@ -61,7 +61,7 @@ def claims(about: str) -> list[dict[str, Any]]:
     return [
         {name: math.nan if value is None else value for name, value in claim.items()}
         for claim in claims_read
-        if claim["statement"].startswith(ABOUT[about])
+        if about is None or claim["statement"].startswith(ABOUT[about])
     ]
 
 

@@ -31,15 +31,8 @@ from granforce.paper.claims.groups import (
     excesses,
     outside,
 )
-from granforce.paper.claims.verdicts import (
-    DIFFERS,
-    FAILED,
-    FEW,
-    MISSING,
-    REPRODUCED,
-    UNDECIDED,
-    UNMEASURED,
-)
+from granforce.paper.claims.outcomes import MIXED, OUTCOMES, VERDICTS, by_claim, score, together
+from granforce.paper.claims.verdicts import FEW, UNMEASURED
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
@@ -65,7 +58,6 @@ _HEADS = {
     "exact": "exact",
     "": "packings alone",
 }
-MIXED = "depends on the sampler"
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
     "exact": "exact intervals",
@@ -98,15 +90,6 @@ _VARIANTS = {
     "prepared_sweeps": "4 times the sweeps",
     "prepared_late_drag": "drag a hundred times later",
 }
-# Of the verdicts on a claim by sampler, the first of these is the verdict on the claim.
-_VERDICTS = (REPRODUCED, DIFFERS, FAILED, UNDECIDED, FEW, UNMEASURED, MISSING)
-# Outcome → verdicts, in the order of the tables of claims.
-_OUTCOMES = {
-    "differ": (FAILED, DIFFERS),
-    "depend on the sampler": (MIXED,),
-    "open": (UNDECIDED, FEW, UNMEASURED, MISSING),
-    "reproduced": (REPRODUCED,),
-}
 
 
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
@@ -119,7 +102,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "walks": lambda: walks(table),
         "others": lambda: others(table),
         "further": lambda: further(table),
-        "score": lambda: score(claims),
+        "score": lambda: f"{score(claims)}\n",
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "verdicts": lambda: verdict_counts(claims),
@@ -579,31 +562,19 @@ def certificates(table: StudyTable) -> str:
     return text + "\n"
 
 
-def score(claims: Rows) -> str:
-    """How many claims are reproduced, differ and are open, in a sentence."""
-    verdicts = [_together(by_sampler) for by_sampler in _by_claim(claims).values()]
-    count = {word: sum(map(verdicts.count, words)) for word, words in _OUTCOMES.items()}
-    mixed = verdicts.count(MIXED)
-    parts = [f"{count['reproduced']} are reproduced", f"{count['differ']} differ"]
-    parts += [f"{count['open']} are open (undecided or too few data)"] if count["open"] else []
-    parts += [f"{mixed} depends on how networks are sampled"] if mixed else []
-    return f"Of {len(verdicts)} claims of the paper and an earlier letter, {listed(parts)}.\n"
-
-
 def verdict_counts(claims: Rows) -> str:
     """How many claims have which verdict: all samplers together, and each, as a table."""
     heads = _used(claims)
-    together = [_together(by_sampler) for by_sampler in _by_claim(claims).values()]
-    counted = [
-        together,
+    columns = [
+        [together(by_sampler) for by_sampler in by_claim(claims).values()],
         *([c["verdict"] for c in claims if c["sampler"] == name] for name in heads),
     ]
     lines = [
-        [word, *(str(verdicts.count(word)) for verdicts in counted)]
-        for word in (*_VERDICTS[:3], MIXED, *_VERDICTS[3:])
-        if any(word in verdicts for verdicts in counted)
+        [word, *(str(verdicts.count(word)) for verdicts in columns)]
+        for word in (*VERDICTS[:3], MIXED, *VERDICTS[3:])
+        if any(word in verdicts for verdicts in columns)
     ]
-    lines.append(["all", *(str(len(verdicts)) for verdicts in counted)])
+    lines.append(["all", *(str(len(verdicts)) for verdicts in columns)])
     return markdown_table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
 
 
@@ -612,35 +583,17 @@ def verdict_table(claims: Rows) -> str:
     heads = [name for name in _used(claims) if name]
     columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
     grouped: dict[str, list[list[str]]] = {}
-    for (statement, source, _), by_sampler in _by_claim(claims).items():
+    for (statement, source, _), by_sampler in by_claim(claims).items():
         cells = [by_sampler[name]["verdict"] if name in by_sampler else "" for name in heads]
-        verdict = _together(by_sampler)
+        verdict = together(by_sampler)
         grouped.setdefault(verdict, []).append([statement, source, f"**{verdict}**", *cells])
     parts = []
-    for outcome, verdicts in _OUTCOMES.items():
+    for outcome, verdicts in OUTCOMES.items():
         rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]
         if rows:
             head = f"### {outcome[0].upper()}{outcome[1:]} ({len(rows)})"
             parts.append(f"{head}\n\n{markdown_table(columns, rows)}")
     return "\n".join(parts)
-
-
-def _together(by_sampler: dict[str, dict[str, Any]]) -> str:
-    """One verdict on a claim: that of the samplers that decide it, MIXED if they disagree."""
-    verdicts = {claim["verdict"] for claim in by_sampler.values()}
-    decided = verdicts & {REPRODUCED, DIFFERS, FAILED}
-    if REPRODUCED in decided and len(decided) > 1:
-        return MIXED
-    return next(word for word in _VERDICTS if word in verdicts)
-
-
-def _by_claim(claims: Rows) -> dict[tuple[str, str, str], dict[str, dict[str, Any]]]:
-    """The claims of each (statement, source, criterion), by sampler."""
-    grouped: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
-    for claim in claims:
-        key = claim["statement"], claim["source"], claim["criterion"]
-        grouped.setdefault(key, {})[claim["sampler"]] = claim
-    return grouped
 
 
 def _used(claims: Rows) -> list[str]:
@@ -656,7 +609,7 @@ def detail_table(claims: Rows) -> str:
     """
     heads = _used(claims)
     rows = []
-    for (statement, _, criterion), by_sampler in _by_claim(claims).items():
+    for (statement, _, criterion), by_sampler in by_claim(claims).items():
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
         (measured, *_) = (claim["measured"] for claim in by_sampler.values())

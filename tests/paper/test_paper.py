@@ -20,7 +20,7 @@ from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
 from granforce.paper import claims, documents, drawings, filled, findings, tables
 from granforce.paper import plan as plans
-from granforce.paper.claims import groups, verdicts
+from granforce.paper.claims import groups, outcomes, verdicts
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import load
@@ -517,15 +517,16 @@ def test_a_claim_has_one_verdict_and_one_for_each_sampler():
     heads = ["claim", "source", "verdict", "nearest-network walk", "exact"]
     assert rows[0] == rows[3] == rows[6] == heads  # no column without numbers
     assert [row[2] for row in rows[2::3]] == [
-        f"**{word}**" for word in (verdicts.FAILED, documents.MIXED, verdicts.REPRODUCED)
+        f"**{word}**" for word in (verdicts.FAILED, outcomes.MIXED, verdicts.REPRODUCED)
     ]
     assert rows[2][3:] == [verdicts.FEW, verdicts.FAILED]
-    assert "1 are reproduced, 1 differ and 1 depends" in documents.score(judged)
+    assert "tests 3 claims" in outcomes.score(judged)
+    assert "it reproduces 1, contradicts 1 and finds that 1 depends" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]
     counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
-    assert counted["reproduced"] == [1, 2, 0] and counted[documents.MIXED] == [1, 0, 0]
+    assert counted["reproduced"] == [1, 2, 0] and counted[outcomes.MIXED] == [1, 0, 0]
     assert counted["undecided"] == [0, 0, 1] and counted["not reproduced"] == [1, 0, 1]
     assert counted["all"] == [3, 3, 3] and "not measured" not in counted
 

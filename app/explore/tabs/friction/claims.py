@@ -2,11 +2,12 @@
 
 import html
 import re
-from collections.abc import Iterable
-from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+
+from granforce.paper.claims import outcomes
+from granforce.types import Rows
 
 from ....results import study_data
 
@@ -18,7 +19,6 @@ VERDICTS = {
     "too few data": "…",
     "not measured": "…",
 }
-DECIDED = {"reproduced", "differs", "not reproduced"}  # the others may change with more data
 # Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
     "gauss_seidel": "the paper’s walk, to 10⁻³",
@@ -26,6 +26,13 @@ SAMPLERS = {
     "uniform": "uniform in S",
     "exact": "exact",
     "": "packings alone",
+}
+# Outcomes of claims, with the words after their number.
+OUTCOMES = {
+    "reproduced": "reproduced",
+    "depend on the sampler": "by some samplers only",
+    "differ": "contradicted",
+    "open": "open",
 }
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th>{}</tr>"
@@ -51,44 +58,19 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
     )
 
 
-def summary(about: Iterable[str]) -> str:
-    """How many claims about some of `study_data.ABOUT` are reproduced, and how to read the tables.
-
-    Methods without a verdict do not count.
-    """
-    count = _counted(chain.from_iterable(map(study_data.claims, about)))
+def summary() -> str:
+    """The numbers of the paper's claims by outcome, and how to read the tables."""
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
-        f"<b>This study reproduces {count.by_all} of the paper's {sum(count)} claims by every "
-        f"method that reached a verdict, and {count.by_some} by some methods only.</b> "
-        f"{count.by_none} differ or are not reproduced, and {count.undecided} are undecided "
-        f"({PAPER}). Each cell: verdict, value, 95 % interval over "
-        f"packings; hover over it for the criterion. {marks}."
+        f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Each cell: verdict, "
+        "value, 95 % interval over packings; hover over it for the criterion. "
+        f"{marks}."
     )
 
 
-class Count(NamedTuple):
-    """Numbers of claims by how many of the methods with a verdict reproduce them."""
-
-    by_all: int
-    by_some: int
-    by_none: int
-    undecided: int
-
-    def __str__(self) -> str:
-        names = "reproduced", "by some methods only", "not reproduced", "undecided"
-        return ", ".join(f"{n} {name}" for n, name in zip(self, names, strict=True) if n)
-
-
-def _counted(claims: Iterable[dict[str, Any]]) -> Count:
-    verdicts: dict[str, set[str]] = {}
-    for claim in claims:
-        decided = {claim["verdict"]} & DECIDED
-        verdicts.setdefault(claim["statement"], set()).update(decided)
-    found = list(verdicts.values())
-    by_all, undecided = found.count({"reproduced"}), found.count(set())
-    by_some = sum("reproduced" in one for one in found) - by_all
-    return Count(by_all, by_some, len(found) - by_all - by_some - undecided, undecided)
+def _counted(claims: Rows) -> str:
+    count = outcomes.counted(claims)
+    return ", ".join(f"{count[name]} {words}" for name, words in OUTCOMES.items() if count[name])
 
 
 def _cell(claim: dict[str, Any]) -> str:

@@ -167,4 +167,4 @@ def _claims() -> str:
     tables = [
         claims.claims(about, heading, opened=about == "eta") for about, heading in CLAIMED.items()
     ]
-    return claims.summary(CLAIMED) + "".join(tables) if any(tables) else ""
+    return claims.summary() + "".join(tables) if any(tables) else ""
