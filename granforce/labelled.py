@@ -19,6 +19,7 @@ from granforce.tolerances import AT_REST
 from granforce.types import Floats, Integers, Mask
 
 COMPONENTS = ["f_n", "f_t"]
+_FOREIGN = "the result belongs to another ensemble"
 # The word for a unit of force in the name of a column, and its name in attributes.
 UNITS = {"packing": "force", "mean": "mean normal force"}
 _COLUMN = re.compile(r"(?:(f_n|f_t)(?:_|(?= |$)))?(.*?)(?: \[([^]]*)\])?")
@@ -206,7 +207,8 @@ def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
         labels = {name: label for name, label in labels.items() if _dimension(label, name) in used}
         return xr.Dataset(variables, labels, _attributes(result))
     except ValueError as error:
-        raise InputError(f"the result belongs to another ensemble: {error}") from None
+        why = str(error).removeprefix(f"{_FOREIGN}: ")
+        raise InputError(f"{_FOREIGN}: {why}") from None
 
 
 def to_dataframe(
@@ -307,7 +309,7 @@ def _refuse_foreign(result: Any, ensemble: Ensemble) -> None:
         forces = starting_network(ensemble)[ensemble.positions(result.contacts)]
         outside = np.maximum(result.low - forces, forces - result.high)
         if np.nanmax(outside, initial=0.0) > AT_REST * ensemble.force_scale:
-            raise InputError("the result belongs to another ensemble: its own forces are outside")
+            raise InputError(f"{_FOREIGN}: its own forces are outside")
 
 
 def _corners(dataset: xr.Dataset) -> pd.DataFrame:

@@ -258,7 +258,7 @@ def refuse_options(function: Callable[..., Any], given: Iterable[str], more: Ite
     for name in sorted(set(given) - set(more))[:1]:
         raise TypeError(
             f"{function.__name__} has no option {name!r}; its options are "
-            f"{', '.join([*names, *more])}"
+            f"{', '.join(dict.fromkeys([*names, *more]))}"
         )
 
 

@@ -346,7 +346,7 @@ def test_results_are_labelled_in_xarray_and_pandas():
         assert len(gf.to_dataframe(result, S)) % len(S.index) == 0
     with pytest.raises(gf.InputError, match=r"gf\.to_dataset\(result, S\)"):
         gf.to_dataset(walk)
-    with pytest.raises(gf.InputError, match="belongs to another ensemble"):
+    with pytest.raises(gf.InputError, match="belongs to another ensemble: the result of shape"):
         gf.to_dataset(walk, gf.ensemble(gf.scene("groove", 0.5)))
 
 
@@ -993,6 +993,10 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
         gf.figures.indeterminacy("scan.zarr")
     with pytest.raises(TypeError, match=r"^walk has no option 'start'; its .* are states, seed, "):
         gf.walk(S, 5, start=3)
+    with pytest.raises(TypeError, match=r"^(?!.*cancel.*cancel)"):
+        gf.walk(S, 5, state=5)
+    with pytest.raises(gf.InputError, match=r"save takes a HoloViews figure, not an int"):
+        gf.figures.save(3, tmp_path / "x.png")
     with pytest.raises(TypeError, match=r"^scan has no option 'N'; its options are seeds, n, .*dt"):
         gf.scan(tmp_path / "s.zarr", [0.1], N=30)
     with pytest.raises(TypeError, match=r"^critical_force has no option 'preciion'; .*precision"):
@@ -1266,6 +1270,29 @@ def test_a_smooth_contact_in_a_conflict_is_named_as_such():
         gf.NotJammedError, match=r"f_t = 0 where μ is 0; these conflict: f_t = 0 on"
     ):
         gf.ensemble(pyramid, mu)
+
+
+def test_a_conflict_names_frictionless_contacts_only_where_there_are_some():
+    S = gf.ensemble(packed(30, 0.3, 1))
+    known = gf.Known([0], 1e3, 1e3)
+    with pytest.raises(gf.NotJammedError, match=r"all known forces; these conflict: f_n = 1000"):
+        gf.ensemble(S.packing, known=known)
+
+
+def test_centres_and_radii_in_different_units_are_suspected():
+    grains = "x,y,r\n" + "\n".join(f"{1000 * k},{1000 * (k % 3 + 1)},1" for k in range(9))
+    for walls in ("floor", "box"):
+        with pytest.raises(gf.NotJammedError, match=r"only 0 of 9 grains touch another: .* unit"):
+            gf.read_table(io.StringIO(grains), mu=0.3, walls=walls, gravity=1)
+
+
+def test_pairs_far_apart_are_not_in_doubt_at_a_large_tolerance():
+    grains = "x,y,r\n1,1,1\n3.02,1,1\n5.5,1,1\n"  # gaps 0.02 and 0.48
+    for tolerance, doubted in ((0.05, 0), (0.4, 0), (0.0005, 1)):
+        packing = gf.read_table(
+            io.StringIO(grains), mu=0.3, walls="floor", gravity=1, tolerance=tolerance
+        )
+        assert len(packing.info["nearly_touching"]) == doubted
 
 
 def test_a_floor_without_side_walls_is_said():

@@ -12,7 +12,7 @@ from typing import Any
 import holoviews as hv
 from holoviews.plotting.util import process_cmap
 
-from granforce.records import InputError
+from granforce.records import InputError, with_article
 from granforce.system.files import written
 from granforce.types import Floats
 
@@ -281,6 +281,10 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
     title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
     """
     path = Path(path)
+    if not isinstance(figure, hv.core.Dimensioned):
+        raise InputError(
+            f"save takes a HoloViews figure, not {with_article(type(figure).__name__)}"
+        )
     if path.suffix == ".html":
         ready("bokeh")
         text = io.StringIO()

@@ -330,8 +330,8 @@ def _statements(
             if given[k] > BALANCED * scale:
                 text += f" (must be relaxed by {given[k]:.3g})"
             texts.append(text)
-    together = "; ".join(texts)
+    smooth = any(text.startswith(f"{_NAMES[1]} = 0 ") for text in texts)
+    frictionless = ", and f_t = 0 where μ is 0" if smooth else ""
     return (
-        "no network satisfies all known forces, and f_t = 0 where μ is 0; these conflict: "
-        f"{together}"
+        f"no network satisfies all known forces{frictionless}; these conflict: {'; '.join(texts)}"
     )

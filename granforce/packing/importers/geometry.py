@@ -28,6 +28,8 @@ OVERLAP_ALLOWED = 0.2
 
 # Pairs whose gap is below this many tolerances, and which are no contacts, are in doubt.
 NEARLY = 100.0
+# Pairs with larger gaps, in largest radii, are in doubt only below the tolerance itself.
+APART = 0.1
 
 # Largest difference, in largest radii, between a given distance or branch and the positions: dumps
 # with six digits pass; a wrong box or a wrong grain does not.
@@ -73,8 +75,8 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
     """The packing with notes in info on large overlaps, and on pairs near the tolerance.
 
     tolerance: which decided what touches, or None if contacts were listed. info["nearly_touching"]
-    lists [i, j, gap] of pairs that are no contacts though their gap is below NEARLY tolerances (in
-    largest radii), and of those that the tolerance makes contacts though their gap is far above
+    lists [i, j, gap] of pairs that are no contacts though their gap is below NEARLY tolerances and
+    below APART (in largest radii), and of those that the tolerance makes contacts though their gap is far above
     those of other contacts; the gap is in the unit of x.
     """
     c, largest, notes = packing.contacts, packing.r.max(), []
@@ -85,7 +87,8 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
             f"disks overlap by up to {overlap:.2g} of the largest radius (mean {mean:.2g}): they "
             "count as soft, each contact at the middle of its overlap"
         )
-    near = min(NEARLY * (tolerance or LISTED_TOUCHING), 1.0)
+    tolerance_used = tolerance or LISTED_TOUCHING
+    near = min(NEARLY * tolerance_used, max(APART, tolerance_used))
     i, j, gap = apart(packing, near)
     if len(i):
         notes.append(

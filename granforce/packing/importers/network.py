@@ -284,6 +284,16 @@ def _missed(packing: Packing) -> str:
     return f"{words}, but are not listed as contacts" if listed else larger_tolerance(words)
 
 
+def _few_touch(packing: Packing) -> str:
+    """A hint at different units of centres and radii, if most grains touch no other grain."""
+    grain = ~left_open_in(packing)  # no wall
+    pairs = np.stack([packing.contacts.i, packing.contacts.j])
+    touching, n = len(np.unique(pairs[:, grain[pairs].all(axis=0)])), int(grain.sum())
+    if 2 * touching >= n:
+        return ""
+    return f"; only {touching} of {n} grains touch another: do x, y and r have the same unit?"
+
+
 def _settled(packing: Packing) -> Packing:
     """The packing with the loads nearest to its own that contact forces can balance.
 
@@ -306,7 +316,7 @@ def _settled(packing: Packing) -> Packing:
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
             f"friction; the largest unbalance is at grains {named} (counted from 0){walls}"
-            f"{_missed(packing)}"
+            f"{_few_touch(packing)}{_missed(packing)}"
         )
     load = packing.load.copy()
     unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])
