@@ -76,8 +76,8 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
 
     tolerance: which decided what touches, or None if contacts were listed. info["nearly_touching"]
     lists [i, j, gap] of pairs that are no contacts though their gap is below NEARLY tolerances and
-    below APART (in largest radii), and of those that the tolerance makes contacts though their gap is far above
-    those of other contacts; the gap is in the unit of x.
+    below APART (in largest radii), and of those that the tolerance makes contacts though their gap
+    is far above those of other contacts; the gap is in the unit of x.
     """
     c, largest, notes = packing.contacts, packing.r.max(), []
     overlap = -c.gap.min(initial=0.0) / largest
