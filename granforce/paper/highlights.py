@@ -24,6 +24,8 @@ WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 # Friction at which packings are compared with those of the largest friction.
 USUAL = 0.1
 PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
+LATE_DRAG = "prepared_late_drag_exact"
+FEWEST = 5  # packings of a mean in brackets
 STATES = ("nearest", "gauss_seidel", "uniform")
 
 
@@ -147,9 +149,20 @@ def _free_forces(of: _Numbers) -> Highlight:
     return Highlight(
         f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
         f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
-        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.",
+        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}{_later_drag(of, most)}.",
         "figure1_exact",
         "ensemble",
+    )
+
+
+def _later_drag(of: _Numbers, mu: float) -> str:
+    """How many dimensions S has if inertia acts for longer, if the study knows; else nothing."""
+    late = statistics.grouped(of.table.part(LATE_DRAG), "dimension").get(mu)
+    if late is None or len(late) < FEWEST:
+        return ""
+    return (
+        f" (and {with_error(late)} if drag replaces inertia only when grains are a hundred times "
+        "closer to balance)"
     )
 
 

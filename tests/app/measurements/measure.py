@@ -5,8 +5,8 @@
 Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
 crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
 loop while pages and tabs open and while it computes), watching (first moving picture, pictures and
-states a second, what watching costs), dragging (of a force, and of the point in force space: frames
-a second, hand to picture), memory (over open–close cycles), visitors (ten at once).
+states a second, what watching costs), dragging (of a force, in blocks too, and of the point in
+force space: frames a second, hand to picture), memory (over open–close cycles), visitors (ten at once).
 Each starts a server of its own on the shipped store.
 """
 
@@ -43,6 +43,13 @@ FREE = """[...Array(400).keys()].map((k) => [150 + 5 * (k % 20), 150 + 5 * Math.
         const box = scene.root.getBoundingClientRect()
         return scene.takenAt({ clientX: box.x + x, clientY: box.y + y }, false) === null
     })"""
+
+
+BODIES = {
+    MANY: "400 disks",
+    "?scene=arch&mu=0.7&states=100": "arch",
+    "?scene=wall&mu=0.65&states=100": "wall",
+}
 
 
 class Stage:
@@ -290,13 +297,20 @@ GRABBED = """e => {
 
 
 def dragging(stage):
-    """A force in the hand at 400 disks: time to its rail, frames a second, hand to picture."""
+    """A force in the hand, of 400 disks and of blocks: time to its rail, frames, hand to picture.
+
+    Then the point in force space, of 400 disks.
+    """
+    for query, words in BODIES.items():
+        page, _ = stage.open(query, still=True)
+        page.wait_for_timeout(4000)
+        _, x, y = chain(page)
+        page.locator(".scene").evaluate(GRABBED)
+        for visit in ("first", "second"):
+            _drag(page, x, y, "scene.hand.rail", f"{words}: rail of the {visit} contact")
+        page.context.close()
     page, _ = stage.open()
-    page.wait_for_timeout(4000)
-    _, x, y = chain(page)
     page.locator(".scene").evaluate(GRABBED)
-    for visit in ("first", "second"):
-        _drag(page, x, y, "scene.hand.rail", f"rail of the {visit} contact")
     page.get_by_role("tab", name="Force space").click()
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4")
     page.wait_for_timeout(1500)
