@@ -56,8 +56,8 @@ HEADS = {
     "said_to_carry": "reported to carry",
     "carry": "precision of report",
     "chi": "χ²/degrees of freedom",
-    "suspected": "outliers: recall",
-    "told": "outliers: precision",
+    "suspected": "recall of outliers",
+    "told": "precision of outliers",
 }
 HIDDEN = ("counts",)  # columns of JSON that no table shows
 # Part → the columns of its tables, for parts with more than a page has room for.
@@ -144,10 +144,10 @@ SPEED_UP, RELATIVE_TIME = "speed-up", "relative time"  # heads of these columns
 SECTIONS = {
     "masonry": (
         "## Walls of blocks\n\n"
-        "Bounds for 16 contacts, the horizontal load factor and 100 uniform states of dry-stone "
-        "walls. The baseline of\nthe bounds is one HiGHS model that starts each program from the "
-        "last basis, and that of the load factor\n`scipy.optimize.linprog`; neither certifies its "
-        "result.\n\n"
+        "We compute bounds for 16 contacts, the horizontal load factor and 100 uniform networks of "
+        "dry-stone walls. The\nbaseline of the bounds is one HiGHS model that starts each program "
+        "from the last basis, and that of the load factor\n`scipy.optimize.linprog`; neither "
+        "certifies its result.\n\n"
     )
 }
 _WORDS = {"hit_and_run": "coordinate hit-and-run"}
@@ -197,9 +197,9 @@ def _table(part: str, rows: Any) -> str:
         libraries = {name: version for name, version in rows["libraries"].items() if version}
         values = {name: value for name, value in rows.items() if name != "libraries"} | libraries
         return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
-    remark = _remark(part, rows) + _below(part, rows) + _worst(part, rows)
     if part in NEEDED:
         rows = [row for row in rows if row.get(NEEDED[part]) is not None]
+    remark = _remark(part, rows) + _below(part, rows) + _worst(part, rows)
     every = tuple(dict.fromkeys(name for row in rows for name in row))
     chosen = COLUMNS.get(part, (every,))
     constant = [
@@ -281,7 +281,7 @@ def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
     if not known:
         return ""
     row = worst(known, key=lambda row: row[column])
-    word = "Largest" if worst is max else "Smallest"
+    word = "Largest" if worst is max else "Lowest"
     head = _head(part, column).removeprefix("largest ").removeprefix("worst ")
     name = next((f"{_cell(row[name])}, " for name in NAMES if name in row), "")
     return f"\n{word} {head}: {_cell(row[column])} ({name}{_place(row)}).\n"
@@ -298,4 +298,6 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, bool):
         return "yes" if value else ""
-    return f"{value:.3g}" if isinstance(value, float) else _WORDS.get(str(value), str(value))
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return _WORDS.get(str(value), str(value)).replace(" states", " networks")

@@ -612,9 +612,7 @@ def detail_table(claims: Rows) -> str:
     for (statement, _, criterion), by_sampler in by_claim(claims).items():
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
-        (measured, *_) = (claim["measured"] for claim in by_sampler.values())
-        measured = measured.partition(", at the deciding μ")[0]
-        rows.append([statement, measured, criterion, *cells])
+        rows.append([statement, _measured(by_sampler), criterion, *cells])
     columns = [_HEADS[name] for name in heads]
     text = markdown_table(["claim", "number", "criterion", *columns], rows)
     unjudged = {claim["sampler"]: _split(claim["why"])[1] for claim in claims}
@@ -625,6 +623,34 @@ def detail_table(claims: Rows) -> str:
         if unjudged.get(name)
     ]
     return text + "".join(f"\n{note}\n" for note in notes)
+
+
+def _measured(by_sampler: dict[str, dict[str, Any]]) -> str:
+    """The number of a claim in words, with what is different about it for some samplers."""
+    words = {
+        name: claim["measured"].partition(", at the deciding μ")[0]
+        for name, claim in by_sampler.items()
+        if np.isfinite(claim["value"])
+    } or {"": next(iter(by_sampler.values()))["measured"]}
+    usual, *_ = words.values()
+    others: dict[str, list[str]] = {}
+    for name, text in words.items():
+        if text != usual:
+            others.setdefault(_different(text, usual), []).append(_HEADS[name])
+    notes = [f"{', '.join(names)}: {what}" for what, names in others.items()]
+    return f"{usual} ({'; '.join(notes)})" if notes else usual
+
+
+def _different(text: str, usual: str) -> str:
+    """The parts of a text, separated by commas, that another lacks; only η3 if it has η2 there."""
+    known = usual.split(", ")
+    parts = []
+    for part in text.split(", "):
+        if part.replace("exact η3", "η2").replace("η3", "η2") in known and part not in known:
+            parts.append("η3")
+        elif part not in known:
+            parts.append(part)
+    return ", ".join(dict.fromkeys(parts))
 
 
 def _split(why: str) -> tuple[str, str]:

@@ -119,7 +119,7 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
                 for mu, group in within(groups, span).items()
             }
             if moments:
-                statement = f"width of P(ΔF_n) in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
+                statement = f"standard deviation of ΔF_n in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
                 yield _trend(statement, _mean_width, moments, POSITIVE)
 
 
@@ -160,7 +160,8 @@ def strength(table: StudyTable) -> Iterator[Claim]:
         ("response_long", "with 600 implicit steps over that with 150"),
         (
             "perturb",
-            "with load steps of 0.4 of the remaining distance over that with 0.1 (other contacts)",
+            "with load steps of 0.4 of the remaining distance over that with 0.1, in a different "
+            "set of contacts",
         ),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):

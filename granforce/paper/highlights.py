@@ -26,6 +26,7 @@ USUAL = 0.1
 PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 LATE_DRAG = "prepared_late_drag_exact"
 FEWEST = 5  # packings of a mean in brackets
+LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
 STATES = ("nearest", "gauss_seidel", "uniform")
 
 
@@ -75,6 +76,17 @@ class _Numbers:
         keys = [(statement, sampler) for sampler in samplers]
         return {key[1]: self._judged[key]["verdict"] for key in keys if key in self._judged}
 
+    def packings(self, part: str) -> str:
+        """How many packings a part has at each μ."""
+        counts = sorted({len(group) for group in self._seeds(part).values()})
+        return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+
+    def _seeds(self, part: str) -> dict[float, set[int]]:
+        seeds: dict[float, set[int]] = {}
+        for row in self.table.part(part):
+            seeds.setdefault(row["mu"], set()).add(row["seed"])
+        return seeds
+
     def mean(self, sampler: str, name: str, mu: float, factor: float = 1.0) -> str:
         """Mean ± standard error over packings at one μ."""
         values = factor * statistics.grouped(self.table.part(SAMPLERS[sampler]), name)[mu]
@@ -102,14 +114,16 @@ def _maximum(of: _Numbers) -> Highlight:
     else:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
-        f" The default compaction protocol changes at μ = {SETTLED_FROM:g}, within the confidence "
-        "interval of this maximum."
+        f" The default settings of the compaction also change at μ = {SETTLED_FROM:g}: see the "
+        "limits of the study."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
+    lengths = of.claims(LENGTHS, ["exact"]).values()
+    also = "".join(f" and ⟨ΔF_n⟩/⟨f_n⟩ at {_quoted(row)}" for row in lengths)
     return Highlight(
-        f"{first}: relative to the forces, they are longest at μ = {_quoted(place)}; the paper's "
-        f"are longest near {PAPERS_PEAK:g}.{step}",
+        f"{first}: exact η3 is largest at μ = {_quoted(place)}{also}; the paper finds its largest "
+        f"η near {PAPERS_PEAK:g}.{step}",
         "samplers",
         "exact-intervals",
     )
@@ -225,18 +239,19 @@ def _sentence(words: str) -> str:
 
 
 def _alike(of: _Numbers) -> Highlight:
-    claim = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
-    ratios = ("η2/η3", "η1/η3")
-    constant = {ratio: of.row(f"{claim}: {ratio} is constant", "nearest") for ratio in ratios}
-    verdicts = {ratio: row["verdict"] for ratio, row in constant.items()}
-    if set(verdicts.values()) == {REPRODUCED}:
-        first = "η1, η2 and η3 are proportional to each other"
-    elif set(verdicts.values()) & {DIFFERS, FAILED}:
+    constant = {name: of.row(f"{name}/η3 is nearly constant", "nearest") for name in ("η1", "η2")}
+    does = [name for name, row in constant.items() if row["verdict"] == REPRODUCED]
+    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, FAILED)]
+    if len(does) == 2:
+        first = "η1 and η2 are nearly proportional to η3"
+    elif does and does_not:
+        first = f"{does[0]} is nearly proportional to η3, but {does_not[0]} is not"
+    elif does_not:
         first = "η1, η2 and η3 are not all proportional to each other"
     else:
         first = "Whether η1, η2 and η3 are proportional to each other is undecided"
     texts = listed(
-        [f"{ratio} varies by a factor of {_quoted(row)}" for ratio, row in constant.items()]
+        [f"{name}/η3 varies by a factor of {_quoted(row)}" for name, row in constant.items()]
     )
     return Highlight(
         f"{first}: for {WORDS['nearest']} and μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
@@ -266,19 +281,23 @@ def _critical(of: _Numbers) -> Highlight:
 
 def _stability(of: _Numbers) -> Highlight:
     claim = "F_crit rises with η"
-    words = {"exact": "exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
+    words = {"exact": "the exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
     rows = of.claims(claim, list(words))
     rising = {name: row for name, row in rows.items() if row["low"] > 0}
     others = [words[name] for name in rows if name not in rising]
     if not rising:
         raise KeyError(claim)
-    named = listed([words[name] for name in rising])
+    named = listed([f"with {words[name]}" for name in rising])
     texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in rising.items()])
-    rest = f"; with {listed(others)}, no rise is shown" if others else ""
+    rest = f"; with {listed(others)}, no correlation is significant" if others else ""
     closely = all(row["verdict"] == REPRODUCED for row in rising.values())
+    first = (
+        f"The critical force rises {named}"
+        if closely
+        else f"The critical force tends to rise {named}, but the correlation is weak"
+    )
     return Highlight(
-        f"The critical force rises with {named}{'' if closely else ', but not closely'}: over all "
-        f"μ, its rank correlation is {texts}{rest}.",
+        f"{first}: over all μ, its rank correlation is {texts}{rest}.",
         "figure2",
         "local-perturbation",
     )
@@ -290,8 +309,8 @@ def _shear(of: _Numbers) -> Highlight:
     if part["high"] >= 1:
         raise KeyError(base)
     return Highlight(
-        "A packing can carry more shear stress than compaction leaves in it: at intermediate μ, "
-        f"the ratio of shear stress to pressure is "
+        "A packing can carry more shear stress than compaction leaves in it: at intermediate μ "
+        f"({of.packings('stress')} packings at each), the ratio of shear stress to pressure is "
         f"{of.judged(f'{base} of the original network, {MID}')} after compaction, and can reach "
         f"{of.judged(f'largest {base}, {MID}')}.",
         "stresses",
@@ -305,9 +324,9 @@ def _volume(of: _Numbers) -> Highlight:
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
         raise KeyError(name)
     return Highlight(
-        "S is narrower at smaller friction, although it has more dimensions: its typical width, "
-        f"unlike the intervals, grows with μ: it is {_quoted(small)} ⟨f_n⟩ at small, "
-        f"{_quoted(middle)} ⟨f_n⟩ at intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
+        "S is narrower at smaller friction, although it has more dimensions: in "
+        f"{of.packings('volume')} packings at each μ, its width is {_quoted(small)} ⟨f_n⟩ at "
+        f"small, {_quoted(middle)} ⟨f_n⟩ at intermediate and {_quoted(large)} ⟨f_n⟩ at large μ.",
         "volumes",
         "volume",
     )

@@ -43,17 +43,16 @@ _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η1 ≈ η2 ≈ 0.15 η3 over all μ, up to a constant factor."""
     rows = dynamic(drawn(table, sampler))
-    for above, below, word, good, fair in (
-        ("eta2", "eta1", "η2/η1", (1 / 1.5, 1.5), (0.5, 2)),
-        ("eta1", "eta3", "η1/η3", (0.12, 0.18), (0.1, 0.225)),
-        ("eta2", "eta3", "η2/η3", (0.12, 0.18), (0.1, 0.225)),
+    for above, below, word, equal, good, fair in (
+        ("eta2", "eta1", "η2/η1", "η2 ≈ η1", (1 / 1.5, 1.5), (0.5, 2)),
+        ("eta1", "eta3", "η1/η3", "η1 ≈ 0.15 η3", (0.12, 0.18), (0.1, 0.225)),
+        ("eta2", "eta3", "η2/η3", "η2 ≈ 0.15 η3", (0.12, 0.18), (0.1, 0.225)),
     ):
         groups = items(
             rows, lambda r, a=above, b=below: np.log(r[a] / r[b]), positive=(above, below)
         )
-        statement = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
         yield over_all(
-            f"{statement}: {word} is constant",
+            f"{word} is nearly constant",
             f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.ptp(logs)),
             groups,
@@ -63,7 +62,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
             possible=(1, np.inf),
         )
         yield over_all(
-            f"{statement}: value of {word}",
+            equal,
             f"geometric mean of {word} over μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.mean(logs)),
             groups,
@@ -208,16 +207,16 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
     wide += [row | {"made": row.get("packing_mu", row["mu"])} for row in ends] if wide else []
     for statement, what, rows, by, good, fair in (
         (
-            "η rises as cones open around the same contacts",
-            "μ of the cones, packings made without friction",
+            "η rises with the μ of the Coulomb condition, in the same packings",
+            "the μ of the Coulomb condition, packings made without friction",
             opened,
             "mu",
             (0.95, 1),
             (0.8, 1),
         ),
         (
-            "η falls as contacts vanish within the same cones",
-            f"the μ of preparation, cones at μ = {widest:g}",
+            "η is smaller in packings with fewer contacts, at the same μ in the Coulomb condition",
+            f"the μ of preparation, μ = {widest:g} in the Coulomb condition",
             wide,
             "made",
             (-1, -0.95),

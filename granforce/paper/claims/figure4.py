@@ -31,17 +31,16 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """P(ΔF_n) falls monotonically at small and large μ and has a peak in between."""
     everywhere = sampled(table, sampler)
     scaled = each(everywhere, lambda values: values / values.mean())
-    for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "each packing's own ⟨ΔF_n⟩")):
+    for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "its mean in each packing")):
         for word, span, has_peak in (
             ("small", SMALL, False),
             ("intermediate", MIDDLE, True),
             ("large", LARGE, False),
         ):
             yield at_each(
-                f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'}, "
-                f"in {unit}",
-                "fraction of the contacts too far right for a falling density "
-                "(departure; 0 if chance could explain it)",
+                f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'} "
+                f"(ΔF_n in units of {unit})",
+                "departure from a falling density",
                 within(groups, span),
                 good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
                 fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
@@ -111,7 +110,7 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         groups = middle | within(ratio, span)
         yield over_all(
             f"S is more elongated at {word} than at intermediate μ",
-            f"mean of std/mean of ΔF_n at μ in {span_text(span)} over that in {span_text(MIDDLE)}",
+            f"mean of std/mean of ΔF_n at {span_text(span)} over that at {span_text(MIDDLE)}",
             lambda keys, means, span=span: _over_middle(keys, means, span),
             dict(sorted(groups.items())),
             good=(1, np.inf),

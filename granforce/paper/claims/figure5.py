@@ -55,7 +55,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     yield at_each(
         "strong contacts are less determined at intermediate μ",
         "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
-        f"μ in {span_text(MIDDLE)}",
+        f"{span_text(MIDDLE)}",
         within(groups, MIDDLE),
         good=(1, np.inf),
         possible=POSITIVE,
@@ -66,7 +66,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Strong and undetermined contacts form different patterns at large μ."""
     groups = _marked(table, sampler, _enriched)
     yield at_each(
-        "strong contacts and undetermined ones form unrelated patterns at μ = 10",
+        "strong contacts and those with long intervals form unrelated patterns at μ = 10",
         "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all",
         within(groups, (10, 10)),
         good=(0.8, 1.25),
@@ -134,7 +134,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ):
             yield at_each(
                 f"with frozen boundary forces, {claim} ({word})",
-                f"{measured}, μ in {span_text(span)}",
+                f"{measured}, {span_text(span)}",
                 within(items(rows, what), span),
                 good=good,
                 fair=fair,

@@ -42,7 +42,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ):
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ",
-            f"mean over packings, μ in {span_text(span)}",
+            f"mean over packings, {span_text(span)}",
             within(everywhere, span),
             good=good,
             fair=fair,
@@ -58,7 +58,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
-            f"mean of μ in {span_text(span)} minus that in {span_text(MIDDLE)}",
+            f"mean over {span_text(span)} minus that over {span_text(MIDDLE)}",
             lambda keys, means, span=span: _mean_difference(keys, means, span),
             dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
             good=(-np.inf, 0),
@@ -75,10 +75,9 @@ def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
             if np.isfinite(apart):
                 groups.setdefault(row["mu"], []).append((row["n"], apart))
     yield at_each(
-        "corr(f_n, ΔF_n) at intermediate μ is of statistical origin: the same if contacts exchange "
-        "the positions of f_n in their intervals",
-        "its remainder when contacts exchange the positions of f_n in their intervals: the "
-        "correlation minus that of permuted positions",
+        "corr(f_n, ΔF_n) at intermediate μ is of statistical origin: unchanged if the relative "
+        "positions of f_n in its interval are shuffled among contacts",
+        "the correlation minus its mean for shuffled positions",
         within({mu: groups[mu] for mu in sorted(groups)}, MIDDLE),
         good=(-0.1, 0.1),
         fair=(-0.2, 0.2),
@@ -120,7 +119,7 @@ def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
-            "fraction of packings in which the range over all other networks of the walk does so",
+            "fraction of packings in which it does",
             within(items(rows, lambda r, test=test: float(test(r))), span),
             good=(0.9, np.inf),
             fair=(0.5, np.inf),

@@ -121,4 +121,6 @@ def positive_friction(groups: Groups) -> Groups:
 def span_text(span: Ends) -> str:
     """A range of μ in words."""
     low, high = span
-    return f"{low:g} … {high:g}" if np.isfinite(high) else f"{low:g} …"
+    if not np.isfinite(high):
+        return f"μ ≥ {low:g}"
+    return f"μ = {low:g} … {high:g}" if low > 0 else f"μ ≤ {high:g}"

@@ -141,7 +141,8 @@ def over_all(
     if why:
         # A number that is certainly outside the good range does not become undecided.
         outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
-        verdict = DIFFERS if outside else UNDECIDED
+        before, verdict = verdict, DIFFERS if outside else UNDECIDED
+        why = why if verdict == before else f"{before}, but {why}"
     return claim._replace(verdict=verdict, why=why)
 
 
@@ -188,7 +189,7 @@ def _turns(turned: Any, verdict: str) -> str:
     why = []
     for other in sorted(set(turned.values()) - {verdict}):
         if turned[None] == other:
-            why.append(f"{other} with another draw of means")
+            why.append(f"{other} with another draw of the means")
         left_out = [
             f"{mu:g}" for mu, direction in turned.items() if mu is not None and direction == other
         ]

@@ -6,7 +6,8 @@ Parts: opening (first picture, changes of μ, bytes), playing (painted frames a 
 crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
 loop while pages and tabs open and while it computes), watching (first moving picture, pictures and
 states a second, what watching costs), dragging (of a force, in blocks too, and of the point in
-force space: frames a second, hand to picture), memory (over open–close cycles), visitors (ten at once).
+force space: frames a second, hand to picture), memory (over open–close cycles), visitors (ten at
+once).
 Each starts a server of its own on the shipped store.
 """
 
