@@ -199,7 +199,7 @@ def _table(part: str, rows: Any) -> str:
         return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
     if part in NEEDED:
         rows = [row for row in rows if row.get(NEEDED[part]) is not None]
-    remark = _remark(part, rows) + _below(part, rows) + _worst(part, rows)
+    remark = _below(part, rows) + _worst(part, rows)
     every = tuple(dict.fromkeys(name for row in rows for name in row))
     chosen = COLUMNS.get(part, (every,))
     constant = [
@@ -247,29 +247,23 @@ def _ratio_head(part: str) -> str:
     return RELATIVE_TIME if RATIOS[part][0] == FASTER else SPEED_UP
 
 
-def _remark(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """A paragraph on the rows in which granforce is the slower one; empty if there are none."""
-    if part not in RATIOS:
-        return ""
-    words, column = RATIOS[part]
-    below = [
-        f"{next(_cell(row[name]) for name in NAMES if name in row)}, {_place(row)} "
-        f"({_cell(row[column])})"
-        for row in rows
-        if row.get(column) is not None and row[column] < 1
-    ]
-    return f"\n{words} ({_ratio_head(part)} below 1): {'; '.join(below)}.\n" if below else ""
-
-
 def _below(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """A paragraph on rows in which other ratios are below 1, for each of these."""
+    """A paragraph for each ratio of the part, on the rows in which it is below 1, if any."""
+    ratios = dict(BELOW.get(part, {}))
+    if part in RATIOS:
+        words, column = RATIOS[part]
+        ratios = {column: f"{words} ({_ratio_head(part)} below 1)"} | ratios
     text = ""
-    for column, words in BELOW.get(part, {}).items():
+    for column, words in ratios.items():
         below = [row for row in rows if row.get(column) is not None and row[column] < 1]
-        if below:
-            places = "; ".join(f"{_place(row)} ({_cell(row[column])})" for row in below)
-            text += f"\n{words}: {places}.\n"
+        places = [f"{_method(row)}{_place(row)} ({_cell(row[column])})" for row in below]
+        text += f"\n{words}: {'; '.join(places)}.\n" if places else ""
     return text
+
+
+def _method(row: Mapping[str, Any]) -> str:
+    """The method of a row with a comma, or nothing."""
+    return next((f"{_cell(row[name])}, " for name in NAMES if name in row), "")
 
 
 def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
@@ -283,8 +277,7 @@ def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
     row = worst(known, key=lambda row: row[column])
     word = "Largest" if worst is max else "Lowest"
     head = _head(part, column).removeprefix("largest ").removeprefix("worst ")
-    name = next((f"{_cell(row[name])}, " for name in NAMES if name in row), "")
-    return f"\n{word} {head}: {_cell(row[column])} ({name}{_place(row)}).\n"
+    return f"\n{word} {head}: {_cell(row[column])} ({_method(row)}{_place(row)}).\n"
 
 
 def _place(row: Mapping[str, Any]) -> str:
