@@ -11,6 +11,7 @@ the exact bounds, convergence of uniform samples).
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -336,7 +337,9 @@ def preparation(table: StudyTable) -> str:
         part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")
     ]
     variants = list(dict.fromkeys(variants))
-    lines, differences = [], []
+    lines: list[list[str]] = []
+    differences: list[_Apart] = []
+    changed: list[str] = []
     for mu in sorted({row["mu"] for row in table.part(*variants)}):
         seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
         for name in ("", *variants):
@@ -354,16 +357,21 @@ def preparation(table: StudyTable) -> str:
                     apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
                     if apart is not None:
                         differences.append(apart)
+                        changed.append(_word(name))
                         text += f" ({_difference(apart)})"
                 cells.append(text)
             if counted != {0}:
-                word = _VARIANTS.get(name, name.removeprefix("prepared_").replace("_", " "))
-                lines.append([f"{mu:g}", word, str(max(counted)), *cells])
+                lines.append([f"{mu:g}", _word(name), str(max(counted)), *cells])
     heads = ["μ", "options", "packings", *(head for head, *_ in columns)]
     text = markdown_table(heads, lines)
     if not differences:
         return text
-    return text + "\n" + _tested(differences) + _widest(table, variants)
+    return text + "\n" + _tested(differences, changed) + _widest(table, variants)
+
+
+def _word(variant: str) -> str:
+    """How the packings of a variant were made, in words."""
+    return _VARIANTS.get(variant, variant.removeprefix("prepared_").replace("_", " "))
 
 
 class _Apart(NamedTuple):
@@ -379,24 +387,31 @@ def _difference(apart: _Apart) -> str:
     return f"**{apart.errors:+.1f}**" if apart.p < 1 - statistics.LEVEL else f"{apart.errors:+.1f}"
 
 
-def _tested(differences: Sequence[_Apart]) -> str:
-    """How many differences are significant, alone and together, in sentences."""
+def _tested(differences: Sequence[_Apart], changed: Sequence[str]) -> str:
+    """How many differences are significant, alone and together, in sentences.
+
+    changed: the option that was changed, in words, for each difference.
+    """
     p = np.array([apart.p for apart in differences if np.isfinite(apart.p)])
     same, level = len(differences) - len(p), 1 - statistics.LEVEL
+    alone = int((p < level).sum())
     text = (
-        f"By Student's t, {int((p < level).sum())} of {len(p)} differences are significant at the "
+        f"By Student's t, {alone} of {len(p)} differences are significant at the "
         f"level {level:.2g} (bold; {level * len(p):.1f} expected by chance)"
     )
     if same:
         text += f"; {same} left out, as all pairs differ by the same amount"
     together = int((p < level / max(1, len(p))).sum())
-    last = (
-        f"After Bonferroni's correction, {together} remain significant."
-        if together
-        else f"None of the {len(p)} remains significant after Bonferroni's correction: these data "
-        "show no dependence on the options."
+    if together:
+        return f"{text}. After Bonferroni's correction, {together} remain significant."
+    text += f". None of the {len(p)} remains significant after Bonferroni's correction"
+    if stats.binom.sf(alone - 1, len(p), level) > level:
+        return f"{text}: so few packings show no dependence on the options."
+    counts = Counter(
+        word for word, apart in zip(changed, differences, strict=True) if apart.p < level
     )
-    return f"{text}. {last}"
+    ((most, times),) = counts.most_common(1)
+    return f"{text}, but chance would rarely make so many significant: {times} are for {most}."
 
 
 def _widest(table: StudyTable, variants: Sequence[str]) -> str:

@@ -114,8 +114,8 @@ def _maximum(of: _Numbers) -> Highlight:
     else:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
-        f" The default settings of the compaction also change at μ = {SETTLED_FROM:g}: see the "
-        "limits of the study."
+        f" The default time step of the compaction changes at μ = {SETTLED_FROM:g}; with the longer"
+        " one throughout, this maximum would be at larger μ (see the limits of the study)."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
@@ -149,7 +149,7 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     }
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
-        f"η2 also has a maximum: with μ, it rises and falls again for {names['does']}{others}.",
+        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
         "figure1_uniform",
         "measures",
     )
@@ -267,9 +267,9 @@ def _critical(of: _Numbers) -> Highlight:
         raise KeyError(claim)
     far = middle["high"] < small["low"] and large["high"] < small["low"]
     first = (
-        "Except at small friction, contacts give way well below their limit loads"
+        "Except at small friction, pushes move a packing well below their limit loads"
         if far
-        else "At intermediate friction, contacts give way below their limit loads"
+        else "At intermediate friction, pushes move a packing below their limit loads"
     )
     return Highlight(
         f"{first}: the mean critical force is {_quoted(small)} of the mean limit load at small, "
@@ -294,7 +294,7 @@ def _stability(of: _Numbers) -> Highlight:
     first = (
         f"The critical force rises {named}"
         if closely
-        else f"The critical force tends to rise {named}, but the correlation is weak"
+        else f"The critical force tends to rise {named}, but only moderately"
     )
     return Highlight(
         f"{first}: over all μ, its rank correlation is {texts}{rest}.",

@@ -521,7 +521,7 @@ def test_a_claim_has_one_verdict_and_one_for_each_sampler():
     ]
     assert rows[2][3:] == [verdicts.FEW, verdicts.FAILED]
     assert "tests 3 claims" in outcomes.score(judged)
-    assert "it reproduces 1, contradicts 1 and finds that 1 depends" in outcomes.score(judged)
+    assert "1 are reproduced (0 by the paper's own walk), 1 contradicted" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]

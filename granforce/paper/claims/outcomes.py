@@ -15,6 +15,7 @@ from granforce.paper.formatting import listed
 from granforce.types import Rows
 
 MIXED = "depends on the sampler"
+PAPERS = "gauss_seidel"  # the sampler of the paper
 # Of the verdicts by sampler, the first of these is the verdict on the claim.
 VERDICTS = (REPRODUCED, DIFFERS, FAILED, UNDECIDED, FEW, UNMEASURED, MISSING)
 # Outcome → verdicts on a claim, in the order of the tables.
@@ -52,12 +53,15 @@ def counted(claims: Rows) -> dict[str, int]:
 
 def score(claims: Rows) -> str:
     """How many claims have which outcome, in a sentence."""
-    count = counted(claims)
-    parts = [f"it reproduces {count['reproduced']}", f"contradicts {count['differ']}"]
-    parts += [f"leaves {count['open']} open (undecided or too few data)"] if count["open"] else []
+    count, paper = counted(claims), counted([c for c in claims if c["sampler"] == PAPERS])
+    parts = [
+        f"{count['reproduced']} are reproduced ({paper['reproduced']} by the paper's own walk)",
+        f"{count['differ']} contradicted ({paper['differ']} by that walk)",
+    ]
+    parts += [f"{count['open']} open (undecided or too few data)"] if count["open"] else []
     mixed = count["depend on the sampler"]
-    parts += [f"finds that {mixed} depends on how networks are sampled"] if mixed else []
+    parts += [f"{mixed} depends on how S is sampled"] if mixed else []
     return (
-        f"This study tests {sum(count.values())} claims of the paper and of an earlier letter "
-        f"(PRL 94, 178001): {listed(parts)}."
+        f"The study that ships with granforce tests {sum(count.values())} claims of the paper and "
+        f"of an earlier letter (PRL 94, 178001): {listed(parts)}."
     )
