@@ -97,6 +97,8 @@ MEANINGS = {
     "contacts_with_unbounded_f_n": "contacts whose f_n has no upper bound, as grains are wedged; "
     "not in the mean and largest extent",
     "contacts_with_unbounded_f_t": "contacts whose f_t has no bound on one or both sides",
+    "contacts_not_certified": "contacts with values that could not be certified (nan), in an "
+    "unbounded S",
     "f_n_low": "smallest f_n of this contact in any network",
     "f_n_high": "largest f_n",
     "f_t_low": "smallest f_t, negative in the other direction",
@@ -214,13 +216,14 @@ _SOLVED = ("programs", "again", "largest_duality_gap", "seconds", "cached")
 INTERVALS = (
     *("contacts", "dimension", "coordination", "exact_eta3", "mean_normal_force"),
     *("mean_extent_of_f_n", "largest_extent_of_f_n", "contacts_with_unbounded_f_n"),
-    *("contacts_with_unbounded_f_t", "correlation", "determined_contacts"),
+    *("contacts_with_unbounded_f_t", "contacts_not_certified", "correlation"),
+    "determined_contacts",
     *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
 BOUNDS = ("f_n_low", "f_t_low", "f_n_high", "f_t_high", "cluster")
 LIMIT_LOADS = (
     *("contacts", "mean_normal_force", "mean_limit_load", "least_limit_load"),
-    *("largest_limit_load", "contacts_without_a_limit", *_SOLVED),
+    *("largest_limit_load", "contacts_without_a_limit", "contacts_not_certified", *_SOLVED),
 )
 LOADS = ("limit_load",)
 LOAD_FACTOR = (

@@ -303,9 +303,9 @@ def values_and_gaps(
 
 
 def _judged(gap: Floats, accuracy: float) -> tuple[float, bool]:
-    """Largest gap, and whether all bounds are finished with small gaps."""
-    reached = gap[~np.isnan(gap)]
-    return float(reached.max(initial=0.0)), bool(np.all(gap <= accuracy))
+    """Largest gap of the certified bounds, and whether all are certified."""
+    certified = gap <= accuracy
+    return float(gap[certified].max(initial=0.0)), bool(certified.all())
 
 
 def _positions(ensemble: Ensemble, contacts: npt.ArrayLike | None) -> Integers:

@@ -57,10 +57,14 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
 
 
 def clusters_of(S: Ensemble, bounds: Intervals) -> Integers:
-    """The cluster of undetermined contacts (k,) of each contact, −1 for determined ones."""
+    """The cluster of undetermined contacts (k,) of each contact, −1 for determined ones.
+
+    Contacts whose bounds are not certified count as undetermined.
+    """
     place = S.positions(bounds.contacts)
     ends = S.contacts.i[place], S.contacts.j[place]
     extent = bounds.high - bounds.low
+    extent[np.isnan(extent)] = np.inf
     return measures.undetermined_clusters(*ends, extent, UNDETERMINED * S.force_scale)[0]
 
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from packings import REFERENCE
 from scipy import optimize
 
 import granforce as gf
@@ -223,3 +224,27 @@ def test_where_everything_is_bounded_unmeasured_forces_may_be_any():
     np.testing.assert_array_equal(
         usual.error, gf.infer(S, none, 1.0, states=20, unmeasured=1000).error
     )
+
+
+def test_bounds_that_only_enormous_forces_attain_are_left_out_by_name(tmp_path, capsys):
+    """A pile at a μ just below which more contacts wedge: all other bounds are certified."""
+    pile = gf.read_table(REFERENCE / "pile.csv", mu=1.2, walls="box", gravity=1)
+    S = gf.ensemble(pile)
+    found = gf.intervals(S)
+    left = np.isnan(found.low).any(axis=1) | np.isnan(found.high).any(axis=1)
+    assert not found.converged and 0 < left.sum() < 15 and found.max_gap <= 1e-8
+    file, table = tmp_path / "pile.npz", tmp_path / "bounds.csv"
+    gf.save_packing(pile, file)
+    run = [str(file), "--cache", str(tmp_path / "store"), "--out", str(table), "--json"]
+    for cached in (False, True):
+        assert main(["intervals", *run]) == 0
+        captured = capsys.readouterr()
+        report = json.loads(captured.out)
+        assert report["contacts_not_certified"] == left.sum() and report["cached"] is cached
+        assert f"{left.sum()} contacts have values that could not be certified" in captured.err
+        assert f": {found.contacts[left][0]}, " in captured.err
+        rows = table.read_text().splitlines()[1:]
+        assert ["nan" in row for row in rows] == left.tolist()
+        # Not certified is not determined.
+        assert all(int(row.split(",")[-1]) >= 0 for row in np.array(rows)[left])
+    assert main(["limit-loads", *run[:3], "--json"]) == 0

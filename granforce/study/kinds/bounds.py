@@ -71,7 +71,7 @@ def _intervals(
         begun(S)
     options |= {"workers": workers, "progress": progress}
     seconds, bounds = timed(intervals, S, parameters["contacts"], **options)
-    check_complete(bounds, "exact bounds")
+    check_complete(S, bounds, "exact bounds")
     return intervals_dataset(S, bounds, seconds=seconds)
 
 
@@ -82,7 +82,7 @@ def _limit_loads(
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = {"workers": workers, "progress": progress}
     seconds, loads = timed(limit_load_bounds, S, parameters["contacts"], **options)
-    check_complete(loads, "limit loads")
+    check_complete(S, loads, "limit loads")
     return limit_loads_dataset(S, loads, seconds=seconds)
 
 

@@ -152,11 +152,15 @@ def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
     return chosen
 
 
-def check_complete(result: Any, what: str) -> None:
-    """Raise Cancelled or InputError for unfinished results, which are not stored."""
+def check_complete(S: Ensemble, result: Any, what: str) -> None:
+    """Raise Cancelled or InputError for unfinished results, which are not stored.
+
+    In an unbounded S single values may stay uncertified (NaN): see `certified_values`.
+    """
     cancelling.check(what)
-    if not result.converged:
-        raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
+    if not result.converged and S.bounded:
+        worst = np.nanmax(result.gap)
+        raise InputError(f"{what} not certified: largest duality gap {worst:.1e} ⟨f_n⟩")
 
 
 PACKING = Kind(

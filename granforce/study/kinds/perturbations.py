@@ -112,7 +112,7 @@ def _perturbed(
     if not missing:
         return [parts[c] for c in chosen]
     loads = limit_load_bounds(S, missing, workers=workers)
-    check_complete(loads, "limit loads")
+    check_complete(S, loads, "limit loads")
     tell = progress or (lambda done, total: None)
 
     def ended(k: int, critical: CriticalForce) -> None:
