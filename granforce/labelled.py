@@ -231,6 +231,11 @@ def to_dataframe(
     if unit == "mean":
         if not isinstance(ensemble, Ensemble):
             raise InputError('unit="mean" needs S: gf.to_dataframe(result, S, unit="mean")')
+        if UNITS["packing"] not in {v.attrs.get("units") for v in dataset.variables.values()}:
+            raise InputError(
+                'unit="mean" changes nothing here, as no variable is known to be a force; leave it '
+                "out (a force divided by S.force_scale is in units of ⟨f_n⟩)"
+            )
         dataset = _in_mean_forces(dataset, ensemble.force_scale)
     if "contact" not in dataset.sizes:
         return _corners(dataset) if "corner" in dataset.sizes else dataset.to_dataframe()

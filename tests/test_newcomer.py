@@ -997,6 +997,10 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
         gf.walk(S, 5, state=5)
     with pytest.raises(gf.InputError, match=r"save takes a HoloViews figure, not an int"):
         gf.figures.save(3, tmp_path / "x.png")
+    with pytest.raises(gf.InputError, match=r"drawn for bokeh, .* backend=\"matplotlib\""):
+        gf.figures.save(gf.plot(S.packing), tmp_path / "x.png")
+    with pytest.raises(gf.InputError, match=r"unit=\"mean\" changes nothing here"):
+        gf.to_dataframe(gf.limit_loads(S), S, unit="mean")
     with pytest.raises(TypeError, match=r"^scan has no option 'N'; its options are seeds, n, .*dt"):
         gf.scan(tmp_path / "s.zarr", [0.1], N=30)
     with pytest.raises(TypeError, match=r"^critical_force has no option 'preciion'; .*precision"):

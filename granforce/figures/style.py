@@ -276,9 +276,9 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
     """Write a figure to a path.
 
     The suffix selects the format: a self-contained web page (.html), or a picture (.png, .svg,
-    .pdf). Figures look best if drawn for the backend that writes the file: "bokeh" for pages,
-    "matplotlib" for pictures; no browser is needed. caption: a description stored in the file: the
-    title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
+    .pdf). A figure must have been drawn for the backend that writes the file, "bokeh" for pages and
+    "matplotlib" for pictures, or for none; no browser is needed. caption: a description stored in
+    the file: the title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
     """
     path = Path(path)
     if not isinstance(figure, hv.core.Dimensioned):
@@ -286,17 +286,32 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
             f"save takes a HoloViews figure, not {with_article(type(figure).__name__)}"
         )
     if path.suffix == ".html":
+        _check_backend(figure, "bokeh")
         ready("bokeh")
         text = io.StringIO()
         title = caption or path.stem
         hv.save(figure, text, fmt="html", backend="bokeh", resources="inline", title=title)
         content = text.getvalue().encode()
     elif path.suffix in (".png", ".svg", ".pdf"):
+        _check_backend(figure, "matplotlib")
         content = _picture(figure, path.suffix.removeprefix("."), caption)
     else:
         raise InputError(f"figures are saved as .html, .png, .svg or .pdf, not {path.suffix!r}")
     with written(path) as file:
         file.write(content)
+
+
+def _check_backend(figure: hv.core.Dimensioned, needed: str) -> None:
+    """InputError if all options of the figure are for the other backend."""
+    styled = set(figure.traverse(lambda element: element.id))
+    drawn = [
+        name for name in hv.Store.registry if styled & set(hv.Store.custom_options(backend=name))
+    ]
+    if drawn and needed not in drawn:
+        raise InputError(
+            f"this figure was drawn for {drawn[0]}, but {needed} writes this kind of file; draw it "
+            f'with backend="{needed}"'
+        )
 
 
 def rendered(figure: Any) -> Any:

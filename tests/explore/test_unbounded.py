@@ -165,7 +165,7 @@ def test_the_command_reports_what_is_bounded_and_how_much_is_not(tmp_path, capsy
 
 
 def test_a_picture_of_the_intervals_is_drawn(tmp_path):
-    gf.figures.save(gf.plot(heap(), colour="interval"), tmp_path / "heap.png")
+    gf.figures.save(gf.plot(heap(), colour="interval", backend="matplotlib"), tmp_path / "heap.png")
     assert (tmp_path / "heap.png").stat().st_size > 1e4
 
 
