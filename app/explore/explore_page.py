@@ -32,7 +32,7 @@ KEYS = [
     ["N  Shift N", "select the next contact, the largest force first"],
     ["[ ]", "pull the selected force down or up"],
     ["H", "hold or release the selected force"],
-    ["Z  Esc", "undo the last pull; release all"],
+    ["Z  Esc", "undo the last pull; undo all pulls (held forces stay held)"],
     ["1 … 6", "the tabs"],
     ["?", "this list"],
 ]

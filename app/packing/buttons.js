@@ -37,7 +37,7 @@ const BUTTONS = `
       ${button("full", "full screen")}
     </div>
     <div class="bar tools">
-      ${button("undo", "the last pull (Z); Esc releases all", "Undo")}
+      ${button("undo", "the last pull (Z); Esc undoes all pulls; held forces stay held", "Undo")}
       <span class="hold-tools">
         <label title="normal force of the selected contact, in mean forces; enter a value to pull it there">fₙ
           <input class="force" type="number" min="0" step="any" aria-label="normal force of the selected contact, in mean forces"></label>

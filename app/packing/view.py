@@ -258,7 +258,7 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
         "mobilised": MOBILISED,
-        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(looks, most)),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(state, most)),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
@@ -279,10 +279,13 @@ def colours(state: AppState, pulled: str) -> dict[str, str]:
     return quantities(state, COLOURS | change)
 
 
-def _full(looks: Looks, most: float) -> str:
+def _full(state: AppState, most: float) -> str:
     """The ΔF_n of full colour, and whether it differs between packings."""
-    why = "" if looks.full else " (this packing)"
-    return f"≥ {most:.2f} ⟨fₙ⟩{why}" if most else "0: every force is determined"
+    if most:
+        return f"≥ {most:.2f} ⟨fₙ⟩{'' if state.looks.full else ' (this packing)'}"
+    if state.shown.summary["dimension"]:
+        return "(being computed)"
+    return "0: every force is determined"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:

@@ -1,6 +1,7 @@
 """The numbers of the results line: values with errors, and what they are worth in words."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,3 +87,13 @@ def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
     exact = {"low": np.zeros(3), "high": high[:, 0]}
     assert view.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
     assert np.isfinite(view.full_extent(None, exact))
+
+
+def test_an_empty_colour_scale_says_why():
+    def end(dimension, most=0.0, full=None):
+        shown = SimpleNamespace(summary={"dimension": dimension})
+        return view._full(SimpleNamespace(shown=shown, looks=SimpleNamespace(full=full)), most)
+
+    assert end(0) == "0: every force is determined"
+    assert end(51) == "(being computed)"
+    assert end(51, 2.5) == "≥ 2.50 ⟨fₙ⟩ (this packing)" and end(51, 2.5, 2.5) == "≥ 2.50 ⟨fₙ⟩"
