@@ -13,7 +13,7 @@ from ..results.planes import Plane
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.known import Knowledge
-from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Appearance, Looks
+from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Appearance
 from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
 from .player import Player, frames
 
