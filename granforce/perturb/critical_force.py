@@ -47,7 +47,7 @@ from granforce.records import (
     worker_count,
 )
 from granforce.system import cancelling
-from granforce.tolerances import INTERVAL_GAP
+from granforce.tolerances import INTERVAL_GAP, LARGEST_UNIT
 from granforce.types import Cancel, Floats, Integers, Mask
 
 # Fraction of the way from the last load at rest to the limit load of the next load.
@@ -172,6 +172,8 @@ def critical_forces(
         limit_loads = real_array(limit_loads, "limit loads")
         if limit_loads.shape != positions.shape or np.any(limit_loads < 0):
             raise InputError(f"give one limit load ≥ 0 for each of the {len(positions)} contacts")
+        if np.any(np.isfinite(limit_loads) & (limit_loads > LARGEST_UNIT * S.force_scale)):
+            raise InputError(f"a limit load is beyond {LARGEST_UNIT:g} times the mean normal force")
     given = limit_loads is not None
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
