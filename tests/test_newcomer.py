@@ -215,8 +215,10 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
     "measure P --states 4": set(),
     "uniform P --states 8": {"reached"},
     "volume P --accuracy 0.5": set(),
-    "intervals P --contacts 0,1": {"contacts_with_unbounded_f_n", "contacts_with_unbounded_f_t"},
-    "limit-loads P --contacts 0": {"contacts_without_a_limit"},
+    "intervals P --contacts 0,1": {
+        *("contacts_with_unbounded_f_n", "contacts_with_unbounded_f_t", "contacts_not_certified"),
+    },
+    "limit-loads P --contacts 0": {"contacts_without_a_limit", "contacts_not_certified"},
     "stress P --angles 4": set(),
     "perturb P --random 1": {"critical_force_deciles"},
     "informative P --states 40 --best 2 --check 1": set(),
