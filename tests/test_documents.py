@@ -262,7 +262,7 @@ def changed(told, statement, sampler="", **numbers):
             "η2(μ) is not monotonic",
             "uniform",
             {"verdict": "reproduced"},
-            r"falls again for [^.;]*uniform",
+            r"then falls for [^.;]*uniform",
         ),
         (highlights.PEAK, "", {"high": 4.0}, "longest at one friction coefficient"),
         (highlights.STRONG, "", {"low": -0.1}, "Whether strong contacts have longer"),
