@@ -36,7 +36,7 @@ from granforce.paper.claims.outcomes import MIXED, OUTCOMES, VERDICTS, by_claim,
 from granforce.paper.claims.verdicts import FEW, UNMEASURED
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
-from granforce.paper.tables import StudyTable
+from granforce.paper.tables import StudyTable, packings_at_each, seeds_at
 from granforce.records import InputError
 from granforce.types import Rows
 
@@ -509,14 +509,9 @@ def counts(table: StudyTable) -> str:
         rows = table.part(part)
         for n in sorted({row["n"] for row in rows}):
             some = [row for row in rows if row["n"] == n]
-            # Several packings may have the same friction of cones.
-            seeds_at: dict[Any, set[int]] = {}
-            for row in some:
-                seeds_at.setdefault(row.get("packing_mu", row["mu"]), set()).add(row["seed"])
-            each = sorted({len(seeds) for seeds in seeds_at.values()})
-            span = f"{each[0]}" if len(each) == 1 else f"{each[0]} to {each[-1]}"
+            places, each = str(len(seeds_at(some))), packings_at_each(some)
             versions = [_version(some, name) for name in ("version", "packing_version")]
-            lines.append([part, _content(part), str(n), str(len(seeds_at)), span, *versions])
+            lines.append([part, _content(part), str(n), places, each, *versions])
     heads = ("part", "content", "disks", "values of μ", "packings at each")
     heads += ("version", "version of packings")
     return markdown_table(heads, lines)

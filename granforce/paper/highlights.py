@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
 from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
-from granforce.paper.tables import StudyTable
+from granforce.paper.tables import StudyTable, packings_at_each
 from granforce.types import Rows
 
 PEAK = "μ where exact η3 is largest"
@@ -78,14 +78,7 @@ class _Numbers:
 
     def packings(self, part: str) -> str:
         """How many packings a part has at each μ."""
-        counts = sorted({len(group) for group in self._seeds(part).values()})
-        return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-
-    def _seeds(self, part: str) -> dict[float, set[int]]:
-        seeds: dict[float, set[int]] = {}
-        for row in self.table.part(part):
-            seeds.setdefault(row["mu"], set()).add(row["seed"])
-        return seeds
+        return packings_at_each(self.table.part(part))
 
     def mean(self, sampler: str, name: str, mu: float, factor: float = 1.0) -> str:
         """Mean ± standard error over packings at one μ."""

@@ -23,7 +23,7 @@ from granforce.study import cells, kinds
 from granforce.study.cells import packing_version
 from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
-from granforce.types import Floats, Integers
+from granforce.types import Floats, Integers, Rows
 
 VERSION = 1
 
@@ -266,6 +266,21 @@ def _counted(dataset: xr.Dataset) -> Floats:
     """Counts of f_n of the states, in the bins with edges FORCES."""
     normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
     return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
+
+
+def seeds_at(rows: Rows) -> dict[float, set[int]]:
+    """{μ at which packings were made: their seeds}; packings may share the friction of cones."""
+    seeds: dict[float, set[int]] = {}
+    for row in rows:
+        mu = row["packing_mu"] if "packing_mu" in row else row["mu"]
+        seeds.setdefault(mu, set()).add(row["seed"])
+    return seeds
+
+
+def packings_at_each(rows: Rows) -> str:
+    """The number of packings at each μ, in words: "10", or "10 to 30"."""
+    counts = sorted(map(len, seeds_at(rows).values())) or [0]
+    return f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
 
 
 def merged(new: StudyTable, old: StudyTable) -> StudyTable:

@@ -1,6 +1,5 @@
 """The paper's Figures 1, 4 and 6 from the finished study, and sentences from its numbers."""
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -9,6 +8,7 @@ from bokeh.models import DataRange1d
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
+from granforce.paper.tables import packings_at_each
 
 from ....results import distributions, study_data
 from ....results.distributions import Row
@@ -70,7 +70,7 @@ class Indeterminacy:
             f"<b>Maxima in nearest-network walks: {_maxima(self.lines)}.</b> "
             "Friction widens the range of forces at each contact, but packings made with more "
             f"friction have fewer contacts: z falls from {z[0][1]:.2f} to {z[-1][1]:.2f} (inset). "
-            f"{_in_the_paper()}Points: means over {packings(walks)} packings of 400 "
+            f"{_in_the_paper()}Points: means over {packings_at_each(walks)} packings of 400 "
             "disks, with standard errors; open symbols: the packing on screen. Click a point to "
             "open or compute such a packing."
         )
@@ -201,13 +201,6 @@ class Correlations:
             f"{with_error(most, error)}, at μ = {mu:g}. 1: the strongest contacts are the least "
             "determined; 0: unrelated."
         )
-
-
-def packings(rows: Iterable[Row]) -> str:
-    """The number of packings per friction: "10 to 30"."""
-    counts = Counter(row["mu"] for row in rows).values()
-    least, most = min(counts, default=0), max(counts, default=0)
-    return str(most) if least == most else f"{least} to {most}"
 
 
 def _small(fig: Figure) -> None:
