@@ -36,7 +36,6 @@ from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.system.plain import counted
 from granforce.system.terminal import print_notes, print_report, report_after
-from granforce.types import Mask
 
 # Of COUNTS, which also has the work done.
 LOADS = ("loads_at_rest", "loads_moving", "loads_undecided")
@@ -109,6 +108,7 @@ def intervals(arguments: argparse.Namespace) -> None:
     forces = unit(arguments, dataset)
     low, high = (dataset[side].values for side in ("low", "high"))
     bounded, certified = np.isfinite(high - low), ~(np.isnan(low) | np.isnan(high))
+    left = dataset["backbone"].values[~certified.all(axis=1)].tolist()
     # Entries of earlier versions also have positions of determined forces.
     position = np.full(len(low), np.nan)
     if (whole := bounded.all(axis=1)).any():
@@ -124,7 +124,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "exact_eta3": dataset["eta3"].item(),
         **forces.reported(extents(dataset)),
         **_without_limit(bounded | ~certified),
-        **_uncertified(dataset, np.asarray(certified.all(axis=1))),
+        **({"contacts_not_certified": len(left)} if left else {}),
         "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
@@ -143,21 +143,19 @@ def intervals(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
+    _name_uncertified(left)
 
 
-def _uncertified(dataset: xr.Dataset, certified: Mask) -> dict[str, int]:
-    """Number of contacts without certified values, with a note that names them; if any."""
-    if certified.all():
-        return {}
-    left = [str(contact) for contact in dataset["backbone"].values[~certified]]
-    print_notes(
-        [
-            f"{counted(len(left), 'contact has', 'contacts have')} values that could not be "
-            f"certified (nan): {brief_list(left)}; only networks with other forces far above "
-            "10⁴ ⟨f_n⟩ attain them; try a slightly different friction coefficient"
-        ]
-    )
-    return {"contacts_not_certified": len(left)}
+def _name_uncertified(contacts: list[int]) -> None:
+    """A note on contacts without certified values, if any."""
+    if contacts:
+        print_notes(
+            [
+                f"{counted(len(contacts), 'contact has', 'contacts have')} values that could not "
+                f"be certified (nan): {brief_list(contacts)}; only networks with other forces far "
+                "above 10⁴ ⟨f_n⟩ attain them; try a slightly different friction coefficient"
+            ]
+        )
 
 
 def _without_limit(bounded: Any) -> dict[str, int]:
@@ -182,12 +180,12 @@ def limit_loads(arguments: argparse.Namespace) -> None:
             "least_limit_load": float(finite.min()),
             "largest_limit_load": float(finite.max()),
         }
-    without = int(np.isinf(load).sum())
+    without, left = int(np.isinf(load).sum()), dataset["backbone"].values[np.isnan(load)].tolist()
     lines = {
         "contacts": len(load),
         **forces.reported(reported),
         **({"contacts_without_a_limit": without} if without else {}),
-        **_uncertified(dataset, ~np.isnan(load)),
+        **({"contacts_not_certified": len(left)} if left else {}),
         **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
@@ -196,6 +194,7 @@ def limit_loads(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
+    _name_uncertified(left)
 
 
 def load_factor(arguments: argparse.Namespace) -> None:
