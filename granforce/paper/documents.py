@@ -338,8 +338,7 @@ def preparation(table: StudyTable) -> str:
     ]
     variants = list(dict.fromkeys(variants))
     lines: list[list[str]] = []
-    differences: list[_Apart] = []
-    changed: list[str] = []
+    differences: list[tuple[str, _Apart]] = []
     for mu in sorted({row["mu"] for row in table.part(*variants)}):
         seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
         for name in ("", *variants):
@@ -356,8 +355,7 @@ def preparation(table: StudyTable) -> str:
                 if name and rows:
                     apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
                     if apart is not None:
-                        differences.append(apart)
-                        changed.append(_word(name))
+                        differences.append((_word(name), apart))
                         text += f" ({_difference(apart)})"
                 cells.append(text)
             if counted != {0}:
@@ -366,7 +364,7 @@ def preparation(table: StudyTable) -> str:
     text = markdown_table(heads, lines)
     if not differences:
         return text
-    return text + "\n" + _tested(differences, changed) + _widest(table, variants)
+    return text + "\n" + _tested(differences) + _widest(table, variants)
 
 
 def _word(variant: str) -> str:
@@ -387,12 +385,9 @@ def _difference(apart: _Apart) -> str:
     return f"**{apart.errors:+.1f}**" if apart.p < 1 - statistics.LEVEL else f"{apart.errors:+.1f}"
 
 
-def _tested(differences: Sequence[_Apart], changed: Sequence[str]) -> str:
-    """How many differences are significant, alone and together, in sentences.
-
-    changed: the option that was changed, in words, for each difference.
-    """
-    p = np.array([apart.p for apart in differences if np.isfinite(apart.p)])
+def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
+    """How many differences (options in words, difference) are significant, in sentences."""
+    p = np.array([apart.p for _, apart in differences if np.isfinite(apart.p)])
     same, level = len(differences) - len(p), 1 - statistics.LEVEL
     alone = int((p < level).sum())
     text = (
@@ -407,9 +402,7 @@ def _tested(differences: Sequence[_Apart], changed: Sequence[str]) -> str:
     text += f". None of the {len(p)} remains significant after Bonferroni's correction"
     if stats.binom.sf(alone - 1, len(p), level) > level:
         return f"{text}: so few packings show no dependence on the options."
-    counts = Counter(
-        word for word, apart in zip(changed, differences, strict=True) if apart.p < level
-    )
+    counts = Counter(word for word, apart in differences if apart.p < level)
     ((most, times),) = counts.most_common(1)
     return f"{text}, but chance would rarely make so many significant: {times} are for {most}."
 
