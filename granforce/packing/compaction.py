@@ -22,7 +22,7 @@ from granforce.numerics.lanes import compiled
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
-from granforce.packing.settling import come_to_rest
+from granforce.packing.settling import SEVERAL, come_to_rest
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -46,9 +46,8 @@ INITIAL_FRACTION = 0.5
 # NEARLY_BALANCED in a step, in ⟨f_n⟩.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
-# From SEVERAL disks on, later by the square of their number: a system of the last phase then costs
-# far more than a sweep, and the many places where grains still move need many systems.
-SEVERAL = 2000
+# Beyond SEVERAL disks, later by the square of their number: the many places where grains still move
+# need many systems.
 # Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
 # than shorter ones, by 8 % at μ = 0.3, 13 % at 0.5, half at 1. Steps of 0.03 and less agree if the
 # last sweeps of a step settle, and then a quarter of the sweeps is enough.

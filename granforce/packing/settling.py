@@ -43,8 +43,10 @@ SOFTNESS = 1e-6
 # Displacement after which the geometry is updated, in largest radii: the neglected quadratic terms
 # of the gaps change forces by a hundredth.
 STRIDE = 0.1 * SOFTNESS**0.5
-# Implicit steps between two calls of `look`; linear systems after which the dynamics takes over.
-STEPS_A_LOOK, MOST_SYSTEMS = 50, 500
+# Implicit steps between two calls of `look`; linear systems after which the dynamics takes over:
+# fewer beyond SEVERAL disks, in inverse proportion to their number, as a system then costs far more
+# than a sweep.
+STEPS_A_LOOK, MOST_SYSTEMS, SEVERAL = 50, 500, 2000
 FIRST_PACE = 100.0
 # Pairs closer than NEAR take part; they are chosen again once two grains may have approached by
 # APPROACHED (both in largest radii).
@@ -114,7 +116,9 @@ def _creep(
     """Overdamped motion; returns whether everything came to rest."""
     pace = FIRST_PACE
     counts, near, ended = np.zeros(3, dtype=np.int64), None, overdamped.MOVED
-    while counts[overdamped.SYSTEMS] < MOST_SYSTEMS:
+    fewer = min(1.0, SEVERAL / len(motion.r))
+    steps = max(1, round(fewer * STEPS_A_LOOK))
+    while counts[overdamped.SYSTEMS] < fewer * MOST_SYSTEMS:
         cancelling.check("compaction")
         motion, near = _chosen(motion, near)
         place = _place(motion, near, mu)
@@ -125,7 +129,7 @@ def _creep(
         velocity.rows[place.grains, 0] = motion.velocity
         velocity.border[:, 0] = motion.dilation.ravel()
         ended = overdamped.move(
-            place.step, moving, SOFTNESS, STRIDE, STEPS_A_LOOK, counts, cancelling.flag()
+            place.step, moving, SOFTNESS, STRIDE, steps, counts, cancelling.flag()
         )
         pace = float(moving.flows.pace[0, 0])
         motion.velocity[:] = velocity.rows[place.grains, 0]

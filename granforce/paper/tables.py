@@ -350,8 +350,8 @@ def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
     """
     first: dict[Any, Any] = {}
     for row in rows:
-        # Packings of small friction are made by another algorithm, which has its own version.
-        made_by = packing_version(row.get("packing_mu", row["mu"]))
+        # Packings of small friction, and large ones, are made by algorithms with other versions.
+        made_by = packing_version(row.get("packing_mu", row["mu"]), row["n"])
         for group, version in zip((row["part"], made_by), _versions(row), strict=True):
             other = first.setdefault(group, (row, version))
             if other[1] != version:

@@ -10,24 +10,27 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from granforce.packing.compaction import NEARLY_FRICTIONLESS
+from granforce.packing.settling import SEVERAL
 from granforce.records import InputError
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 from granforce.types import Cancel, Progress
 
-# Versions of the algorithms that make packings certified to be at rest: of dynamics alone, and of
-# small friction, where linear programs finish them.
-PACKING_VERSION, FINISHED_VERSION = 7, 8
+# Versions of the algorithms that make packings certified to be at rest: of dynamics alone, the same
+# for more than SEVERAL disks, and of small friction, where linear programs finish them.
+PACKING_VERSION, LARGE_VERSION, FINISHED_VERSION = 7, 9, 8
 
 
-def packing_version(mu: float) -> int:
-    """The version of `pack` at this friction.
+def packing_version(mu: float, disks: int) -> int:
+    """The version of `pack` at this friction, for this number of disks.
 
     It is among the parameters of a packing, so that it enters the key of everything that depends on
     the packing.
     """
-    return FINISHED_VERSION if 0 < mu <= NEARLY_FRICTIONLESS else PACKING_VERSION
+    if mu > NEARLY_FRICTIONLESS:
+        return LARGE_VERSION if disks > SEVERAL else PACKING_VERSION
+    return FINISHED_VERSION if mu > 0 else PACKING_VERSION
 
 
 def _unchanged(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
@@ -123,7 +126,7 @@ def is_current(kind: Kind, entry: Entry) -> bool:
         return False
     if not isinstance(packing, dict) or "n" not in packing:  # imported: named by its contents
         return True
-    return bool(packing.get("version") == packing_version(packing["mu"]))
+    return bool(packing.get("version") == packing_version(packing["mu"], packing["n"]))
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")

@@ -241,3 +241,10 @@ def test_public_names_are_what_they_say():
             assert callable(public) or inspect.ismodule(public), name
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = granforce.nothing
+
+
+def test_packings_of_different_algorithms_have_different_versions():
+    few, many = (kinds.PACKING.parameters(n, 0.1, 1)["version"] for n in (2000, 2001))
+    small, none = (kinds.PACKING.parameters(2001, mu, 1)["version"] for mu in (1e-4, 0))
+    assert len({few, many, small}) == 3
+    assert none == few  # the number of disks matters to overdamped motion alone

@@ -65,7 +65,7 @@ def _packing_parameters(
         "box_mass": moderate(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy", most=COARSEST),
-        "version": packing_version(mu),
+        "version": packing_version(mu, n),
         # Only if not the default, so that keys of other packings stay valid.
         **({} if check_box(box) == "square" else {"box": box}),
         **({} if drag_below is None else {"drag_below": drag_below}),
