@@ -97,28 +97,28 @@ TERMS = {
     ),
     "extent": Term(
         "extent of a force",
-        "Largest minus smallest fₙ of one contact, over all of S (exact) or over the states seen; "
-        "the latter grows with their number.",
+        "Largest minus smallest fₙ of one contact, over all of S (exact) or over the networks "
+        "seen; the latter grows with their number.",
         "ΔFₙ",
     ),
     "eta1": Term(
         "indeterminacy by spread",
-        "How much a contact's force scatters over the states, relative to the mean force: 0 if "
+        "How much a contact's force scatters over the networks, relative to the mean force: 0 if "
         "determined, 0.1 for a scatter of a tenth.",
         "η1",
     ),
     "eta2": Term(
         "indeterminacy by distance",
-        "The typical distance between two states in force space, relative to the size of the "
-        "mean state.",
+        "The typical distance between two networks in force space, relative to the size of the "
+        "mean network.",
         "η2",
     ),
     "eta3": Term(
         "indeterminacy by intervals",
-        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints; "
-        "times 0.15, it is comparable to η1 and η2. The value seen grows with the number of "
-        "networks and has no standard error. It can exceed the exact one, because their midpoints "
-        "differ.",
+        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints, "
+        "which are signed for fₜ; times 0.15, it is comparable to η1 and η2. The value seen grows "
+        "with the number of networks and has no standard error. It can exceed the exact one, "
+        "because their midpoints differ.",
         "η3",
     ),
     "width": Term(
@@ -165,14 +165,14 @@ TERMS = {
     ),
     "ess": Term(
         "effective sample size",
-        "How many independent states the sample is worth, for the force that is sampled least "
+        "How many independent networks the sample is worth, for the force that is sampled least "
         "well.",
         "ESS",
     ),
     "limit_load": Term(
         "limit load",
         "The largest pair of opposite forces, along the normal of one contact, that pushes its "
-        "grains apart and for which a balanced network exists, whatever the history. The pair "
+        "disks apart and for which a balanced network exists, whatever the history. The pair "
         "counts in the balance like fₙ, but not for the friction of the contact: the limit load is "
         "the largest fₙ − |fₜ|/μ, at most the largest fₙ.",
     ),
@@ -217,7 +217,7 @@ TERMS = {
     "informative": Term(
         "which measurement next",
         "The contacts whose fₙ, once known, would leave the shortest intervals on average: "
-        "selected by the covariance of forces over uniform states, then ranked by exact bounds.",
+        "selected by the covariance of forces over uniform networks, then ranked by exact bounds.",
     ),
     "seen": Term(
         "seen",
@@ -231,7 +231,8 @@ TERMS = {
         "out of the equations.",
     ),
     "unloaded": Term(
-        "unloaded contact", "The bodies touch, but no balanced network has a force at this contact."
+        "contact without force",
+        "The disks touch, but no balanced network has a force at this contact.",
     ),
     "no_friction": Term(
         "forces along contacts",
@@ -264,13 +265,13 @@ TERMS = {
     "walk": Term(
         "random walk",
         "Each step kicks all forces at random, then restores balance: by moving to the nearest "
-        "network, or, in the paper's walk, by sweeps. Most of its states lie on the boundary of "
+        "network, or, in the paper's walk, by sweeps. Most of its networks lie on the boundary of "
         "S: they are not uniform in S. Projected from many dimensions onto two, even boundary "
         "points can fall near the middle.",
     ),
     "uniform": Term(
         "uniform in S",
-        "States drawn so that every part of S is visited in proportion to its volume.",
+        "Networks drawn so that every part of S is visited in proportion to its volume.",
     ),
     "accelerated": Term(
         "nearest-network walk",
@@ -357,7 +358,7 @@ TERMS = {
     "seed": Term(
         "seed", "The starting value of the random numbers: the same seed gives the same packing."
     ),
-    "states": Term("states", "The number of force networks generated for this packing."),
+    "states": Term("networks", "The number of force networks generated for this packing."),
     "packed_mu": Term(
         "friction during packing",
         "The friction with which the packing was made, if it differs from the friction of its "
@@ -365,7 +366,7 @@ TERMS = {
     ),
     "store": Term(
         "precomputed results",
-        "States computed earlier and kept, listed with the values of μ available: some came "
+        "Networks computed earlier and kept, listed with the values of μ available: some came "
         "with the page, others were computed here.",
     ),
     "study": Term(

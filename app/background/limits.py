@@ -56,7 +56,7 @@ DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, with the number of 
 # Name in words and range of each parameter: up to the limit, or in which the dynamics makes sense.
 NAMES: dict[str, tuple[str, float, float | None]] = {
     "n": ("N", 1, None),
-    "states": ("the number of states", 1, None),
+    "states": ("the number of networks", 1, None),
     "upload": ("an upload's size in MB", 1, None),
     "mu": ("the friction coefficient", 0, 1000),
     "seed": ("a seed", 0, MOST_SEED),

@@ -73,7 +73,12 @@ class Controls:
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = Select(label="Networks from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
-        self.series = Select(label="Precomputed results", **LIST | {"width": 480})
+        self.series = Select(
+            label="Precomputed results",
+            margin=FIELD["margin"],
+            max_width=580,
+            sizing_mode="stretch_width",
+        )
         self.go = pmui.Button(label="Compute", color="primary", visible=False, margin=0, sx=PLAIN)
         self.command = CopyButton(label="Copy CLI command", **FIELD)
         self.opens = Disclosure(line=MADE, margin=0)

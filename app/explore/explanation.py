@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ..results import study_data
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..widgets.header import Header
@@ -15,7 +16,7 @@ FRICTION = (
     "lets each contact carry a wider range of forces, but a packing made with more friction "
     "comes to rest with fewer contacts, so fewer forces are free. With little friction many "
     "directions are open, but narrow; with a lot of it few, but wide: the indeterminacy "
-    "rises and then falls, and is largest around μ = 0.2 to 0.3.</p>"
+    "rises and then falls{}.</p>"
 )
 
 
@@ -78,7 +79,13 @@ def rest(replay: Replay) -> str:
         f"<p><b>Around the picture.</b> Dashed: the box{_sides(replay)}; disks outside it are "
         "periodic copies of those inside.</p>"
     )
-    return worded(replay, text) if replay.outlines else text + FRICTION + around
+    return worded(replay, text) if replay.outlines else text + FRICTION.format(_largest()) + around
+
+
+def _largest() -> str:
+    """The μ of the largest indeterminacy in the study, in words; empty without the study."""
+    near = {f"{peak['value']:.1g}" for peak in study_data.maxima()}
+    return f", and is largest near μ = {' to '.join(sorted(near))}" if near else ""
 
 
 def _sides(replay: Replay) -> str:

@@ -17,6 +17,7 @@ from ..state.app_state import AppState
 from ..widgets.header import Header
 from ..widgets.hints import Hints
 from ..widgets.page_frame import framed
+from ..widgets.unfolding import Unfolding
 from . import explanation
 from .controls import Controls
 from .page_address import Address
@@ -37,6 +38,15 @@ KEYS = [
     ["?", "this list"],
 ]
 
+# At the foot of a scrolled part: letters fade there instead of being cut. Once the end of the
+# content is in view, the shade is below it.
+SHADE = {
+    "content": '""', "flex": "none", "position": "sticky", "bottom": 0, "zIndex": 2,
+    "height": "28px", "background": "linear-gradient(transparent, var(--paper) 85%)",
+    "pointerEvents": "none",
+}  # fmt: skip
+SCROLLED = ":host > * { max-height: none; }"  # as high as its content: the shade follows it
+
 # Below 900 px everything is in one column. Above, the page is one screen high: the packing is a
 # square of the available height, with tabs and results next to it; from 1800 px on force space has
 # its own column between them (player.js).
@@ -56,7 +66,7 @@ GRID = {
         "content": "var(--waiting, none)", "position": "sticky", "top": "64px", "height": 0,
         "paddingLeft": "24px", "whiteSpace": "nowrap", "zIndex": 2, "color": "var(--quiet)",
     },
-    "& .status.urgent": {"position": "sticky", "bottom": 0, "zIndex": 5},
+    "& .status.urgent": {"flex": "none", "position": "sticky", "bottom": 0, "zIndex": 5},
     "@media (min-width: 900px)": {
         "& .main-content": {
             "gridTemplate": (
@@ -76,13 +86,18 @@ GRID = {
         },
         "& .panels": {
             "gridArea": "panels", "height": "auto", "overflow": "hidden auto",
-            "padding": "0 14px 0 0", "marginLeft": "-10px",
+            "padding": "0 14px 0 0", "marginLeft": "-10px", "scrollPadding": "44px 0 32px",
+            "isolation": "isolate",  # its shade is below force space
         },
+        "& .panels::after, & .space::after": SHADE,
         "& .space": {
             "gridArea": "panels", "height": "auto", "overflow": "hidden auto", "zIndex": 1,
             "padding": "0 14px 0 0", "margin": "44px 0 0 -10px",  # below the titles of the tabs
         },
-        "& .results": {"gridArea": "results", "padding": "4px 24px 8px 0"},
+        "& .results": {
+            "gridArea": "results", "padding": "4px 12px 8px", "margin": "0 24px 0 -12px",
+            "background": "var(--ground)", "borderRadius": "6px",
+        },
         "& .status": {"gridArea": "status"},
     },
     "@media (min-width: 1800px)": {
@@ -135,8 +150,9 @@ class _Around:
         self.header.link(state.looks, dark="dark")
         self.address = Address(state)  # created before the visitor can change the view
         self.side, self.controls = side, pn.Column(css_classes=["controls"], **WIDE)
-        self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **WIDE)
-        self.panels = pn.Column(css_classes=["panels"], **WIDE)
+        scrolled = WIDE | {"stylesheets": [SCROLLED]}
+        self.space = pn.Column(visible=False, css_classes=["space", "in-plane"], **scrolled)
+        self.panels = pn.Column(css_classes=["panels"], **scrolled)
         self.results = pn.Column(css_classes=["results"], **WIDE)
         self.status = StatusLine(state, css_classes=["status"], **WIDE)
         self.columns = [
@@ -158,6 +174,6 @@ class _Around:
         yield from tabs.filling(state.looks.tab)
         if state.looks.wide:
             yield from tabs.filling("plane")
-        self.panels.extend([self.address, Hints()])
+        self.panels.extend([self.address, Hints(), Unfolding()])
         explanation.follow(state, self.header)
         state.read_ahead()

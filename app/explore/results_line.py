@@ -123,8 +123,9 @@ def _dashes(quantities: Iterable[Quantity]) -> list[str]:
 
 
 def _named(quantity: Quantity, value: str) -> str:
-    """A value after its symbol, which is seen where a low window leaves no room for titles."""
-    return f'<i class="symbol">{term(quantity.key, quantity.symbol)}</i> {value}'
+    """A value after its symbol and name, seen where a low window leaves no room for titles."""
+    name = f'<span class="name"> {quantity.words}</span>'
+    return f'<i class="symbol">{term(quantity.key, quantity.symbol)}{name}</i> {value}'
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

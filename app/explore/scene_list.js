@@ -1,11 +1,12 @@
 // The list of scenes: choosing one opens its page, in the same theme, and with the friction if it
 // was chosen.
 
+import { sceneOptions } from "../browser/scene_options.js"
+
 export function render({ model }) {
   const root = document.createElement("label")
   root.className = "scenelist"
-  root.innerHTML = `Scene <select aria-label="Scene">${model.titles.map(([name, title]) =>
-    `<option value="${name}">${title}</option>`).join("")}</select>`
+  root.innerHTML = `Scene <select aria-label="Scene">${sceneOptions(model.titles, "Explore")}</select>`
   const list = root.querySelector("select")
   const show = () => {
     list.value = model.shown

@@ -16,12 +16,12 @@ IMPORTED = "imported"  # listed only while such a packing is on screen
 class SceneList(Scripted):
     """Names of all scenes; choosing one opens it; see scene_list.js."""
 
-    titles = param.List(doc="[name, title] of every scene")
+    titles = param.List(doc="[name, title, page] of every scene")
     shown = param.String(default=scene_links.MANY)
     usual = param.Number(doc="μ of the scene on screen, which is not taken along")
 
     def __init__(self, **params: Any) -> None:
-        titles = [*scene_links.titles(), [IMPORTED, "Your packing"]]
+        titles = [*scene_links.titles(), [IMPORTED, "Your packing", "Explore"]]
         super().__init__(titles=titles, **params)
         self.follow({})
 

@@ -26,7 +26,7 @@ def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
-            f"colour: {colours(state, pulled)[looks.colour]}.",
+            f"colour: {quantities(state, colours(pulled))[looks.colour]}.",
             origin(state.cell),
             *([] if moving else [f"{network(state)}."]),
             *known_words(state),

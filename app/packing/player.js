@@ -19,7 +19,7 @@ import { Split } from "./drawing/split_view.js"
 import { Sway } from "./drawing/displacement.js"
 
 const PLOTS_MS = 30 // shortest time between two repaints of the plots while a force is pulled
-const OLD = 0.88 // opacity of outdated results, which are also grey but still legible
+const OLD = 0.9 // opacity of outdated results, which are also grey but still legible
 const NO_ERROR = "Enter an error bar of 0 or more, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // after which a moved view is stored in the link
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")

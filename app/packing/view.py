@@ -32,7 +32,7 @@ LEGEND = """
 <label data-term="{width_term}">Width {width}</label>
 <span>up to <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
-  </svg> {shown:.3g} ⟨fₙ⟩</span>
+  </svg> {shown:.3g} ⟨fₙ⟩{wide_bounds}</span>
 <span tabindex="0" data-term="rattler">pale disks: no force</span>
 <details><summary>Scales</summary>
 <label title="auto: for ΔFₙ, its {saturation:g} quantile in this packing">colours full at
@@ -258,31 +258,39 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
     return {
         "mobilised": MOBILISED,
-        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), _full(state, most)),
+        "extent": (
+            "0",
+            list(palettes(looks.dark)["extent"][::8]),
+            _full(state, most, _bounds(state)),
+        ),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
-        "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
+        "known": ("0", list(palettes(looks.dark)["known"][::8]), "all of the interval"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
 
 
 def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
-    """Labels {name: words}, COLOURS or WIDTHS; those of intervals say whether they are exact."""
-    exact = exact_intervals(state.possible, state.shown)
-    return labels | {"extent": f"{labels['extent']}, {state.bounds if exact else 'seen'}"}
+    """Labels {name: words} for captions; those of intervals say whether they are exact."""
+    return labels | {"extent": f"{labels['extent']}, {_bounds(state)}"}
 
 
-def colours(state: AppState, pulled: str) -> dict[str, str]:
+def _bounds(state: AppState) -> str:
+    """The kind of the intervals that lines show, in words."""
+    return state.bounds if exact_intervals(state.possible, state.shown) else "seen"
+
+
+def colours(pulled: str) -> dict[str, str]:
     """The labels of COLOURS; pulled: "pull" or "push" if that led to the network on screen."""
-    change = {"change": f"change by the {pulled}"} if pulled else {}
-    return quantities(state, COLOURS | change)
+    return COLOURS | ({"change": f"change by the {pulled}"} if pulled else {})
 
 
-def _full(state: AppState, most: float) -> str:
-    """The ΔF_n of full colour, and whether it differs between packings."""
+def _full(state: AppState, most: float, bounds: str) -> str:
+    """The ΔF_n of full colour, of which bounds, and whether it differs between packings."""
     if most:
-        return f"≥ {most:.2f} ⟨fₙ⟩{'' if state.looks.full else ' (this packing)'}"
+        this = "" if state.looks.full else ", this packing"
+        return f"≥ {most:.2f} ⟨fₙ⟩ ({bounds}{this})"
     if state.shown.summary["dimension"]:
         return "(being computed)"
     return "0: every force is determined"
@@ -318,13 +326,14 @@ def legend(state: AppState, pulled: str = "") -> str:
     shown = min(widest, LARGE)
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
     return worded(replay, LEGEND).format(
-        width=_chosen(state, "thickness", quantities(state, WIDTHS)),
+        width=_chosen(state, "thickness", WIDTHS),
         shown=shown,
         high=6 + 6 * shown / widest,
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=_chosen(state, "colour", colours(state, pulled)),
+        colour=_chosen(state, "colour", colours(pulled)),
+        wide_bounds=f" ({_bounds(state)})" if looks.thickness == "extent" else "",
         bar=bar,
         saturation=SATURATION,
         full="" if looks.full is None else f"{looks.full:g}",

@@ -65,7 +65,7 @@ def states(library: Library, selection: Selection) -> Work:
                     )
                 cell = library.find(selection.kind, kind.reached(params, dataset))
             if cell is None:
-                raise InputError("these states were removed from the cache; compute them again")
+                raise InputError("these networks were removed from the cache; compute them again")
         return library.shown(cell)
 
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
@@ -79,7 +79,7 @@ def all_states(library: Library, cell: Cell) -> Work:
         computed_anew(library, cell, params, job)
         whole = library.find(cell.kind, params)
         if whole is None:
-            raise InputError("these states were removed from the cache; compute them again")
+            raise InputError("these networks were removed from the cache; compute them again")
         return library.shown(whole)
 
     return Work(work, wants=((cell.kind, params),))

@@ -199,7 +199,7 @@ class Library:
         dataset = self.stored(kinds.PACKING, params)
         if dataset is not None:
             return dataset_packing(dataset)
-        raise InputError("the packing of these states is not in any open store")
+        raise InputError("the packing of these networks is not in any open store")
 
     def exact(self, selection: Selection) -> xr.Dataset | None:
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""

@@ -132,10 +132,10 @@ def differing(requested: Selection, shown: Selection | None) -> str:
         words.append(f"packed at μ = {requested.packing['mu']:g}")
     if requested.kind != shown.kind:
         words.append(
-            f"states {KINDS[requested.kind]}" if requested.kind == "uniform" else "a random walk"
+            f"networks {KINDS[requested.kind]}" if requested.kind == "uniform" else "a random walk"
         )
     if requested.states != shown.states:
-        words.append(f"{requested.states} states")
+        words.append(f"{requested.states} networks")
     if requested.kind == shown.kind == "walk" and requested.relax != shown.relax:
         words.append(SOLVERS[requested.relax])
     return ", ".join(words) or f"μ = {requested.mu:g}"
@@ -195,9 +195,9 @@ def series(
         words += [f"{name} {value}" for name, value in unusual(packing).items()]
         if not selection.same_mu:
             words.append(f"packed at μ = {packing['mu']:g}")
-    words.append(f"{selection.states} states")
+    words.append(f"{selection.states} networks")
     if selection.seed != 0:
-        words.append(f"seed {selection.seed} of the states")
+        words.append(f"seed {selection.seed} of the networks")
     usual = {"walk": 1, "uniform": 4}[selection.kind]
     chains = (parameters or {}).get("chains", usual)
     if chains != usual:

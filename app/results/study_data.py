@@ -30,6 +30,7 @@ ABOUT = {
     ),
     "store": ("F_crit", "α ", "the first motion"),
 }
+PEAK = "(μ) is largest near μ = "  # in a claim, before the paper's value
 
 _reading = threading.Lock()
 
@@ -62,6 +63,15 @@ def claims(about: str | None = None) -> list[dict[str, Any]]:
         {name: math.nan if value is None else value for name, value in claim.items()}
         for claim in claims_read
         if about is None or claim["statement"].startswith(ABOUT[about])
+    ]
+
+
+def maxima() -> list[dict[str, Any]]:
+    """The claims about the μ at which each η is largest, as nearest-network walks have it."""
+    return [
+        claim
+        for claim in claims("eta")
+        if PEAK in claim["statement"] and claim["sampler"] == "nearest"
     ]
 
 

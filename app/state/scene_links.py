@@ -47,6 +47,7 @@ def request_of(query: str) -> Request:
 
 
 def titles() -> list[list[str]]:
-    """[name, title] of every scene, for the list on the page."""
-    names_and_titles = [[name, scenes.EVERY[name].title] for name in (*SMALL, *LARGE)]
-    return [*names_and_titles, [OWN, "Build your own"]]
+    """[name, title, the page that shows it] of every scene, for the list on the page."""
+    named = [(name, "Learn") for name in SMALL] + [(name, "Explore") for name in LARGE]
+    listed = [[name, scenes.EVERY[name].title, door] for name, door in named]
+    return [*listed, [OWN, "Build your own", "Learn"]]

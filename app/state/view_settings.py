@@ -11,15 +11,15 @@ COLOURS = {
     "extent": "interval ΔFₙ",
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
-    "known": "known forces: fraction of the exact interval removed",
-    "deviation": "inferred minus measured fₙ, in σ",
+    "known": "reduction by held forces",
+    "deviation": "inferred − measured fₙ",
 }
 WIDTHS = {
     "normal": "normal force fₙ",
     "extent": "interval ΔFₙ",
     "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
-    "known": "known forces: length of the exact interval removed",
+    "known": "reduction by held forces",
     "measured": "measured fₙ",
 }
 # Glossary key of each quantity shown by colour or width.

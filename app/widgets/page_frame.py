@@ -13,11 +13,13 @@ LIGHT = {
     "--paper": "#ffffff", "--ink": "#1d252d", "--quiet": "#5a636e", "--line": "#e4e8ec",
     "--field": "#c3cbd5", "--hover": "#f0f3f6", "--accent": "#1464c8", "--pale": "#dbe8f7",
     "--on-accent": "#ffffff", "--warn": "#7a4a00", "--warn-paper": "#fff3dc", "--hand": "#b5236b",
+    "--ground": "#f6f8fa",
 }  # fmt: skip
 DARK = {
     "--paper": "#121212", "--ink": "#e8ecf1", "--quiet": "#a4adb8", "--line": "#2c333b",
     "--field": "#4a545f", "--hover": "#20262d", "--accent": "#7db7ff", "--pale": "#1d3350",
     "--on-accent": "#0b1a2c", "--warn": "#ffcf87", "--warn-paper": "#33260d", "--hand": "#ff5ca8",
+    "--ground": "#1a1e23",
 }  # fmt: skip
 HIDDEN = {"display": "none"}
 # Remove Material UI's own bar and the room for it, as the page has its own header.

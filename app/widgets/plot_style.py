@@ -24,10 +24,17 @@ PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 # The page's font, which canvases do not inherit.
 FONT = 'Inter, Roboto, "Helvetica Neue", sans-serif'
 
-# Bokeh makes both white: a notice about the wheel, and the strip behind the tools.
-NOTICE = ".bk-Panel { color: var(--ink); background-color: var(--paper); }"
+# A notice about Ctrl that Bokeh shows whenever the wheel scrolls the page past a plot.
+NOTICE = ".bk-Panel { display: none; }"
+# Bokeh makes the strip behind the tools white.
 TOOLS = ":host(.bk-inner) { background: none; }"
 
+# As many columns of a legend as fit: about 6.6 px a letter, and the mark.
+FITTING = """
+const letters = legend.items.map(({ label }) => label.value.length)
+const columns = Math.floor(cb_obj.inner_width / (30 + 6.6 * Math.max(...letters)))
+legend.ncols = Math.max(1, Math.min(most, columns))
+"""
 COLOURS = 33
 
 
@@ -145,7 +152,7 @@ def corner(fig: Figure, word: str) -> Title:
 
 
 def legend_above(fig: Figure, columns: int = 4) -> None:
-    """A small legend above the plot, where no curve crosses it."""
+    """A small legend above the plot, where no curve crosses it; columns: at most."""
     legend = fig.legend[0]
     fig.center.remove(legend)
     legend.update(
@@ -156,6 +163,9 @@ def legend_above(fig: Figure, columns: int = 4) -> None:
     )  # fmt: skip
     fig.add_layout(legend, "above")
     # Outside the plot Bokeh draws a legend's marks only once, possibly before there are data.
+    fig.js_on_change(
+        "inner_width", CustomJS(args={"legend": legend, "most": columns}, code=FITTING)
+    )
     again = CustomJS(args={"legend": legend}, code="setTimeout(() => legend.change.emit(), 50)")
     for source in {renderer.data_source for item in legend.items for renderer in item.renderers}:
         source.js_on_change("data", again)

@@ -615,7 +615,7 @@ def detail_table(claims: Rows) -> str:
     for (statement, _, criterion), by_sampler in by_claim(claims).items():
         criterion = criterion.replace("[", "(").replace("]", ")")
         cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
-        rows.append([statement, _measured(by_sampler), criterion, *cells])
+        rows.append([statement, measured(by_sampler), criterion, *cells])
     columns = [_HEADS[name] for name in heads]
     text = markdown_table(["claim", "number", "criterion", *columns], rows)
     unjudged = {claim["sampler"]: _split(claim["why"])[1] for claim in claims}
@@ -628,7 +628,7 @@ def detail_table(claims: Rows) -> str:
     return text + "".join(f"\n{note}\n" for note in notes)
 
 
-def _measured(by_sampler: dict[str, dict[str, Any]]) -> str:
+def measured(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number of a claim in words, with what is different about it for some samplers."""
     words = {
         name: claim["measured"].partition(", at the deciding μ")[0]

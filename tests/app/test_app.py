@@ -85,7 +85,7 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     cells = library.cells()
     assert [cell.mu for cell in cells] == [0, 0.1, 1]
     assert {cell.series for cell in cells} == {
-        f"N = {DISKS}, seed 1, {STATES} states, nearest-network walk, by PIQP"
+        f"N = {DISKS}, seed 1, {STATES} networks, nearest-network walk, by PIQP"
     }
 
 
@@ -274,8 +274,10 @@ def test_older_links_to_a_renamed_tab_open_it():
 def test_a_button_names_all_that_is_to_be_computed_anew():
     shown = select(30, 0.1, 1, states=30)
     assert differing(select(30, 0.4, 1, states=30), shown) == "μ = 0.4"
-    assert differing(select(40, 0.1, 2, states=31), shown) == "N = 40, seed 2, 31 states"
-    assert differing(select(30, 0.1, 1, states=30, kind="uniform"), shown) == "states uniform in S"
+    assert differing(select(40, 0.1, 2, states=31), shown) == "N = 40, seed 2, 31 networks"
+    assert (
+        differing(select(30, 0.1, 1, states=30, kind="uniform"), shown) == "networks uniform in S"
+    )
     assert differing(select(30, 0.1, 1, 0.3, states=30), shown) == "packed at μ = 0.3"
     assert differing(shown, None) == "μ = 0.1"
 
@@ -476,7 +478,7 @@ def test_a_refusal_is_told_until_something_succeeds(state, done):
         wait_for(state)
     state.ask(small(0.2, 10**9), at_once=True)
     state.looks.zoom = (1.0, 1.0, 2.0)  # which is looked at
-    assert "states" in state.work.message
+    assert "networks" in state.work.message
     if done == "another mu":
         state.choose(mu=1)
     elif done == "a force known":
@@ -497,7 +499,7 @@ def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(visited):
     too_many = f"?mu=1&n={DISKS}&states={10**9}&tab=export&colour=extent"
     state = visited(too_many)
     assert state.cell is not None and state.looks.colour == "extent"
-    assert "states" in state.work.message
+    assert "networks" in state.work.message
 
 
 def test_states_in_no_store_are_missing_until_computed(state):
@@ -748,7 +750,7 @@ def test_progress_grows_and_estimates_the_rest(state):
 
 def test_sizes_beyond_the_limits_are_refused(state):
     large = select(LIMITS.n + 1, 0.2, 1, states=5)
-    for asked, word in ((small(0.2, LIMITS.states + 1), "states"), (large, "N must lie")):
+    for asked, word in ((small(0.2, LIMITS.states + 1), "networks"), (large, "N must lie")):
         state.ask(asked, at_once=True)
         assert not state.work.busy and word in state.work.message and "\n" not in state.work.message
 

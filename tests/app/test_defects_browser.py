@@ -388,7 +388,17 @@ def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(visit):
     page.wait_for_function(f"() => {MODEL}('coordination_here')?.get_length() === 1")
     page.get_by_role("cell", name="η1(μ) is not monotonic").wait_for()
     verdicts = page.get_by_role("cell").filter(has_text="✓")
-    assert verdicts.count() >= 5 and "criterion" in verdicts.first.inner_html()
+    assert verdicts.count() >= 5 and "largest" in verdicts.first.inner_text()
+
+
+def test_what_is_unfolded_comes_into_view(visit):
+    page = visit("?tab=intervals")
+    page.get_by_role("button", name="How many networks does it take?").click()
+    fold = page.locator(".MuiAccordion-root").first
+    results = page.get_by_role("region", name="Results")
+    page.wait_for_timeout(1500)  # it grows, and is followed
+    bottom = fold.evaluate("e => e.getBoundingClientRect().bottom")
+    assert fold.evaluate("e => e.offsetHeight") > 150 and bottom < results.bounding_box()["y"]
 
 
 # Colour and width by limit load

@@ -27,7 +27,8 @@ TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
 }
 LOOK = {
     "& .MuiTabs-root": {
-        "minHeight": "36px", "padding": "0 10px", "background": "var(--paper)",
+        "minHeight": "36px", "padding": "0 clamp(0px, 3vw - 12px, 10px)",
+        "background": "var(--paper)",
         "@media (min-width: 900px)": {"position": "sticky", "top": 0, "zIndex": 2},
     },
     "& .MuiTab-root": {

@@ -4,6 +4,7 @@ import { distance } from "../model/polytope.js"
 import { number } from "../model/sentences.js"
 
 const NAMED = 30 // px: least length of a component with a label
+const ROOMY = 70 // px: least radius of a disk inside which these labels have room
 export const ASIDE = 9 // px between friction and the wall that would cover it
 
 /** Values next to the forces used as axes of S, on the side of each with more room. */
@@ -56,7 +57,7 @@ export function drawNames(arrows, F) {
   }
   const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])
   if (load > 1e-9) write(cx, cy - 0.55 * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
-  drawParts(arrows, arrows.ends()[0], F)
+  if (scene.r[0] * arrows.unit > ROOMY) drawParts(arrows, arrows.ends()[0], F)
 }
 
 /** The components of one force, labelled. */

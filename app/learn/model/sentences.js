@@ -53,7 +53,7 @@ export function legend(body) {
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const parts = scene.r.length < 4 ? "normal parts, " : ""
   const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
-  const heads = scene.r.length > 2 ? " (equal and opposite between two disks)" : ""
+  const heads = scene.r.length > 2 ? " (in opposite pairs)" : ""
   return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
 

@@ -2,6 +2,7 @@
 
 import { goneBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
+import { sceneOptions } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
 import { Bars } from "../drawing/bars.js"
 import { palette } from "../drawing/palette.js"
@@ -335,7 +336,7 @@ class Workbench {
 
   controls() {
     const does = (name, act, event = "click") => this.part(name).addEventListener(event, act)
-    this.part("name").innerHTML = this.model.titles.map(([name, title]) => `<option value="${name}">${title}</option>`).join("")
+    this.part("name").innerHTML = sceneOptions(this.model.titles, "Learn")
     does("name", (event) => this.open(event.target), "change")
     does("range", (event) => this.setMu(Number(event.target.value)), "input")
     does("typed", (event) => this.type(event.target.value), "change")

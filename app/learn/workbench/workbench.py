@@ -19,7 +19,7 @@ class Workbench(Scripted):
     """A small scene with all its tools."""
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
-    titles = param.List(doc="[name, title] of every scene")
+    titles = param.List(doc="[name, title, page] of every scene")
     large = param.List(default=[*scene_links.LARGE], doc="names of those that Explore shows")
     note = param.String(doc="error in the link")
     dark = param.Boolean()

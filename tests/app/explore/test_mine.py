@@ -22,9 +22,11 @@ def computed(state):
 def test_computations_are_listed_named_opened_and_deleted(computed):
     state, view = computed, Mine(computed)
     wait_for(state)
-    newest, older = sorted(view.rows, key=lambda row: "3 states" in row["what"])
+    newest, older = sorted(view.rows, key=lambda row: "3 networks" in row["what"])
     assert newest["here"] and not older["here"] and newest["when"] >= older["when"]
-    assert "3 states" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
+    assert (
+        "3 networks" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
+    )
     assert older["megabytes"] > 0
     view.hear({"call": [older["entry"], "  the  short\none "]})
     wait_for(state)

@@ -497,6 +497,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
         assert [float(number) for number in shown.groups()] == pytest.approx(largest, abs=6e-5)
         assert f"at μ = {mu:g}" in view.first.object
     told = view.details.object
+    assert "geometric mean of η<sub>2</sub>/η<sub>1</sub>" in told and "✓ if " in told
     assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
@@ -624,6 +625,7 @@ def test_the_table_has_the_bounds_under_what_is_held_and_says_so(state):
 
     head, free = table()
     assert "held" not in head and "known" not in free and "Forces are in the mean" in head
+    assert "weighted by the distance" in head and "signed for f_t" in head
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     head, early = table()  # before the bounds under it are there
     assert "still being computed" in head and "f_n_low [mean]" not in early
@@ -816,11 +818,12 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     assert all(offered("sign", "difference")) and not any(offered("known"))
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
     assert all(offered("known"))
-    assert ">interval ΔFₙ, seen</option>" in player.legend
+    state.looks.thickness = "extent"  # its name stays; the scale says which intervals
+    assert "⟨fₙ⟩ (seen)" in player.legend
     wait_for(state)
-    assert ">interval ΔFₙ, exact given the held forces</option>" in player.legend
+    assert "⟨fₙ⟩ (exact given the held forces)" in player.legend
     state.knowledge.release(3)
-    assert ">interval ΔFₙ, exact</option>" in player.legend
+    assert "⟨fₙ⟩ (exact)" in player.legend and ">interval ΔFₙ</option>" in player.legend
     player.colour = "known"  # chosen in the legend
     assert state.looks.colour == "known"
     state.knowledge.release(3)
@@ -933,10 +936,11 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
 
 def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
+    state.looks.colour = "extent"
     wait_for(state)
     page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
     assert "interval, exact given the held forces" in page and "interval, seen" not in page
-    assert "interval ΔFₙ, exact given the held forces" in page
+    assert "⟨fₙ⟩ (exact given the held forces" in page
 
 
 def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):

@@ -92,8 +92,10 @@ def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
 def test_an_empty_colour_scale_says_why():
     def end(dimension, most=0.0, full=None):
         shown = SimpleNamespace(summary={"dimension": dimension})
-        return view._full(SimpleNamespace(shown=shown, looks=SimpleNamespace(full=full)), most)
+        state = SimpleNamespace(shown=shown, looks=SimpleNamespace(full=full))
+        return view._full(state, most, "exact")
 
     assert end(0) == "0: every force is determined"
     assert end(51) == "(being computed)"
-    assert end(51, 2.5) == "≥ 2.50 ⟨fₙ⟩ (this packing)" and end(51, 2.5, 2.5) == "≥ 2.50 ⟨fₙ⟩"
+    assert end(51, 2.5) == "≥ 2.50 ⟨fₙ⟩ (exact, this packing)"
+    assert end(51, 2.5, 2.5) == "≥ 2.50 ⟨fₙ⟩ (exact)"

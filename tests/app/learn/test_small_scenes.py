@@ -38,8 +38,10 @@ def test_links_name_a_scene(query, scene, mu):
 
 
 def test_every_scene_of_the_library_is_on_the_list():
-    listed = [name for name, _ in scene_links.titles()]
+    listed = [name for name, *_ in scene_links.titles()]
     assert listed[0] == scene_links.FIRST and set(listed) >= {"many", "own", "column"}
+    for name, _, page in scene_links.titles():  # which the list says beforehand
+        assert page == ("Explore" if name in scene_links.LARGE else "Learn")
 
 
 @pytest.mark.parametrize(

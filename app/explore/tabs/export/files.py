@@ -16,7 +16,7 @@ from granforce.study.keys import canonical
 from granforce.study.schema import packing_dataset
 
 from ....results.library import Cell
-from ....results.replays import Replay
+from ....results.replays import Replay, worded
 from ....results.saved_file import Columns
 from ....results.selection import command
 from ....state.known import Knowledge
@@ -86,22 +86,28 @@ def _bounds(exact: xr.Dataset, replay: Replay, ending: str = "") -> Columns:
 # The meaning of the columns in the table of contacts.
 COLUMNS = {
     "contact": "number of the contact in the packing",
-    "i": "number of the first grain; the normal n points from i to j",
-    "j": "number of the second grain",
+    "i": "number of the first disk; the normal n points from i to j",
+    "j": "number of the second disk",
     "known": "1 where the normal force is held, else 0",
     "f_n_original": "normal force as packed",
     "f_t_original": "tangential force as packed, along t = (-n_y, n_x)",
     "f_n": "normal force in the network on screen",
     "f_t": "tangential force in the network on screen",
-    "f_n_seen_low": "smallest normal force of all states",
-    "f_n_seen_high": "largest normal force of all states",
-    "f_t_seen_low": "smallest tangential force of all states",
-    "f_t_seen_high": "largest tangential force of all states",
+    "f_n_seen_low": "smallest normal force in all networks",
+    "f_n_seen_high": "largest normal force in all networks",
+    "f_t_seen_low": "smallest tangential force in all networks",
+    "f_t_seen_high": "largest tangential force in all networks",
     "f_n_low": "least possible normal force (exact; 0 within its duality gap)",
     "f_n_high": "largest possible normal force (exact; 0 within its duality gap)",
     "f_t_low": "least possible tangential force (exact; 0 within its duality gap)",
     "f_t_high": "largest possible tangential force (exact; 0 within its duality gap)",
 }
+
+
+ETA3 = (
+    "eta3: the mean length of the intervals of f_n and f_t, divided by the mean of their "
+    "midpoints, which are signed for f_t."
+)
 
 
 def _meaning(column: str) -> str:
@@ -125,10 +131,12 @@ def bounds_of(knowledge: Knowledge) -> str:
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
     """Lines, each after a #, that explain a table and its units."""
     unit = (
-        "Forces are in the mean normal force, as on screen; it is "
-        f"{replay.force_scale:.9g} in the packing's own unit (pressure times length)."
+        "Forces are in the mean normal force, as on screen: the mean weighted by the distance "
+        "between centres if the pressure is prescribed, otherwise the plain mean of the original "
+        f"network; {replay.force_scale:.9g} in the packing's own unit (pressure times length)."
     )
-    lines = [*filter(None, titles), unit, *(f"{name}: {_meaning(name)}" for name in columns)]
+    meanings = (f"{name}: {worded(replay, _meaning(name))}" for name in columns)
+    lines = [*filter(None, titles), unit, ETA3, *meanings]
     return "".join(f"# {line}\n" for line in lines)
 
 

@@ -49,7 +49,7 @@ def finding(outlined: Outlined, replay: Replay, others: Floats, called: str) -> 
     inner = planes.inner_share(path, outlined.outer)
     many = "All" if inner == 1 else f"{min(inner, 0.99):.0%}"
     words = f"{_drawn(replay)} <b>{many} of them lie less than halfway from the middle of the "
-    words += "blue shape to its edge</b> (dotted)"
+    words += "shaded shape to its edge</b> (dotted)"
     if len(others):
         share = planes.inner_share(others, outlined.outer)
         words += f", and {share:.0%} of the {len(others)} {called}"

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from granforce.paper import documents
 from granforce.paper.claims import outcomes
+from granforce.paper.claims.verdicts import FAILED, REPRODUCED
 from granforce.types import Rows
 
 from ....results import study_data
@@ -34,9 +36,11 @@ OUTCOMES = {
     "differ": "contradicted",
     "open": "open",
 }
+UNBROKEN = "\u00a0…\u00a0"  # of a range
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th>{}</tr>"
-TABLE = "<div style='overflow-x:auto'><table class='claims'>{}</table></div>"
+TABLE = "<div class='judged'><table class='claims'>{}</table></div>"
+CELL = '<td data-by="{}">{}</td>'  # `data-by`: in front of the value where columns do not fit
 
 
 def claims(about: str, heading: str, opened: bool = False) -> str:
@@ -50,8 +54,12 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
     used = [name for name in SAMPLERS if any(name in one for one in by_statement.values())]
     rows = [HEAD.format("".join(f"<th>{SAMPLERS[name]}</th>" for name in used))]
     for statement, one in by_statement.items():
-        cells = "".join(f"<td>{_cell(one[name]) if name in one else ''}</td>" for name in used)
-        rows.append(f"<tr><td>{typeset(statement)}</td>{cells}</tr>")
+        cells = "".join(
+            CELL.format(SAMPLERS[name], _cell(one[name])) if name in one else "<td></td>"
+            for name in used
+        )
+        judged = f"<small>{typeset(_judged(one))}</small>"
+        rows.append(f"<tr><td>{typeset(statement)}{judged}</td>{cells}</tr>")
     return (
         f"<details{' open' if opened else ''}><summary>{heading}: {_counted(chosen)}</summary>"
         f"{TABLE.format(''.join(rows))}</details>"
@@ -62,9 +70,9 @@ def summary() -> str:
     """The numbers of the paper's claims by outcome, and how to read the tables."""
     marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
     return (
-        f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Each cell: verdict, "
-        "value, 95 % interval over packings; hover over it for the criterion. "
-        f"{marks}."
+        f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Below each claim: "
+        f"the number that is judged, and the range of its interval for {VERDICTS[REPRODUCED]}. "
+        f"Each cell: verdict, value, 95 % interval over packings. {marks}."
     )
 
 
@@ -73,17 +81,27 @@ def _counted(claims: Rows) -> str:
     return ", ".join(f"{count[name]} {words}" for name, words in OUTCOMES.items() if count[name])
 
 
+def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
+    """The number that a claim is judged by, and its ranges, in words."""
+    criterion = next(iter(by_sampler.values()))["criterion"]
+    good, wider, fair = criterion.removesuffix("]").partition(" [")
+    ranges = f"{VERDICTS[REPRODUCED]} if {good}"
+    if wider:
+        ranges += f", {VERDICTS[FAILED]} unless {fair}"
+    return f"{documents.measured(by_sampler)}; {ranges.replace(' … ', UNBROKEN)}"
+
+
 def _cell(claim: dict[str, Any]) -> str:
-    hover = f"{claim['verdict']}: {claim['measured']}; criterion {claim['criterion']}"
-    if claim["why"]:
-        hover += f"; {claim['why']}"
     words = VERDICTS.get(claim["verdict"], claim["verdict"])
     if np.isfinite(claim["value"]):
         words += f" {_number(claim['value'])}"
-    if np.isfinite([claim["low"], claim["high"]]).all() and claim["verdict"] != "too few data":
-        words += f" <small>({_number(claim['low'])} … {_number(claim['high'])})</small>"
+    few = claim["verdict"] == "too few data"
+    known = np.isfinite([claim["low"], claim["high"]]).all() and not few
+    details = [f"({_number(claim['low'])}{UNBROKEN}{_number(claim['high'])})"] if known else []
+    details += [f"at μ\u00a0=\u00a0{claim['mu']:g}"] if np.isfinite(claim["mu"]) else []
+    hover = "; ".join(filter(None, (claim["verdict"], claim["why"])))
     title = html.escape(plain(hover), quote=True)
-    return f'<span title="{title}" aria-label="{title}">{words}</span>'
+    return f'<span title="{title}">{words} <small>{typeset(" ".join(details))}</small></span>'
 
 
 def _number(value: float) -> str:
@@ -96,6 +114,8 @@ def plain(text: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """A claim with its symbols as HTML: F_n with its index below, η1 as η₁."""
+    """A text with its symbols as HTML: F_n with its index below, η1 as η₁, 1e-05 as 10⁻⁵."""
     text = re.sub(r"([A-Za-z])_([a-z]+)", r"\1<sub>\2</sub>", html.escape(text))
+    text = re.sub(r"\b1e-0?(\d+)", r"10<sup>−\1</sup>", text)
+    text = re.sub(r"(?<!\w)-(?=\d)", "−", text)
     return re.sub(r"η([123])", r"η<sub>\1</sub>", text)

@@ -29,7 +29,6 @@ SAMPLERS = {
 }
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
-PEAK = "(μ) is largest near μ = "  # in a claim, before the paper's value
 BINS = 30
 ROOM = 1.5  # of the largest η: leaves room for the inset above the rising curve
 
@@ -78,14 +77,13 @@ class Indeterminacy:
 
 def _in_the_paper() -> str:
     """The μ of the maxima in the paper's Figure 1 and in these walks, as a sentence or nothing."""
-    peaks = [
-        claim
-        for claim in study_data.claims("eta")
-        if PEAK in claim["statement"] and claim["sampler"] == "nearest"
-    ]
+    peaks = study_data.maxima()
     if not peaks:
         return ""
-    ours, paper = [peak["value"] for peak in peaks], peaks[0]["statement"].partition(PEAK)[2]
+    ours, paper = (
+        [peak["value"] for peak in peaks],
+        peaks[0]["statement"].partition(study_data.PEAK)[2],
+    )
     least, most = min(peak["low"] for peak in peaks), max(peak["high"] for peak in peaks)
     return (
         "In the paper's Figure 1 η also rises and falls, with its maxima near "

@@ -32,7 +32,7 @@ export function render({ model, view }) {
   const root = document.createElement("details"), page = view.model.document
   root.innerHTML = `<summary>All contacts as a table</summary>
     <div class="filters">
-      <label>number of contact or grain <input class="find" inputmode="numeric"></label>
+      <label>number of contact or disk <input class="find" inputmode="numeric"></label>
       <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
       <span class="pages"><button type="button" class="soft earlier">previous ${ROWS}</button>
         <button type="button" class="soft later">next ${ROWS}</button></span>
@@ -42,7 +42,7 @@ export function render({ model, view }) {
   const part = (name) => root.querySelector(name), body = part("tbody")
   const sorted = { by: FORCE, down: true }
   const player = () => page.get_model_by_name("player")?.player
-  let from = 0, pending = 0, shown = [], headed = "", asked = false // asked: opened by the visitor, not by a link
+  let from = 0, pending = 0, shown = [], headed = ""
 
   /** The data for the columns. */
   function now() {
@@ -131,7 +131,6 @@ export function render({ model, view }) {
   for (const name of [".find", ".least"]) part(name).addEventListener("input", fill)
   part(".earlier").addEventListener("click", () => turn(-ROWS))
   part(".later").addEventListener("click", () => turn(ROWS))
-  part("summary").addEventListener("click", () => { asked = !root.open })
   root.addEventListener("toggle", () => {
     const on = player()
     model.open = root.open
@@ -139,7 +138,6 @@ export function render({ model, view }) {
     if (root.open) {
       on.listeners.add(soon)
       fill()
-      if (asked) root.scrollIntoView({ block: "start", behavior: "smooth" })
     } else { on.listeners.delete(soon); if (on.look) dim(null, 0) }
   })
   const open = () => { root.open = model.open }

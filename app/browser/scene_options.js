@@ -1,0 +1,8 @@
+// The options of a list of scenes: first those of this page, then those that open the other one.
+
+/** HTML for titles [[name, title, door]]; here: the door of this page, "Explore" or "Learn". */
+export function sceneOptions(titles, here) {
+  const options = (given) => given.map(([name, title]) => `<option value="${name}">${title}</option>`).join("")
+  const elsewhere = titles.filter(([, , door]) => door !== here)
+  return `${options(titles.filter(([, , door]) => door === here))}<optgroup label="opens in ${elsewhere[0][2]}">${options(elsewhere)}</optgroup>`
+}
