@@ -46,6 +46,10 @@ class InputError(ValueError):
         return " ".join(super().__str__().split())
 
 
+class InputWarning(UserWarning):
+    """Input can be used, but is probably wrong; the message says what to check."""
+
+
 class NotJammedError(InputError):
     """No admissible force network exists, or none was reached within the budget."""
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from granforce.packing.importers.geometry import check_disks, doubtful, largest_gap, touching
 from granforce.packing.importers.network import find
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.scenes import places_behind
 from granforce.records import (
     InputError,
@@ -27,6 +28,7 @@ from granforce.types import Floats
 WALLS = ("floor", "box")
 
 
+@packing_noted
 def from_disks(
     x: npt.ArrayLike,
     r: npt.ArrayLike,
@@ -48,7 +50,7 @@ def from_disks(
     place that a disk touches is one more grain, whose balance is not required. gravity: g times the
     mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
     nearly_touching [i, j, gap]: gaps within a factor of 100 of the tolerance, and far above those
-    of other contacts.
+    of other contacts; an InputWarning says so.
 
     Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
     network exists.

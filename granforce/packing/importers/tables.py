@@ -12,6 +12,7 @@ from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
 from granforce.packing.importers.network import adopt, find, refuse_idle_reverse, with_edge
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.text import (
     Source,
     Table,
@@ -38,6 +39,7 @@ NAMES += ("i", "j", "nx", "ny", "length", "f_n", "f_t")
 _SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
 
 
+@packing_noted
 def read_table(
     grains: Source,
     contacts: Source | None = None,
@@ -67,9 +69,10 @@ def read_table(
     open set: the loads). reverse: change the sign of f_t. Without forces, the network nearest to
     equal normal forces at the given pressure (or loads) is computed; pressure is not used with f_n,
     f_t. walls ("floor", "box" or segments) and gravity are for tables without forces, as in
-    `from_disks`. most_grains: largest number of grains. packing.info has notes on
-    overlaps and on pairs in doubt, which nearly_touching lists [i, j, gap]: gaps within a factor of
-    100 of the tolerance, and far above those of other contacts.
+    `from_disks`. most_grains: largest number of grains. InputWarnings, whose
+    texts are also in packing.info["notes"], report forces that do not balance, overlaps, and pairs
+    in doubt, which packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100
+    of the tolerance, and far above those of other contacts.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
