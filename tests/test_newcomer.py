@@ -143,7 +143,10 @@ def test_seeds_have_defaults_as_on_the_command_line():
 
 
 def test_a_mistyped_store_leaves_nothing(tmp_path):
-    assert len(gf.open_store(tmp_path / "typo.zarr")) == 0
+    store = gf.open_store(tmp_path / "typo.zarr")
+    assert len(store) == 0
+    with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the path$"):
+        gf.figures.indeterminacy(store)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -313,6 +316,11 @@ def test_relaxations_are_typed_as_functions_are_called():
     for name, word in typed.items():
         function = computed[word]["relax"]
         assert getattr(gf, name.removesuffix("_only")) is function
+    S = gf.ensemble(reference("n100_mu0.1_s11"))
+    named, called = gf.walk(S, 2, relax="nearest_piqp"), gf.walk(S, 2, relax=gf.nearest_piqp)
+    assert np.array_equal(named.states, called.states)
+    with pytest.raises(gf.InputError, match=r"^relax must be nearest, .*only, got 'newton'$"):
+        gf.walk(S, 2, relax="newton")
 
 
 def test_stored_walks_are_listed_with_the_relaxation_as_typed(cache, capsys):
@@ -983,9 +991,24 @@ def test_tables_are_in_either_unit():
     high = table["f_n_high [packing]"].to_numpy()
     assert mean["f_n_high [mean]"].to_numpy() == pytest.approx(high / S.force_scale)
     assert "f_n_high [packing]" not in mean and S.force_scale != 1
+    force, dataset = bounds.high / S.force_scale, gf.to_dataset(bounds, S, unit="mean")
+    assert np.array_equal(dataset["high"], force, equal_nan=True)
+    assert dataset["high"].units == "mean normal force"
     for name, options in {"unit must be": {"unit": "N"}, "needs S": {"unit": "mean"}}.items():
         with pytest.raises(gf.InputError, match=name):
             gf.to_dataframe(S.packing, **options)
+
+
+def test_an_outline_of_stresses_is_labelled_as_the_command_writes_it(cache, capsys):
+    assert main("stress -n 30 --mu 0.3 --angles 5 --out s.csv".split()) == 0
+    assert main("stress -n 30 --mu 0.3 --angles 5 --out s.zarr".split()) == 0
+    outline = gf.stress_outline(gf.ensemble(gf.pack(30, 0.3)), 5)
+    pd.testing.assert_frame_equal(gf.to_dataframe(outline), pd.read_csv("s.csv"))
+    written, labelled = xr.open_zarr("s.zarr", consolidated=False), gf.to_dataset(outline)
+    xr.testing.assert_equal(written, labelled)
+    assert labelled["angle"].units == written["angle"].units == "rad"
+    assert labelled["largest"].units == written["largest"].units == "pressure"
+    assert labelled.attrs["friction"] == outline.friction
 
 
 def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
@@ -1174,10 +1197,13 @@ def test_forces_that_are_clearly_no_equilibrium_are_noted():
     """A sheared lattice balances if |f_t| has opposite signs; of equal sign they turn each disk."""
     good = gf.read_table(*square_lattice(1, 0.25, -0.25), mu=0.3, box=[3, 3])
     assert good.info["residual"] < 1e-14 and "notes" not in good.info
-    slipped = gf.read_table(*square_lattice(1, 0.5, -0.5), mu=0.3, box=[3, 3])
+    with pytest.warns(gf.InputWarning) as warned:
+        slipped = gf.read_table(*square_lattice(1, 0.5, -0.5), mu=0.3, box=[3, 3])
     (note,) = slipped.info["notes"]
+    assert [str(one.message) for one in warned] == [note] and warned[0].filename == __file__
     assert "|f_t| ≤ μ f_n by up to 0.2 ⟨f_n⟩: check μ = 0.3" in note  # 0.5 − 0.3
-    turned = gf.read_table(*square_lattice(1, 0.25, 0.25), mu=0.3, box=[3, 3])
+    with pytest.warns(gf.InputWarning, match="by up to 1"):
+        turned = gf.read_table(*square_lattice(1, 0.25, 0.25), mu=0.3, box=[3, 3])
     (note,) = turned.info["notes"]
     assert "do not balance the grains, by up to 1 ⟨f_n⟩" in note  # four contacts
 
@@ -1186,7 +1212,8 @@ def test_the_command_prints_such_a_note(cache, capsys):
     for name, file in zip(("g.csv", "c.csv"), square_lattice(1, 0.5, -0.5), strict=True):
         Path(name).write_text(file.read())
     assert main("import table g.csv c.csv --mu 0.3 --box 3 3".split()) == 0
-    assert "granforce: the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n" in capsys.readouterr().err
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("granforce: the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n")
 
 
 def test_a_periodic_table_with_few_digits_is_answered_with_the_tolerance():
