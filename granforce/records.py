@@ -471,8 +471,8 @@ def make_contacts(
     """Contacts from array-likes, cast once.
 
     i, j (N_c,): grains, from 0. normal (N_c, 2): unit vectors from i to j. length (N_c,): centre
-    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than
-    RIGID_OVERLAP, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
+    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than 10⁻⁵ of
+    the largest radius, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
     disks).
 
     Raises InputError for grains outside 0 … N − 1, self-contacts, normals of other length,

@@ -20,12 +20,15 @@ import xarray as xr
 from packings import packed, reference
 
 import granforce as gf
+from granforce import tolerances
 from granforce.cli import report_lines
 from granforce.cli.parser import main
 from granforce.cli.results import with_units
 from granforce.cli.words import make_parser
+from granforce.explore import uniform
 from granforce.figures import picture
 from granforce.glossary import TERMS
+from granforce.packing import compaction
 from granforce.packing.scenes import SCENES
 from granforce.perturb import grain_loads
 from granforce.study import scan
@@ -41,6 +44,22 @@ def test_tab_and_help_list_the_public_names_and_nothing_else():
     assert all(getattr(gf, name) is not None for name in names)
     told = pydoc.render_doc(gf, renderer=pydoc.plaintext)
     assert "    pack(" in told and "class Packing(" in told and "find_a_place" not in told
+
+
+def test_help_shows_the_values_of_constants():
+    numbers = (int, float)
+    for name in gf.__all__:
+        thing = getattr(gf, name)
+        home = sys.modules.get(getattr(thing, "__module__", ""), gf)
+        for word in re.findall(r"\b[A-Z][A-Z_]{4,}\b", inspect.getdoc(thing) or ""):
+            value = getattr(tolerances, word, getattr(home, word, None))
+            assert not isinstance(value, numbers) or name == "Side", (name, word)
+    told = pydoc.render_doc(gf.pack, renderer=pydoc.plaintext)
+    assert f"farther than {compaction.STRIDE:g}." in told
+    assert f"by default {compaction.NEARLY_BALANCED:g}, less from {compaction.SEVERAL} d" in told
+    assert "10⁻⁴" in told and compaction.NEARLY_FRICTIONLESS == 1e-4
+    told = inspect.getdoc(gf.sample_uniform)
+    assert f"up to {uniform.MOST_STATES} times" in told
 
 
 def test_help_shows_types_by_their_names():
@@ -260,7 +279,7 @@ def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsy
     }
     for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
         stored.pop(name)  # the store gives these names to something else, or one for each state
-    for name in ("pressure", "reached"):
+    for name in ("coordination", "pressure", "reached"):  # of which help says more
         stored.pop(name)
     assert len(stored) > 25 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals p.npz".split()) == 0
@@ -1059,6 +1078,7 @@ def test_samples_are_drawn_and_intervals_named_as_a_colour():
         ("import table bare.csv --mu 0.5", "bare.csv: the first line contains only numbers; "),
         ("import table other.csv --mu 0.5", "other.csv: no column x, y, r; "),
         ("figures rows.csv --out f.png", "rows.csv is a table; "),
+        ("plot folder --out f.png", "folder is a folder; plot draws the file of a packing (.npz)"),
         ("plot p.npz --states bounds.zarr --out p.png", "bounds.zarr: contains no states; "),
     ],
 )
@@ -1066,6 +1086,7 @@ def test_slips_of_a_newcomer_are_answered_with_what_to_do(line, said, cache, cap
     Path("bare.csv").write_text("0,0,1\n2,0,1\n")
     Path("other.csv").write_text("pos_x,pos_y,rad\n0,0,1\n2,0,1\n")
     Path("rows.csv").write_text("mu\n0.1\n")
+    Path("folder").mkdir()
     if line.startswith("plot"):
         gf.save_packing(gf.scene("groove"), "p.npz")
         assert main("intervals p.npz --out bounds.zarr".split()) == 0
@@ -1091,7 +1112,8 @@ def test_a_load_factor_of_rounding_errors_is_0(monkeypatch):
     assert gf.load_factor(S).factor == 0.0
 
 
-def test_bars_end_at_their_total_unless_interrupted(capsys):
+def test_bars_end_at_their_total_unless_interrupted(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with terminal.Bar("bounds", "bound") as progress:
         progress(3, 8)
     assert "8/8" in capsys.readouterr().err.rsplit("\r", 1)[-1]

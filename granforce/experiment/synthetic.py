@@ -86,7 +86,7 @@ def synthetic_frame(
     with their direction and force; False: grains there are only flagged. pixels: per unit of
     length; newton: mean normal force. number: of the frame.
 
-    Raises InputError for values below 0 or beyond LARGEST_UNIT, and for a packing without forces.
+    Raises InputError for values below 0 or beyond 10⁶⁰, and for a packing without forces.
     """
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
         if not 0 <= value <= LARGEST_UNIT or (name == "missed" and value >= 1):

@@ -21,7 +21,7 @@ def displacement(
     """Displacements of grains, or of bodies of any shape, as arrows on the packing.
 
     field (N, 2): displacements in any unit, NaN for grains without an arrow; the longest arrow is
-    LONGEST_ARROW mean diameters of free grains long. contact: position of the perturbed contact,
+    two mean diameters of free grains long. contact: position of the perturbed contact,
     which is marked.
     """
     style.ready(backend)

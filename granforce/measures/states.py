@@ -210,7 +210,7 @@ def growing(states: Floats) -> dict[str, Floats]:
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
     """Position of each f_n in its interval, from 0 (least) to 1 (largest).
 
-    NaN where the force is determined: ΔF_n is at most REVERSED of the largest force.
+    NaN where the force is determined: ΔF_n is at most 10⁻⁶ of the largest force.
     normal_forces (N_c,); low, high (N_c, 2). Raises InputError as `eta3` does, and for another
     number of forces.
     """

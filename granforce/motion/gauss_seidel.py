@@ -33,8 +33,8 @@ def gauss_seidel(
     """One step of contact dynamics from rest, by sweeps until it has ended; a Relaxation.
 
     start (N_c, 2): first guess, force. order: "sequential" or "random" (a new permutation each
-    sweep, from seed). options: tolerance (BALANCED), the residual in ⟨f_n⟩ that counts as balance;
-    rest (AT_REST), the residual from which the nearest network replaces further sweeps, None to
+    sweep, from seed). options: tolerance (10⁻¹⁰), the residual in ⟨f_n⟩ that counts as balance;
+    rest (10⁻³), the residual from which the nearest network replaces further sweeps, None to
     sweep down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also
     True if grains move steadily: then no equilibrium is near, and the residual shows it. cancel()
     returning True raises Cancelled.

@@ -65,7 +65,7 @@ def blocks(
     masses are in proportion, and gravity points along −y. materials (N,): labels of the materials
     of the bodies, and friction: μ of pairs of them if it is not mu, {("stone", "wood"): 0.4, …}.
     tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
-    default TOUCHING times the largest body. balanced: whether to look for a network; otherwise
+    default 10⁻⁹ times the largest body. balanced: whether to look for a network; otherwise
     forces are 0, even if nothing balances. An edge on an edge touches at both ends of the shared
     part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
     contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. names: of the bodies, for
