@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,17 @@ _KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "te
 
 class InputError(ValueError):
     """Input cannot be used; the message says in one line what is wrong and what to do."""
+
+    # The name of a refused argument, with which the message begins, and its value.
+    argument: str = ""
+    value: Any = None
+
+    @classmethod
+    def of(cls, argument: str, value: Any, words: str) -> Self:
+        """The error of an argument; words follow its name."""
+        error = cls(f"{argument} {words}")
+        error.argument, error.value = argument, value
+        return error
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
@@ -332,7 +343,7 @@ def real(value: Any, name: str) -> float:
     """One real number as a float, which may be NaN or infinity; InputError otherwise."""
     array = real_array(value, name)
     if array.ndim:
-        raise InputError(f"{name} must be one number, got {brief(value)}")
+        raise InputError.of(name, value, f"must be one number, got {brief(value)}")
     return float(array)
 
 
@@ -340,7 +351,8 @@ def choice(value: Any, options: Collection[str], name: str) -> str:
     """The value, if it is one of the options; InputError otherwise."""
     if not isinstance(value, str) or value not in options:
         *others, last = options
-        raise InputError(f"{name} must be {', '.join(others)} or {last}, got {brief(value)}")
+        words = f"must be {', '.join(others)} or {last}, got {brief(value)}"
+        raise InputError.of(name, value, words)
     return value
 
 
@@ -367,7 +379,7 @@ def _number(value: Any, name: str) -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be a number, got {brief(value)}") from None
+        raise InputError.of(name, value, f"must be a number, got {brief(value)}") from None
 
 
 def friction(mu: Any) -> float:
@@ -375,18 +387,16 @@ def friction(mu: Any) -> float:
 
     Raises InputError unless it is 0 or between 1/LARGEST_UNIT and LARGEST_FRICTION.
     """
-    value = _number(mu, "friction coefficient")
+    name = "friction coefficient"
+    value = _number(mu, name)
     if not np.isfinite(value) or value < 0:
-        raise InputError(f"friction coefficient must be finite and ≥ 0, got {value:g}")
+        raise InputError.of(name, mu, f"must be finite and ≥ 0, got {value:g}")
     if value > LARGEST_FRICTION:
-        raise InputError(
-            f"friction coefficient {value:g} is too large for the balance of forces in double "
-            f"precision; use at most {LARGEST_FRICTION:g}"
-        )
+        why = "is too large for the balance of forces in double precision; use at most"
+        raise InputError.of(name, mu, f"{value:g} {why} {LARGEST_FRICTION:g}")
     if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would overflow
-        raise InputError(
-            f"friction coefficient {value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
-        )
+        words = f"{value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
+        raise InputError.of(name, mu, words)
     return float(f"{abs(value):.{MU_DIGITS}g}")  # also for −0
 
 
@@ -412,11 +422,12 @@ def positive(
     """The value as a finite float > 0 (or_zero: ≥ 0) from least to most; InputError otherwise."""
     number = _number(value, name)
     if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
-        raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
+        words = f"must be finite and {'≥' if or_zero else '>'} 0, got {number:g}"
+        raise InputError.of(name, value, words)
     if number < least:
-        raise InputError(f"{name} must be at least {least:g}, got {number:g}")
+        raise InputError.of(name, value, f"must be at least {least:g}, got {number:g}")
     if number > most:
-        raise InputError(f"{name} must be at most {most:g}, got {number:g}")
+        raise InputError.of(name, value, f"must be at most {most:g}, got {number:g}")
     return number
 
 
@@ -428,11 +439,11 @@ def whole(value: Any, name: str, least: int = 0, most: int | None = LARGEST_WHOL
     except (TypeError, ValueError, OverflowError):
         exact = False
     if not exact:
-        raise InputError(f"{name} must be a whole number, got {brief(value)}")
+        raise InputError.of(name, value, f"must be a whole number, got {brief(value)}")
     if number < least:
-        raise InputError(f"{name} must be at least {least}, got {brief(value)}")
+        raise InputError.of(name, value, f"must be at least {least}, got {brief(value)}")
     if most is not None and number > most:
-        raise InputError(f"{name} must be at most {most}, got {brief(value)}")
+        raise InputError.of(name, value, f"must be at most {most}, got {brief(value)}")
     return number
 
 
@@ -458,10 +469,9 @@ def moderate(value: Any, name: str) -> float:
     """The value as a float > 0 whose powers stay finite; InputError otherwise."""
     number = positive(value, name)
     if not 1 / LARGEST_UNIT <= number <= LARGEST_UNIT:
-        raise InputError(
-            f"{name} must lie between {1 / LARGEST_UNIT:g} and {LARGEST_UNIT:g}, got {number:g}; "
-            "choose another unit"
-        )
+        limits = f"between {1 / LARGEST_UNIT:g} and {LARGEST_UNIT:g}"
+        words = f"must lie {limits}, got {number:g}; choose another unit"
+        raise InputError.of(name, value, words)
     return number
 
 
@@ -618,7 +628,9 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
         raise InputError(f"box must be two sides L_x, L_y > 0: {error}") from None
     tilt = real(tilt, "tilt")
     if box.shape != (2,) or not np.all(box > 0):
-        raise InputError(f"box must be two sides L_x, L_y > 0, got {brief(box)}")
+        raise InputError.of(
+            "box", box, f"must be two sides L_x, L_y > 0, got {brief(box.tolist())}"
+        )
     if not np.isfinite(tilt):
         raise InputError(f"the tilt of the cell must be a finite number, got {tilt}")
     if tilt and not np.all(np.isfinite(box)):

@@ -1100,6 +1100,28 @@ def test_slips_of_a_newcomer_are_answered_with_what_to_do(line, said, cache, cap
     assert "other" not in line or "--columns x=NAME" in told
 
 
+@pytest.mark.parametrize(
+    "option, said",
+    [
+        ("--mu -1", "must be finite and ≥ 0"),
+        ("--ensemble-mu -1", "must be finite and ≥ 0"),
+        ("--seed -1", "must be at least 0"),
+        ("--walk-seed -1", "must be at least 0"),
+        ("-n -1", "must be at least 0"),
+        ("--step-accuracy 7", "must be at most 1"),
+        ("--drag-below 7", "must be at most 1"),
+        ("--box-mass 1e99", "must lie between 1e-60 and 1e+60"),
+        ("--states 0", "must be at least 1"),
+        ("--chains 0", "must be at least 1"),
+    ],
+)
+def test_messages_name_the_option_that_was_typed(option, said, cache, capsys):
+    usual = " --mu 0.3" if "--mu" not in option.split() else ""
+    assert main(f"walk {option}{usual}".split()) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"granforce: {option.split()[0]} {said}")
+
+
 def test_only_disks_without_support_are_named():
     floor = [[0, 0, 12, 0]]
     with pytest.raises(gf.NotJammedError, match=r"at grains 1 \(counted from 0\)"):

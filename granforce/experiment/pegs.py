@@ -140,7 +140,8 @@ def read_pegs(
     """
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:
-        raise InputError(f"reach is in mean radii and must lie between 0 and 2, got {reach}")
+        words = f"is in mean radii and must lie between 0 and 2, got {reach}"
+        raise InputError.of("reach", reach, words)
     if walls is not None and not hasattr(walls, "gaps"):
         walls = read_outline(walls)
     listing = open_frames(positions, adjacency, columns=columns).listing(frame)

@@ -77,7 +77,8 @@ def likeliest(
     """
     m, s = checked(ensemble, measured, sigma)
     if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
-        raise InputError(f"unmeasured must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}")
+        words = f"must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}"
+        raise InputError.of("unmeasured", unmeasured, words)
     forces = fitted(ensemble, m, s, unmeasured)
     deviation = (forces - m) / s
     freedom = int(np.isfinite(deviation).sum()) - _adapted(ensemble, m, forces)

@@ -238,10 +238,9 @@ def check_drag(drag_below: float | None, mu: float) -> float | None:
     if drag_below is None:
         return None
     if mu <= NEARLY_FRICTIONLESS:
-        raise InputError(
-            f"drag_below is not used at μ ≤ {NEARLY_FRICTIONLESS:g}, where linear programs finish "
-            "the packing; leave it out"
-        )
+        why = "where linear programs finish the packing; leave it out"
+        words = f"is not used at μ ≤ {NEARLY_FRICTIONLESS:g}, {why}"
+        raise InputError.of("drag_below", drag_below, words)
     return positive(drag_below, "drag_below", most=1.0)
 
 

@@ -125,7 +125,8 @@ def _segments(packing: Packing, walls: str | npt.ArrayLike) -> Floats:
     if not isinstance(walls, str):
         return float_array(np.atleast_2d(np.asarray(walls)), (-1, 4), "walls")
     if walls not in WALLS:
-        raise InputError(f"walls must be {', '.join(WALLS)}, or segments, got {brief(walls)}")
+        words = f"must be {', '.join(WALLS)}, or segments, got {brief(walls)}"
+        raise InputError.of("walls", walls, words)
     left, bottom = (packing.x - packing.r[:, None]).min(axis=0)
     right, top = (packing.x + packing.r[:, None]).max(axis=0)
     floor = (left, bottom, right, bottom)
