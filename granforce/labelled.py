@@ -12,7 +12,7 @@ import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.records import InputError, Packing, brief, with_article
+from granforce.records import InputError, Packing, choice, with_article
 from granforce.study.bounds import clusters_of
 from granforce.study.schema import VARIABLES
 from granforce.tolerances import AT_REST
@@ -179,8 +179,7 @@ def to_dataset(
     Raises InputError for anything else, for a unit without effect, and if the ensemble is missing
     or does not match.
     """
-    if unit not in UNITS:
-        raise InputError(f"unit must be packing or mean, got {brief(unit)}")
+    choice(unit, UNITS, "unit")
     dataset = _dataset(result, ensemble)
     return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble)
 

@@ -227,6 +227,7 @@ class Relaxation(NamedTuple):
 
 # The call that makes an argument of a function.
 _MAKERS = {
+    "Contacts": "contacts = gf.make_contacts(i, j, normal, length, r)",
     "CriticalForce": "critical = gf.critical_force(S, contact)",
     "Ensemble": "S = gf.ensemble(packing)",
     "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
@@ -581,6 +582,7 @@ def make_packing(
     Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains
     that touch their own images, and shapes that do not match.
     """
+    _check_kind("make_packing", contacts, Contacts)
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")

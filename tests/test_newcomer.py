@@ -1061,6 +1061,44 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
         gf.to_dataframe(gf.limit_loads(S, S.index[:1]), S)
 
 
+def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
+    S, disks = gf.ensemble(gf.scene("groove")), ([[1, 1], [3, 1]], [1, 1], 0.6)
+    packing, field = S.packing, np.zeros((2, 2))
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    draw, same = gf.figures, tmp_path / "same.vtk"
+    slips = {
+        "a path must be text or a pathlib.Path, got 1": lambda: gf.load_packing(1),
+        "a path must be text or a pathlib.Path, got None": lambda: gf.read_table(None, mu=0.3),
+        f"{same}: give each of the two files": lambda: gf.save_vtk(packing, same, same),
+        "pressure applies to periodic boxes": lambda: gf.from_disks(
+            *disks, walls="floor", gravity=1, pressure=3
+        ),
+        "tolerance has no effect": lambda: gf.read_table(
+            *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], tolerance=1e-5
+        ),
+        "walls must be a regular array": lambda: gf.from_disks(*disks, walls=packing, gravity=1),
+        "make_packing takes a Contacts, not 3": lambda: gf.make_packing(*packing[:3], 3, [], 0.3),
+        "bodies must be a list": lambda: gf.blocks(3, 0.5),
+        "friction must be {": lambda: gf.blocks([square], 0.5, fixed=[0], friction=0.3),
+        "give the name of each": lambda: gf.blocks([square], 0.5, fixed=[0], names=[]),
+        "contacts must be a list of numbers from 0 to 1": lambda: gf.plot(packing, contacts=[-1]),
+        "displacements must have shape": lambda: draw.displacement(packing, field),
+        "compare must be {name: rows}": lambda: draw.indeterminacy([{"mu": 0.1}], compare=3),
+        "mu must be real numbers, got text": lambda: draw.indeterminacy([{"mu": "x"}]),
+        "every sigma is NaN": lambda: gf.infer(S, S.original, np.nan),
+        "states must have shape": lambda: gf.measures.sampling(np.zeros((4, 30, 2, 2))),
+        "state must have shape": lambda: gf.measures.Growth().add(np.zeros((3, 2, 2))),
+        "give at least one friction": lambda: gf.scan(tmp_path / "s.zarr", []),
+        "known must be Known": lambda: gf.ensemble(packing, known=gf.Known(field, [0], [1])),
+    }
+    for said, slip in slips.items():
+        with pytest.raises(gf.InputError) as answer:
+            slip()
+        assert str(answer.value).startswith(said)
+    with pytest.raises(TypeError, match=r"^gauss_seidel has no option 'sweeps'; .*rest"):
+        gf.gauss_seidel(S, S.original, sweeps=3)
+
+
 def test_samples_are_drawn_and_intervals_named_as_a_colour():
     S = gf.ensemble(gf.scene("groove"))
     options = {"contacts": S.index, "backend": "matplotlib"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from typing import Any
 
@@ -13,7 +14,16 @@ from granforce.motion import sweeps
 from granforce.motion.box_motion import BOX_MASS
 from granforce.motion.contact_dynamics import StepProblem, add_forces, set_stiffness
 from granforce.numerics.lanes import MANY, ONE, room
-from granforce.records import InputError, Relaxation, choice, positive, random_seed, takes, whole
+from granforce.records import (
+    InputError,
+    Relaxation,
+    choice,
+    positive,
+    random_seed,
+    refuse_options,
+    takes,
+    whole,
+)
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
 from granforce.types import Cancel, Floats
@@ -41,6 +51,7 @@ def gauss_seidel(
 
     Raises InputError if the whole stress is prescribed or forces are known.
     """
+    refuse_options(gauss_seidel, options, [*inspect.signature(SideBySide).parameters][2:])
     order = choice(order, ("sequential", "random"), "order")
     start = ensemble.network(start, "start")
     seed, alone = random_seed(seed), SideBySide(ensemble, 1, **options)

@@ -104,7 +104,7 @@ def read_yade(
     """
     cell = _cell(box, tilt)
     tables = _yade_bodies(bodies), _yade_links(interactions, bool(columns))
-    grains, links = renamed(columns or {}, _BODY + _INTERACTION, *tables)
+    grains, links = renamed({} if columns is None else columns, _BODY + _INTERACTION, *tables)
     grains.require("x", "y", "z", "r")
     links.require(*_INTERACTION)
     plane = _plane(grains, 3)

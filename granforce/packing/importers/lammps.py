@@ -157,7 +157,7 @@ def open_lammps(
         atoms = _table(first.name, items, "ATOMS")
         entries = second.items(step)
         pairs = _table(second.name, entries, _label(entries))
-        atoms, pairs = renamed(columns or {}, NAMES, atoms, pairs)
+        atoms, pairs = renamed({} if columns is None else columns, NAMES, atoms, pairs)
         check_grains(len(atoms.rows), most_grains, first.name)
         box = box_of(first.name, items)
         x, r, index = _disks(atoms, box)

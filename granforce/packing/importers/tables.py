@@ -53,7 +53,7 @@ def read_table(
     pressure: float = 1.0,
     walls: str | npt.ArrayLike | None = None,
     gravity: float = 0.0,
-    tolerance: float = LISTED_TOUCHING,
+    tolerance: float | None = None,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from a CSV of grains and, optionally, a CSV of contacts (paths or open files).
@@ -62,7 +62,7 @@ def read_table(
     1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
     numbers from 0 without an id column); optionally nx, ny, length (otherwise nearest images are
     joined) and f_n, f_t (or fn, ft). Without contacts, grains closer than tolerance (in largest
-    radii) touch.
+    radii, by default 10⁻⁶) touch.
     box: (L_x, L_y), inf for an open direction; None: open. tilt: of the cell, whose upper side
     begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
     forces: whether to read f_n, f_t, by default if present; they then determine the pressure (in an
@@ -77,9 +77,13 @@ def read_table(
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
+    if tolerance is None:
+        tolerance = LISTED_TOUCHING
+    elif contacts is not None and walls is None:
+        raise InputError("tolerance has no effect with a table of contacts: leave it out")
     pressure = positive(pressure, "pressure")
-    found = [read_csv(source) for source in (grains, contacts) if source is not None]
-    table, *pairs = renamed(_full(columns or {}), NAMES, *found)
+    found = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
+    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *found)
     pairs = [_with_full_names(one) for one in pairs]
     _check_columns(table, "x", "y", "r")
     for one in pairs:
