@@ -21,6 +21,7 @@ _HOME = {
     "Cell": "cell",
     "Contacts": "records",
     "InputError": "records",
+    "InputWarning": "records",
     "NotJammedError": "records",
     "Packing": "records",
     "Relaxation": "records",

@@ -97,6 +97,7 @@ from granforce.perturb.loaded import loaded_networks as loaded_networks
 from granforce.records import Cancelled as Cancelled
 from granforce.records import Contacts as Contacts
 from granforce.records import InputError as InputError
+from granforce.records import InputWarning as InputWarning
 from granforce.records import NotJammedError as NotJammedError
 from granforce.records import Packing as Packing
 from granforce.records import Relaxation as Relaxation

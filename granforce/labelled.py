@@ -12,7 +12,7 @@ import xarray as xr
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.records import InputError, Packing, brief, with_article
+from granforce.records import InputError, Packing, choice, with_article
 from granforce.study.bounds import clusters_of
 from granforce.study.schema import VARIABLES
 from granforce.tolerances import AT_REST
@@ -68,6 +68,7 @@ _DIMENSIONS = {
         "rays": "ray direction",
     },
     "Outline": {"corners": "corner direction"},
+    "StressOutline": {"support": "angle"},
     "Pull": {
         "states": "value contact component",
         **dict.fromkeys(("residual", "violation"), "value"),
@@ -98,6 +99,7 @@ _RENAMED = {
     "UniformSample": {"flat": "states"},
     "Draws": {"flat": "states"},
     "LimitLoads": {"load": "limit_load"},
+    "StressOutline": {"support": "largest"},
     "_CriticalForces": {"low": "critical_low", "high": "critical_high"},
     "Carrying": {"least": "f_n_least"},
     "Informative": {
@@ -113,6 +115,7 @@ _VARIABLE_UNITS = {
     **dict.fromkeys(("residual", "violation", "gap"), UNITS["mean"]),
     **dict.fromkeys(("centre", "radius"), "length"),
     "deviation": "sigma",
+    "largest": "pressure",
 }
 
 
@@ -158,19 +161,31 @@ def _arrays(result: Any, names: Sequence[str]) -> dict[str, Any]:
     return {name: getattr(result, name, None) for name in names}
 
 
-def to_dataset(result: Any, ensemble: Ensemble | None = None) -> xr.Dataset:
+def to_dataset(
+    result: Any, ensemble: Ensemble | None = None, *, unit: str = "packing"
+) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
 
     result: a Packing, a record returned by `intervals`, `walk` and others, the list from
     `critical_forces`, networks (N_c, 2), (S, N_c, 2) or (chains, S, N_c, 2), or a number per
     contact (N_c,), such as limit loads of all of S. ensemble: of the result, not needed for a
-    Packing, Volume or Outline. Coordinates: contact, its number in the packing; i and j, its
-    grains; x and y, the point of contact, length; component, "f_n" or "f_t"; polygon, "inner" or
-    "outer" for an outline's corners. Forces are in the packing's unit. Numbers and texts of the
-    record become attributes.
+    Packing, Volume, Outline or StressOutline. Coordinates: contact, its number in the packing; i
+    and j, its grains; x and y, the point of contact, length; component, "f_n" or "f_t"; polygon,
+    "inner" or "outer" for an outline's corners; angle, of a StressOutline. unit: of forces,
+    "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of the
+    command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are always in it.
+    Numbers and texts of the record become attributes.
 
-    Raises InputError for anything else, and if the ensemble is missing or does not match.
+    Raises InputError for anything else, for a unit without effect, and if the ensemble is missing
+    or does not match.
     """
+    choice(unit, UNITS, "unit")
+    dataset = _dataset(result, ensemble)
+    return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble)
+
+
+def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
+    """A result as a dataset in the packing's unit."""
     result = _several(result)
     if isinstance(result, np.ndarray) and result.ndim == 1:
         dimensions, arrays = {"value": "contact"}, {"value": result}
@@ -220,38 +235,27 @@ def to_dataframe(
     variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
     `read_known` and ``--known`` read the file that the table's `to_csv` writes. Of intervals,
     ``cluster`` is the cluster of undetermined contacts, −1 where determined. A Volume has a row for
-    each ladder, an Outline for each corner, a Body for each contact along each direction. unit: of
-    forces, "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of
-    the command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are always in
-    [mean]. Other arguments and errors as for `to_dataset`.
+    each ladder, an Outline for each corner, a StressOutline for each angle, a Body for each contact
+    along each direction. Arguments and errors as for `to_dataset`.
     """
-    if unit not in UNITS:
-        raise InputError(f"unit must be packing or mean, got {brief(unit)}")
-    dataset = to_dataset(result, ensemble)
-    if unit == "mean":
-        if not isinstance(ensemble, Ensemble):
-            raise InputError('unit="mean" needs S: gf.to_dataframe(result, S, unit="mean")')
-        if UNITS["packing"] not in {v.attrs.get("units") for v in dataset.variables.values()}:
-            raise InputError(
-                'unit="mean" changes nothing here, as no variable is known to be a force; leave it '
-                "out (a force divided by S.force_scale is in units of ⟨f_n⟩)"
-            )
-        dataset = _in_mean_forces(dataset, ensemble.force_scale)
+    dataset = to_dataset(result, ensemble, unit=unit)
     if "contact" not in dataset.sizes:
-        return _corners(dataset) if "corner" in dataset.sizes else dataset.to_dataframe()
+        others = {"corner": _corners, "angle": _angles}
+        table = next((table for name, table in others.items() if name in dataset.sizes), None)
+        return dataset.to_dataframe() if table is None else table(dataset)
     words = {units: word for word, units in UNITS.items()} | {"sigma": "sigma"}
     columns = {}
     for name, values in dataset.data_vars.items():
         if "contact" not in values.dims or "side" in values.dims[1:]:
             continue
-        unit = words.get(values.attrs.get("units", ""))
+        word = words.get(values.attrs.get("units", ""))
         if "component" not in values.dims:
-            columns[column_name(None, str(name), unit)] = values
+            columns[column_name(None, str(name), word)] = values
             continue
         variable = "" if name in ("states", "forces") else str(name)
         for part in COMPONENTS:
             one = values.sel(component=part, drop=True)
-            columns[column_name(part, variable, unit)] = one
+            columns[column_name(part, variable, word)] = one
     order = [
         name
         for name in ("chain", "state", "value", "load", "side", "direction")
@@ -263,8 +267,16 @@ def to_dataframe(
     return table[[*first, *(name for name in columns if name not in first)]]
 
 
-def _in_mean_forces(dataset: xr.Dataset, scale: float) -> xr.Dataset:
-    """The same with all forces divided by ⟨f_n⟩."""
+def _in_mean_forces(dataset: xr.Dataset, ensemble: Ensemble | None) -> xr.Dataset:
+    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces."""
+    if not isinstance(ensemble, Ensemble):
+        raise InputError('unit="mean" needs S as the second argument: (result, S, unit="mean")')
+    if UNITS["packing"] not in {v.attrs.get("units") for v in dataset.variables.values()}:
+        raise InputError(
+            'unit="mean" changes nothing here, as no variable is known to be a force; leave it '
+            "out (a force divided by S.force_scale is in units of ⟨f_n⟩)"
+        )
+    scale = ensemble.force_scale
     units = {"units": UNITS["mean"]}
     return dataset.assign(
         {
@@ -323,6 +335,12 @@ def _corners(dataset: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame({"polygon": dataset["polygon"].values, "u1": u[:, 0], "u2": u[:, 1]})
 
 
+def _angles(dataset: xr.Dataset) -> pd.DataFrame:
+    """A row for each angle of an outline of stresses."""
+    table = dataset.to_dataframe().reset_index()
+    return table.rename(columns=lambda name: column_name(None, name, dataset[name].attrs["units"]))
+
+
 def _contact_labels(packing: Packing, contacts: Integers) -> dict[str, Any]:
     every, at = packing.contacts, packing.contact_points[contacts]
     return {
@@ -348,6 +366,8 @@ def _labels(result: Any) -> dict[str, Any]:
     if type(result).__name__ == "Outline":
         polygons = ["inner"] * len(result.inner) + ["outer"] * len(result.outer)
         labels["polygon"] = ("corner", np.array(polygons, dtype=object))
+    if type(result).__name__ == "StressOutline":
+        labels["angle"] = ("angle", result.angles, {"units": "rad"})
     for dimension, name in (("value", "values"), ("load", "loads")):
         if isinstance(values := getattr(result, name, None), np.ndarray):
             labels[dimension] = values

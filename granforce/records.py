@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -42,8 +42,23 @@ _KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "te
 class InputError(ValueError):
     """Input cannot be used; the message says in one line what is wrong and what to do."""
 
+    # The name of a refused argument, with which the message begins, and its value.
+    argument: str = ""
+    value: Any = None
+
+    @classmethod
+    def of(cls, argument: str, value: Any, words: str) -> Self:
+        """The error of an argument; words follow its name."""
+        error = cls(f"{argument} {words}")
+        error.argument, error.value = argument, value
+        return error
+
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
+
+
+class InputWarning(UserWarning):
+    """Input can be used, but is probably wrong; the message says what to check."""
 
 
 class NotJammedError(InputError):
@@ -212,6 +227,7 @@ class Relaxation(NamedTuple):
 
 # The call that makes an argument of a function.
 _MAKERS = {
+    "Contacts": "contacts = gf.make_contacts(i, j, normal, length, r)",
     "CriticalForce": "critical = gf.critical_force(S, contact)",
     "Ensemble": "S = gf.ensemble(packing)",
     "Packing": "packing = gf.pack(400, 0.1), or gf.load_packing(file)",
@@ -328,7 +344,7 @@ def real(value: Any, name: str) -> float:
     """One real number as a float, which may be NaN or infinity; InputError otherwise."""
     array = real_array(value, name)
     if array.ndim:
-        raise InputError(f"{name} must be one number, got {brief(value)}")
+        raise InputError.of(name, value, f"must be one number, got {brief(value)}")
     return float(array)
 
 
@@ -336,7 +352,8 @@ def choice(value: Any, options: Collection[str], name: str) -> str:
     """The value, if it is one of the options; InputError otherwise."""
     if not isinstance(value, str) or value not in options:
         *others, last = options
-        raise InputError(f"{name} must be {', '.join(others)} or {last}, got {brief(value)}")
+        words = f"must be {', '.join(others)} or {last}, got {brief(value)}"
+        raise InputError.of(name, value, words)
     return value
 
 
@@ -363,7 +380,7 @@ def _number(value: Any, name: str) -> float:
             raise TypeError
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be a number, got {brief(value)}") from None
+        raise InputError.of(name, value, f"must be a number, got {brief(value)}") from None
 
 
 def friction(mu: Any) -> float:
@@ -371,18 +388,16 @@ def friction(mu: Any) -> float:
 
     Raises InputError unless it is 0 or between 1/LARGEST_UNIT and LARGEST_FRICTION.
     """
-    value = _number(mu, "friction coefficient")
+    name = "friction coefficient"
+    value = _number(mu, name)
     if not np.isfinite(value) or value < 0:
-        raise InputError(f"friction coefficient must be finite and ≥ 0, got {value:g}")
+        raise InputError.of(name, mu, f"must be finite and ≥ 0, got {value:g}")
     if value > LARGEST_FRICTION:
-        raise InputError(
-            f"friction coefficient {value:g} is too large for the balance of forces in double "
-            f"precision; use at most {LARGEST_FRICTION:g}"
-        )
+        why = "is too large for the balance of forces in double precision; use at most"
+        raise InputError.of(name, mu, f"{value:g} {why} {LARGEST_FRICTION:g}")
     if 0 < value < 1 / LARGEST_UNIT:  # its inverse, or a product of two, would overflow
-        raise InputError(
-            f"friction coefficient {value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
-        )
+        words = f"{value:g} is too small; take 0, or at least {1 / LARGEST_UNIT:g}"
+        raise InputError.of(name, mu, words)
     return float(f"{abs(value):.{MU_DIGITS}g}")  # also for −0
 
 
@@ -408,11 +423,12 @@ def positive(
     """The value as a finite float > 0 (or_zero: ≥ 0) from least to most; InputError otherwise."""
     number = _number(value, name)
     if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
-        raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
+        words = f"must be finite and {'≥' if or_zero else '>'} 0, got {number:g}"
+        raise InputError.of(name, value, words)
     if number < least:
-        raise InputError(f"{name} must be at least {least:g}, got {number:g}")
+        raise InputError.of(name, value, f"must be at least {least:g}, got {number:g}")
     if number > most:
-        raise InputError(f"{name} must be at most {most:g}, got {number:g}")
+        raise InputError.of(name, value, f"must be at most {most:g}, got {number:g}")
     return number
 
 
@@ -424,11 +440,11 @@ def whole(value: Any, name: str, least: int = 0, most: int | None = LARGEST_WHOL
     except (TypeError, ValueError, OverflowError):
         exact = False
     if not exact:
-        raise InputError(f"{name} must be a whole number, got {brief(value)}")
+        raise InputError.of(name, value, f"must be a whole number, got {brief(value)}")
     if number < least:
-        raise InputError(f"{name} must be at least {least}, got {brief(value)}")
+        raise InputError.of(name, value, f"must be at least {least}, got {brief(value)}")
     if most is not None and number > most:
-        raise InputError(f"{name} must be at most {most}, got {brief(value)}")
+        raise InputError.of(name, value, f"must be at most {most}, got {brief(value)}")
     return number
 
 
@@ -454,10 +470,9 @@ def moderate(value: Any, name: str) -> float:
     """The value as a float > 0 whose powers stay finite; InputError otherwise."""
     number = positive(value, name)
     if not 1 / LARGEST_UNIT <= number <= LARGEST_UNIT:
-        raise InputError(
-            f"{name} must lie between {1 / LARGEST_UNIT:g} and {LARGEST_UNIT:g}, got {number:g}; "
-            "choose another unit"
-        )
+        limits = f"between {1 / LARGEST_UNIT:g} and {LARGEST_UNIT:g}"
+        words = f"must lie {limits}, got {number:g}; choose another unit"
+        raise InputError.of(name, value, words)
     return number
 
 
@@ -467,8 +482,8 @@ def make_contacts(
     """Contacts from array-likes, cast once.
 
     i, j (N_c,): grains, from 0. normal (N_c, 2): unit vectors from i to j. length (N_c,): centre
-    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than
-    RIGID_OVERLAP, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
+    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than 10⁻⁵ of
+    the largest radius, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
     disks).
 
     Raises InputError for grains outside 0 … N − 1, self-contacts, normals of other length,
@@ -567,6 +582,7 @@ def make_packing(
     Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains
     that touch their own images, and shapes that do not match.
     """
+    _check_kind("make_packing", contacts, Contacts)
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
@@ -614,7 +630,9 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
         raise InputError(f"box must be two sides L_x, L_y > 0: {error}") from None
     tilt = real(tilt, "tilt")
     if box.shape != (2,) or not np.all(box > 0):
-        raise InputError(f"box must be two sides L_x, L_y > 0, got {brief(box)}")
+        raise InputError.of(
+            "box", box, f"must be two sides L_x, L_y > 0, got {brief(box.tolist())}"
+        )
     if not np.isfinite(tilt):
         raise InputError(f"the tilt of the cell must be a finite number, got {tilt}")
     if tilt and not np.all(np.isfinite(box)):

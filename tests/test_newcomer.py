@@ -20,12 +20,15 @@ import xarray as xr
 from packings import packed, reference
 
 import granforce as gf
+from granforce import tolerances
 from granforce.cli import report_lines
 from granforce.cli.parser import main
 from granforce.cli.results import with_units
 from granforce.cli.words import make_parser
+from granforce.explore import uniform
 from granforce.figures import picture
 from granforce.glossary import TERMS
+from granforce.packing import compaction
 from granforce.packing.scenes import SCENES
 from granforce.perturb import grain_loads
 from granforce.study import scan
@@ -41,6 +44,22 @@ def test_tab_and_help_list_the_public_names_and_nothing_else():
     assert all(getattr(gf, name) is not None for name in names)
     told = pydoc.render_doc(gf, renderer=pydoc.plaintext)
     assert "    pack(" in told and "class Packing(" in told and "find_a_place" not in told
+
+
+def test_help_shows_the_values_of_constants():
+    numbers = (int, float)
+    for name in gf.__all__:
+        thing = getattr(gf, name)
+        home = sys.modules.get(getattr(thing, "__module__", ""), gf)
+        for word in re.findall(r"\b[A-Z][A-Z_]{4,}\b", inspect.getdoc(thing) or ""):
+            value = getattr(tolerances, word, getattr(home, word, None))
+            assert not isinstance(value, numbers) or name == "Side", (name, word)
+    told = pydoc.render_doc(gf.pack, renderer=pydoc.plaintext)
+    assert f"farther than {compaction.STRIDE:g}." in told
+    assert f"by default {compaction.NEARLY_BALANCED:g}, less from {compaction.SEVERAL} d" in told
+    assert "10⁻⁴" in told and compaction.NEARLY_FRICTIONLESS == 1e-4
+    told = inspect.getdoc(gf.sample_uniform)
+    assert f"up to {uniform.MOST_STATES} times" in told
 
 
 def test_help_shows_types_by_their_names():
@@ -143,7 +162,10 @@ def test_seeds_have_defaults_as_on_the_command_line():
 
 
 def test_a_mistyped_store_leaves_nothing(tmp_path):
-    assert len(gf.open_store(tmp_path / "typo.zarr")) == 0
+    store = gf.open_store(tmp_path / "typo.zarr")
+    assert len(store) == 0
+    with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the path$"):
+        gf.figures.indeterminacy(store)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -257,7 +279,7 @@ def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsy
     }
     for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
         stored.pop(name)  # the store gives these names to something else, or one for each state
-    for name in ("pressure", "reached"):
+    for name in ("coordination", "pressure", "reached"):  # of which help says more
         stored.pop(name)
     assert len(stored) > 25 and stored.items() <= report_lines.MEANINGS.items()
     assert main("intervals p.npz".split()) == 0
@@ -313,6 +335,11 @@ def test_relaxations_are_typed_as_functions_are_called():
     for name, word in typed.items():
         function = computed[word]["relax"]
         assert getattr(gf, name.removesuffix("_only")) is function
+    S = gf.ensemble(reference("n100_mu0.1_s11"))
+    named, called = gf.walk(S, 2, relax="nearest_piqp"), gf.walk(S, 2, relax=gf.nearest_piqp)
+    assert np.array_equal(named.states, called.states)
+    with pytest.raises(gf.InputError, match=r"^relax must be nearest, .*only, got 'newton'$"):
+        gf.walk(S, 2, relax="newton")
 
 
 def test_stored_walks_are_listed_with_the_relaxation_as_typed(cache, capsys):
@@ -983,9 +1010,24 @@ def test_tables_are_in_either_unit():
     high = table["f_n_high [packing]"].to_numpy()
     assert mean["f_n_high [mean]"].to_numpy() == pytest.approx(high / S.force_scale)
     assert "f_n_high [packing]" not in mean and S.force_scale != 1
+    force, dataset = bounds.high / S.force_scale, gf.to_dataset(bounds, S, unit="mean")
+    assert np.array_equal(dataset["high"], force, equal_nan=True)
+    assert dataset["high"].units == "mean normal force"
     for name, options in {"unit must be": {"unit": "N"}, "needs S": {"unit": "mean"}}.items():
         with pytest.raises(gf.InputError, match=name):
             gf.to_dataframe(S.packing, **options)
+
+
+def test_an_outline_of_stresses_is_labelled_as_the_command_writes_it(cache, capsys):
+    assert main("stress -n 30 --mu 0.3 --angles 5 --out s.csv".split()) == 0
+    assert main("stress -n 30 --mu 0.3 --angles 5 --out s.zarr".split()) == 0
+    outline = gf.stress_outline(gf.ensemble(gf.pack(30, 0.3)), 5)
+    pd.testing.assert_frame_equal(gf.to_dataframe(outline), pd.read_csv("s.csv"))
+    written, labelled = xr.open_zarr("s.zarr", consolidated=False), gf.to_dataset(outline)
+    xr.testing.assert_equal(written, labelled)
+    assert labelled["angle"].units == written["angle"].units == "rad"
+    assert labelled["largest"].units == written["largest"].units == "pressure"
+    assert labelled.attrs["friction"] == outline.friction
 
 
 def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
@@ -1019,6 +1061,44 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
         gf.to_dataframe(gf.limit_loads(S, S.index[:1]), S)
 
 
+def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
+    S, disks = gf.ensemble(gf.scene("groove")), ([[1, 1], [3, 1]], [1, 1], 0.6)
+    packing, field = S.packing, np.zeros((2, 2))
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    draw, same = gf.figures, tmp_path / "same.vtk"
+    slips = {
+        "a path must be text or a pathlib.Path, got 1": lambda: gf.load_packing(1),
+        "a path must be text or a pathlib.Path, got None": lambda: gf.read_table(None, mu=0.3),
+        f"{same}: give each of the two files": lambda: gf.save_vtk(packing, same, same),
+        "pressure applies to periodic boxes": lambda: gf.from_disks(
+            *disks, walls="floor", gravity=1, pressure=3
+        ),
+        "tolerance has no effect": lambda: gf.read_table(
+            *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], tolerance=1e-5
+        ),
+        "walls must be a regular array": lambda: gf.from_disks(*disks, walls=packing, gravity=1),
+        "make_packing takes a Contacts, not 3": lambda: gf.make_packing(*packing[:3], 3, [], 0.3),
+        "bodies must be a list": lambda: gf.blocks(3, 0.5),
+        "friction must be {": lambda: gf.blocks([square], 0.5, fixed=[0], friction=0.3),
+        "give the name of each": lambda: gf.blocks([square], 0.5, fixed=[0], names=[]),
+        "contacts must be a list of numbers from 0 to 1": lambda: gf.plot(packing, contacts=[-1]),
+        "displacements must have shape": lambda: draw.displacement(packing, field),
+        "compare must be {name: rows}": lambda: draw.indeterminacy([{"mu": 0.1}], compare=3),
+        "mu must be real numbers, got text": lambda: draw.indeterminacy([{"mu": "x"}]),
+        "every sigma is NaN": lambda: gf.infer(S, S.original, np.nan),
+        "states must have shape": lambda: gf.measures.sampling(np.zeros((4, 30, 2, 2))),
+        "state must have shape": lambda: gf.measures.Growth().add(np.zeros((3, 2, 2))),
+        "give at least one friction": lambda: gf.scan(tmp_path / "s.zarr", []),
+        "known must be Known": lambda: gf.ensemble(packing, known=gf.Known(field, [0], [1])),
+    }
+    for said, slip in slips.items():
+        with pytest.raises(gf.InputError) as answer:
+            slip()
+        assert str(answer.value).startswith(said)
+    with pytest.raises(TypeError, match=r"^gauss_seidel has no option 'sweeps'; .*rest"):
+        gf.gauss_seidel(S, S.original, sweeps=3)
+
+
 def test_samples_are_drawn_and_intervals_named_as_a_colour():
     S = gf.ensemble(gf.scene("groove"))
     options = {"contacts": S.index, "backend": "matplotlib"}
@@ -1036,6 +1116,7 @@ def test_samples_are_drawn_and_intervals_named_as_a_colour():
         ("import table bare.csv --mu 0.5", "bare.csv: the first line contains only numbers; "),
         ("import table other.csv --mu 0.5", "other.csv: no column x, y, r; "),
         ("figures rows.csv --out f.png", "rows.csv is a table; "),
+        ("plot folder --out f.png", "folder is a folder; plot draws the file of a packing (.npz)"),
         ("plot p.npz --states bounds.zarr --out p.png", "bounds.zarr: contains no states; "),
     ],
 )
@@ -1043,6 +1124,7 @@ def test_slips_of_a_newcomer_are_answered_with_what_to_do(line, said, cache, cap
     Path("bare.csv").write_text("0,0,1\n2,0,1\n")
     Path("other.csv").write_text("pos_x,pos_y,rad\n0,0,1\n2,0,1\n")
     Path("rows.csv").write_text("mu\n0.1\n")
+    Path("folder").mkdir()
     if line.startswith("plot"):
         gf.save_packing(gf.scene("groove"), "p.npz")
         assert main("intervals p.npz --out bounds.zarr".split()) == 0
@@ -1054,6 +1136,28 @@ def test_slips_of_a_newcomer_are_answered_with_what_to_do(line, said, cache, cap
     told = capsys.readouterr().err
     assert code == 2 and told.count("\n") == 1 and told.startswith(f"granforce: {said}")
     assert "other" not in line or "--columns x=NAME" in told
+
+
+@pytest.mark.parametrize(
+    "option, said",
+    [
+        ("--mu -1", "must be finite and ≥ 0"),
+        ("--ensemble-mu -1", "must be finite and ≥ 0"),
+        ("--seed -1", "must be at least 0"),
+        ("--walk-seed -1", "must be at least 0"),
+        ("-n -1", "must be at least 0"),
+        ("--step-accuracy 7", "must be at most 1"),
+        ("--drag-below 7", "must be at most 1"),
+        ("--box-mass 1e99", "must lie between 1e-60 and 1e+60"),
+        ("--states 0", "must be at least 1"),
+        ("--chains 0", "must be at least 1"),
+    ],
+)
+def test_messages_name_the_option_that_was_typed(option, said, cache, capsys):
+    usual = " --mu 0.3" if "--mu" not in option.split() else ""
+    assert main(f"walk {option}{usual}".split()) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"granforce: {option.split()[0]} {said}")
 
 
 def test_only_disks_without_support_are_named():
@@ -1068,7 +1172,8 @@ def test_a_load_factor_of_rounding_errors_is_0(monkeypatch):
     assert gf.load_factor(S).factor == 0.0
 
 
-def test_bars_end_at_their_total_unless_interrupted(capsys):
+def test_bars_end_at_their_total_unless_interrupted(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with terminal.Bar("bounds", "bound") as progress:
         progress(3, 8)
     assert "8/8" in capsys.readouterr().err.rsplit("\r", 1)[-1]
@@ -1174,10 +1279,13 @@ def test_forces_that_are_clearly_no_equilibrium_are_noted():
     """A sheared lattice balances if |f_t| has opposite signs; of equal sign they turn each disk."""
     good = gf.read_table(*square_lattice(1, 0.25, -0.25), mu=0.3, box=[3, 3])
     assert good.info["residual"] < 1e-14 and "notes" not in good.info
-    slipped = gf.read_table(*square_lattice(1, 0.5, -0.5), mu=0.3, box=[3, 3])
+    with pytest.warns(gf.InputWarning) as warned:
+        slipped = gf.read_table(*square_lattice(1, 0.5, -0.5), mu=0.3, box=[3, 3])
     (note,) = slipped.info["notes"]
+    assert [str(one.message) for one in warned] == [note] and warned[0].filename == __file__
     assert "|f_t| ≤ μ f_n by up to 0.2 ⟨f_n⟩: check μ = 0.3" in note  # 0.5 − 0.3
-    turned = gf.read_table(*square_lattice(1, 0.25, 0.25), mu=0.3, box=[3, 3])
+    with pytest.warns(gf.InputWarning, match="by up to 1"):
+        turned = gf.read_table(*square_lattice(1, 0.25, 0.25), mu=0.3, box=[3, 3])
     (note,) = turned.info["notes"]
     assert "do not balance the grains, by up to 1 ⟨f_n⟩" in note  # four contacts
 
@@ -1186,7 +1294,8 @@ def test_the_command_prints_such_a_note(cache, capsys):
     for name, file in zip(("g.csv", "c.csv"), square_lattice(1, 0.5, -0.5), strict=True):
         Path(name).write_text(file.read())
     assert main("import table g.csv c.csv --mu 0.3 --box 3 3".split()) == 0
-    assert "granforce: the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n" in capsys.readouterr().err
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("granforce: the forces violate f_n ≥ 0 or |f_t| ≤ μ f_n")
 
 
 def test_a_periodic_table_with_few_digits_is_answered_with_the_tolerance():

@@ -92,7 +92,8 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         store = getattr(arguments, "store", None)
         return max(code, 1) if store is not None and store.incomplete else code
     except InputError as error:
-        return refused(str(error))
+        option = command.option_of(error.argument, error.value, arguments)
+        return refused(option + str(error).removeprefix(error.argument) if option else str(error))
     except MemoryError as error:
         return refused(f"not enough memory: {str(error) or 'ask for less'}")
     except Cancelled:

@@ -104,6 +104,14 @@ _CALLED = {
     "sample": "uniform",
     "bounds": "intervals",
 }
+# Arguments of the library as its messages call them, and the attributes of their options.
+_ARGUMENTS = {
+    "friction coefficient": "mu",
+    "the number of disks": "n",
+    "the number of random contacts": "random",
+    "the number of states kept": "keep",
+    "effective sample size": "effective",
+}
 # Options that a useless one may be mistaken for, as attributes.
 _INSTEAD = {"mu": "ensemble_mu"}
 
@@ -248,6 +256,23 @@ class Parser(argparse.ArgumentParser):
                     words = f"{', '.join(others)} or {last}" if others else last
                     return f"{action.option_strings[-1]} {path}: the name must end with {words}"
         return None
+
+    def option_of(self, argument: str, value: Any, arguments: argparse.Namespace) -> str | None:
+        """The option, as typed, that gave an argument of the library its value, or None.
+
+        Of several, such as --seed and --walk-seed for a seed, it is the one with that value.
+        """
+        word = _ARGUMENTS.get(argument, argument.removeprefix("the number of "))
+        found = [
+            (typed, given)
+            for name, typed in self.options.items()
+            if f"_{name}".endswith(f"_{word}")
+            and (given := getattr(arguments, name, None)) is not None
+        ]
+        if len(found) > 1:
+            plain = isinstance(value, (int, float, str))
+            found = [one for one in found if one[1] is value or (plain and one[1] == value)]
+        return found[0][0] if found else None
 
     def paths(self, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
         """(as typed, path with its role) of every path in a command line."""

@@ -52,7 +52,8 @@ MEANINGS = {
     "mu": "friction coefficient μ",
     "pressure": "pressure P0; undefined in an open packing",
     "packing_fraction": "packing fraction φ, rattlers included",
-    "coordination": "mean coordination number z of the backbone",
+    "coordination": "mean number z of contacts of a backbone grain, including those with walls; "
+    "walls and rattlers do not count as grains",
     "mean_normal_force": "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
     "the pressure is prescribed, otherwise the plain mean of the original network",
     "residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",

@@ -40,8 +40,9 @@ def write_columns(path: str, columns: Mapping[str, Any]) -> None:
 
 def _dataset(columns: Mapping[str, Any]) -> xr.Dataset:
     """Columns as variables of `to_dataset`: f_n_low and f_t_low become low, by component."""
-    rows, *others = columns
-    coordinates: dict[str, Any] = {rows: columns[rows]}
+    first, *others = columns
+    _, rows, word = parts(first)
+    coordinates: dict[str, Any] = {rows: (rows, columns[first], {"units": word} if word else {})}
     variables: dict[str, Any] = {}
     for name in others:
         if name in _LABELS:

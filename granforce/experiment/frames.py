@@ -34,6 +34,8 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
     Sorted by number. columns: of text files, as for `read_pegs`. Raises InputError if there are
     none, or two with the same number.
     """
+    if not paths:
+        raise InputError("give a folder of frames, or their files")
     files = []
     for path in map(expanded, paths):
         if path.is_dir():

@@ -53,7 +53,7 @@ class Draws(NamedTuple):
     residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component
-    reached: bool  # all in S, and R̂ ≤ MIXED
+    reached: bool  # all in S, and R̂ ≤ 1.1
     counts: dict[str, Any]  # turns, rejected paths, dropped states, held coordinates
     setup_seconds: float  # wall time for computing the walls
     sampling_seconds: float  # wall time of the draws, including dropped ones

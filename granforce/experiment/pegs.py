@@ -26,6 +26,7 @@ from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
 from granforce.packing.importers.network import WORTH_REVERSING, judged, worth_reversing
+from granforce.packing.importers.notes import noted
 from granforce.packing.importers.text import Source, check_grains
 from granforce.records import (
     InputError,
@@ -92,6 +93,7 @@ def open_frames(
     return read_frames(positions, adjacency, columns)
 
 
+@noted(lambda photoelastic: photoelastic.report)
 def read_pegs(
     positions: Source | Frames,
     adjacency: Source | None = None,
@@ -132,13 +134,14 @@ def read_pegs(
 
     The report gives the repairs, by kind; how many inner grains cannot be balanced on the listed
     contacts alone and with the candidates, with their total unbalance in mean measured normal
-    forces; and the result.
+    forces; and the result. Its notes are also InputWarnings.
 
     Raises InputError naming file and line.
     """
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:
-        raise InputError(f"reach is in mean radii and must lie between 0 and 2, got {reach}")
+        words = f"is in mean radii and must lie between 0 and 2, got {reach}"
+        raise InputError.of("reach", reach, words)
     if walls is not None and not hasattr(walls, "gaps"):
         walls = read_outline(walls)
     listing = open_frames(positions, adjacency, columns=columns).listing(frame)

@@ -26,7 +26,7 @@ from granforce.experiment.listing import Listing
 from granforce.experiment.matfile import read_struct
 from granforce.packing.importers.text import LARGEST, Source
 from granforce.records import InputError
-from granforce.system.files import content_of
+from granforce.system.files import content_of, path_text
 from granforce.types import Floats
 
 _NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
@@ -88,7 +88,7 @@ def _content(source: Source) -> tuple[str, bytes]:
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
-        name = os.fspath(source)
+        name = path_text(source)
         content = content_of(name, _LARGEST_FILE)
     name = os.path.basename(name) or name
     if isinstance(content, str) or not content:

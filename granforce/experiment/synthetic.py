@@ -12,7 +12,16 @@ from granforce import notebook
 from granforce.experiment.listing import Listing
 from granforce.experiment.pegs import Photoelastic
 from granforce.forces.build import ensemble
-from granforce.records import Contacts, InputError, Packing, positive, random_seed, takes, whole
+from granforce.records import (
+    Contacts,
+    InputError,
+    Packing,
+    positive,
+    random_seed,
+    real,
+    takes,
+    whole,
+)
 from granforce.system.files import written
 from granforce.tolerances import LARGEST_UNIT
 from granforce.types import Floats, Integers
@@ -86,10 +95,10 @@ def synthetic_frame(
     with their direction and force; False: grains there are only flagged. pixels: per unit of
     length; newton: mean normal force. number: of the frame.
 
-    Raises InputError for values below 0 or beyond LARGEST_UNIT, and for a packing without forces.
+    Raises InputError for values below 0 or beyond 10⁶⁰, and for a packing without forces.
     """
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
-        if not 0 <= value <= LARGEST_UNIT or (name == "missed" and value >= 1):
+        if not 0 <= real(value, name) <= LARGEST_UNIT or (name == "missed" and value >= 1):
             raise InputError(
                 f"{name} must be from 0 to {LARGEST_UNIT:g} (missed: below 1), got {value}"
             )

@@ -85,7 +85,7 @@ class Body(NamedTuple):
 
 @takes(Ensemble)
 def body(S: Ensemble) -> Body:
-    """The Body of an Ensemble S of at most MOST_DIMENSIONS dimensions.
+    """The Body of an Ensemble S of at most three dimensions.
 
     Certificates decide where S is unbounded: a ray balances without load and leaves no cone, both
     to a relative 10⁻¹². Just below the friction μ′ at which S becomes unbounded (the tangent of

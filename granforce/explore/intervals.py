@@ -45,7 +45,7 @@ class Intervals(NamedTuple):
     gap: Floats  # (k, 2, 2) duality gap of [component, low or high] in ⟨f_n⟩
     backbone: Mask  # (k,) bool, largest f_n > 0
     max_gap: float  # largest gap among the certified bounds
-    converged: bool  # every bound was certified, with a gap ≤ INTERVAL_GAP in a bounded S
+    converged: bool  # every bound was certified, with a gap ≤ 10⁻⁸ ⟨f_n⟩ in a bounded S
     counts: dict[str, int]  # programs solved, skipped by reason, solved again by HiGHS; iterations
 
     @property
@@ -90,7 +90,7 @@ class LimitLoads(NamedTuple):
     load: Floats  # (k,) limit load F, force; inf without a limit; NaN: cancelled, or not certified
     gap: Floats  # (k,) duality gap in ⟨f_n⟩
     max_gap: float
-    converged: bool  # every load was certified with a gap ≤ INTERVAL_GAP
+    converged: bool  # every load was certified with a gap ≤ 10⁻⁸ ⟨f_n⟩
     counts: dict[str, int]  # programs, again, iterations
 
 
@@ -115,7 +115,7 @@ def intervals(
     needs no program for its least f_n. watch(Bound) is called with each bound as it is computed:
     all upper bounds of f_n, then the lower ones, then those of f_t, each in order of decreasing
     widths (N_c,), which affect only this order; bounds with f_n = 0 may be sent again at the end,
-    changed by INTERVAL_GAP at most. progress(done, total) is called as programs end. cancel() →
+    changed by 10⁻⁸ ⟨f_n⟩ at most. progress(done, total) is called as programs end. cancel() →
     True ends early: missing bounds are NaN and ``converged`` is False.
 
     In an unbounded S, bounds that a self-balanced change of forces moves without end are ±inf, and

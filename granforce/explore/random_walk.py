@@ -1,9 +1,8 @@
 """Random walks in S: perturb every force, relax to an equilibrium, accept or stay.
 
-The paper's walk relaxes by contact dynamics: relax=gauss_seidel with rest=None and
-tolerance=EQUILIBRIUM. The nearest-network walk, the default, moves to the network nearest to the
-perturbed one, which is 10 to 400 times faster and always exists. The two spread differently (see
-the page on results).
+The paper's walk relaxes by contact dynamics: relax="gauss_seidel_only". The nearest-network walk,
+the default, moves to the network nearest to the perturbed one, which is 10 to 400 times faster and
+always exists. The two spread differently (see the page on results).
 """
 
 from __future__ import annotations
@@ -18,13 +17,14 @@ import numpy as np
 from granforce import measures, notebook
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest, nearest_of_many, starting_network
+from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.motion.gauss_seidel import SideBySide, gauss_seidel
 from granforce.numerics.lanes import LANES
 from granforce.records import (
     InputError,
     NotJammedError,
     Relaxation,
-    brief,
+    choice,
     random_seed,
     refuse_options,
     takes,
@@ -33,7 +33,7 @@ from granforce.records import (
 from granforce.records import whole as whole_number
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
-from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED
+from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, EQUILIBRIUM
 from granforce.types import Cancel, Floats, Integers, Progress
 
 # Number of chains from which a thread vectorises them: eight lanes cost as much as three chains.
@@ -44,6 +44,13 @@ SHUFFLED = ("order", "seed")  # options of relaxations with their own order of c
 
 Seed = int | np.random.SeedSequence
 Relax = Callable[..., Relaxation]  # as `nearest`
+# Relaxations as typed, with their options.
+RELAXATIONS: dict[str, dict[str, Any]] = {
+    "nearest": {"relax": nearest},
+    "nearest_piqp": {"relax": nearest_piqp},
+    "gauss_seidel": {"relax": gauss_seidel},
+    "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
+}
 
 
 @notebook.brief
@@ -109,7 +116,7 @@ def walk(
     *,
     chains: int = 1,
     workers: int = 1,
-    relax: Relax = nearest,
+    relax: Relax | str = "nearest",
     max_attempts: int | None = None,
     whole: bool = True,
     skip: bool = True,
@@ -123,8 +130,9 @@ def walk(
     """Random walk until `states` accepted states in all; chains follow each other in the result.
 
     chains: independent walks from the original network, with states divided evenly; workers:
-    threads, each of which vectorises many chains. Neither changes the states of a chain. relax,
-    options: the relaxation and its options. max_attempts: per chain, by default 20 per state.
+    threads, each of which vectorises many chains. Neither changes the states of a chain. relax:
+    "nearest", "nearest_piqp", "gauss_seidel", "gauss_seidel_only" (the paper's walk), or a function
+    as `nearest`; options: of the relaxation. max_attempts: per chain, by default 20 per state.
     whole: whether fewer states than requested are an error; otherwise there may be fewer, or none.
     begun: a Walk of one chain with the same arguments and fewer states, which is continued; its
     last state is computed again and must agree.
@@ -146,7 +154,9 @@ def walk(
     if chains > states:
         raise InputError(f"there must be at least as many states as chains, got {states}")
     if not callable(relax):
-        raise InputError(f"relax must be a function, such as granforce.nearest, got {brief(relax)}")
+        options = RELAXATIONS[choice(relax, RELAXATIONS, "relax")] | options
+        relax = options.pop("relax")
+        assert callable(relax)
     _check_options(relax, options)
     check_memory(16 * states * len(ensemble.index), f"{states} states")
     if chains > 1 and not (begun is None and enough is None):

@@ -86,7 +86,7 @@ class UniformSample(NamedTuple):
     residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
-    reached: bool  # complete, all in S, R̂ ≤ MIXED, and the effective sample size as requested
+    reached: bool  # complete, all in S, R̂ ≤ 1.1, and the effective sample size as requested
     counts: dict[str, Any]  # turns, rejected paths, dropped and skipped states, held coordinates
     setup_seconds: float  # wall time of the walls
     sampling_seconds: float  # wall time of the steps, including dropped ones
@@ -235,7 +235,7 @@ def sample_uniform(
 
     chains: independent chains of equal length (states are rounded up to that); workers: threads;
     the result does not depend on their number. effective: requested effective sample size (bulk and
-    tail, of every component): more states are drawn, up to MOST_STATES times the larger of both
+    tail, of every component): more states are drawn, up to 10 times the larger of both
     numbers, until it is reached; ``reached`` says whether it was. method: "billiard", or
     "hit_and_run", a slow independent check. previous: a UniformSample of this ensemble to continue,
     drawn with the same chains, seed and method. progress(done, total) counts states; cancel() →

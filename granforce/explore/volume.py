@@ -107,7 +107,7 @@ def volume(
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
     number. progress(done, total) counts paths; total is an estimate that later rounds may raise.
 
-    Raises InputError for an accuracy below LEAST_ACCURACY and unbounded forces, NotJammedError if S
+    Raises InputError for an accuracy below 0.01 and unbounded forces, NotJammedError if S
     is empty.
     """
     begin = time.perf_counter()

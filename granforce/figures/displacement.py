@@ -8,7 +8,7 @@ import numpy as np
 from granforce.figures import style
 from granforce.figures.networks import bodies, outline
 from granforce.forces.balance import left_open_in
-from granforce.records import Packing
+from granforce.records import InputError, Packing, real_array, whole
 from granforce.types import Floats
 
 # Length of the arrow of the fastest grain, in mean diameters.
@@ -21,11 +21,13 @@ def displacement(
     """Displacements of grains, or of bodies of any shape, as arrows on the packing.
 
     field (N, 2): displacements in any unit, NaN for grains without an arrow; the longest arrow is
-    LONGEST_ARROW mean diameters of free grains long. contact: position of the perturbed contact,
+    two mean diameters of free grains long. contact: position of the perturbed contact,
     which is marked.
     """
     style.ready(backend)
-    field = np.asarray(field, float)
+    field = real_array(field, "displacements")
+    if field.shape != packing.x.shape:
+        raise InputError(f"displacements must have shape {packing.x.shape}, got {field.shape}")
     known = np.isfinite(field).all(axis=1)
     size = np.linalg.norm(field[known], axis=1)
     longest = size.max(initial=0.0)
@@ -39,10 +41,11 @@ def displacement(
         *outline(packing, backend),
     ]
     if contact is not None:
-        at = packing.contact_points[[contact]]
+        last = len(packing.contacts.i) - 1
+        at = packing.contact_points[[whole(contact, "the number of a contact", 0, last)]]
         drawn.append(style.dots(at, "perturbed contact", style.COLOURS[1], backend, size=8))
-    whole = np.isfinite(packing.box).all()
-    if whole:
+    periodic = np.isfinite(packing.box).all()
+    if periodic:
         low, high = packing.cell.extent
     else:
         corners = [*(outlines[k] for k in np.flatnonzero(free)), x[known] + arrow * field[known]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.measures import statistics
-from granforce.records import InputError, brief
+from granforce.records import InputError, brief, real
 from granforce.study.cells import scan_rows
 from granforce.study.store import Store
 from granforce.types import Floats, Rows
@@ -43,7 +43,11 @@ def indeterminacy(
         points = statistics.means(rows, name, factor=factor)
         if points:
             curves.append((points, label, style.COLOURS[k], "solid", k))
-    compare = compare or {}
+    compare = {} if compare is None else compare
+    if not isinstance(compare, Mapping):
+        raise InputError(f"compare must be {{name: rows}}, got {brief(compare)}")
+    compare = {source: _checked(others) for source, others in compare.items()}
+    outside = _checked(outside)
     for source, dash in zip(compare, ("dashed", "dotted"), strict=False):
         for k, (name, label, factor) in enumerate(_MEASURES):
             points = statistics.means(compare[source], name, factor=factor)
@@ -86,6 +90,8 @@ def _checked(rows: Any) -> Rows:
         raise InputError(f"rows must be {give}; got {brief(rows)}") from None
     if not all(isinstance(row, Mapping) for row in rows):
         raise InputError(f"rows must be {give}")
+    for row in rows:
+        real(row.get("mu", np.nan), "mu")
     return rows
 
 

@@ -16,6 +16,7 @@ from granforce.forces.build import ensemble
 from granforce.records import (
     InputError,
     Packing,
+    are_whole,
     brief,
     float_array,
     real_array,
@@ -24,7 +25,7 @@ from granforce.records import (
 )
 from granforce.system.plain import counted
 from granforce.tolerances import ADMISSIBLE
-from granforce.types import Floats
+from granforce.types import Floats, Integers
 
 COLOURS = ("mobilisation", "force", "spread", "interval")
 WIDEST = 4.0  # f_n / ⟨f_n⟩ beyond which lines have constant width
@@ -72,7 +73,7 @@ def plot(
     """
     style.ready(backend)
     count = len(packing.contacts.i)
-    shown = np.arange(count) if contacts is None else np.asarray(contacts)
+    shown = np.arange(count) if contacts is None else _numbered(contacts, count)
     states = _states(states)
     drawn = packing.forces[shown] if states is None else real_array(states, "states")
     if drawn.shape[-2:] != (len(shown), 2):
@@ -102,6 +103,17 @@ def plot(
     kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     title = f"{counted(count, *kind)}, μ = {packing.mu:g}{scale}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
+
+
+def _numbered(contacts: npt.ArrayLike, count: int) -> Integers:
+    """Numbers (k,) of contacts; InputError for others than 0 … count − 1."""
+    numbers = real_array(contacts, "contacts")
+    if numbers.ndim != 1 or not are_whole(numbers, count - 1).all():
+        raise InputError(
+            f"contacts must be a list of numbers from 0 to {count - 1}, such as S.index of an "
+            f"ensemble S, got {brief(contacts)}"
+        )
+    return numbers.astype(np.int64)
 
 
 def _states(given: Any) -> Any:

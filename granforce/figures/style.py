@@ -13,7 +13,7 @@ import holoviews as hv
 from holoviews.plotting.util import process_cmap
 
 from granforce.records import InputError, with_article
-from granforce.system.files import written
+from granforce.system.files import path_text, written
 from granforce.types import Floats
 
 # Okabe and Ito's palette, distinguishable with colour-vision deficiency.
@@ -280,7 +280,7 @@ def save(figure: Any, path: str | Path, caption: str = "") -> None:
     "matplotlib" for pictures, or for none; no browser is needed. caption: a description stored in
     the file: the title of a page, the Description of a PNG, <desc> in an SVG, the Subject of a PDF.
     """
-    path = Path(path)
+    path = Path(path_text(path))
     if not isinstance(figure, hv.core.Dimensioned):
         raise InputError(
             f"save takes a HoloViews figure, not {with_article(type(figure).__name__)}"

@@ -197,7 +197,9 @@ class Ensemble:
     def coordination(self) -> float:
         """Mean number z of contacts of a grain of the backbone; NaN without grains to balance.
 
-        2 N_c / M, except that contacts with walls and other grains left open count once.
+        Contacts with walls belong to a grain's contacts, but walls, other grains left open and
+        rattlers are not among the grains of the mean: a contact of two grains counts twice, one
+        with a wall once. Without walls, z = 2N_c/N_g.
         """
         if not len(self.grains):
             return np.nan

@@ -96,6 +96,8 @@ def bounds_of(known: Known | None, count: int) -> Floats:
         if not isinstance(known, Known):
             raise TypeError
         contacts = np.atleast_1d(np.asarray(known.contacts, dtype=np.float64))
+        if contacts.ndim > 1:
+            raise TypeError
         low, high = known.sides
     except (TypeError, ValueError):
         raise InputError(

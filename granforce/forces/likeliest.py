@@ -77,7 +77,8 @@ def likeliest(
     """
     m, s = checked(ensemble, measured, sigma)
     if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
-        raise InputError(f"unmeasured must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}")
+        words = f"must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}"
+        raise InputError.of("unmeasured", unmeasured, words)
     forces = fitted(ensemble, m, s, unmeasured)
     deviation = (forces - m) / s
     freedom = int(np.isfinite(deviation).sum()) - _adapted(ensemble, m, forces)
@@ -101,6 +102,8 @@ def checked(
         raise InputError(f"measured and sigma must be numbers of shape {shape}") from None
     if m.shape != shape:
         raise InputError(f"measured must have shape {shape}, got {m.shape}")
+    if np.isnan(s).all() and not np.isnan(m).all():
+        raise InputError("every sigma is NaN: give the standard errors of the measured forces")
     nothing = np.isnan(m) | np.isnan(s)
     m[nothing] = s[nothing] = np.nan
     if np.isinf(m).any() or np.isinf(s).any():

@@ -60,8 +60,8 @@ def nearest(
     """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
 
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
-    distance to the optimum below NEAREST; ``converged`` is False where that was not reached (S is
-    empty, or max_iterations were too few): forces are the last iterate, inside the cones.
+    distance to the optimum below 10⁻⁶ ⟨f_n⟩; ``converged`` is False where that was not reached (S
+    is empty, or max_iterations were too few): forces are the last iterate, inside the cones.
     cancel() returning True raises Cancelled.
     """
     (relaxation,) = nearest_of_many(

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import fft
 
 from granforce.measures import statistics
+from granforce.measures.states import networks
 from granforce.types import Floats
 
 BLOCKS = 10  # runs of consecutive states, left out one at a time
@@ -40,6 +41,7 @@ class Sampling(NamedTuple):
 
 def sampling(states: Floats) -> Sampling:
     """Sampling of consecutive states (S, N_c, 2) of one chain."""
+    states = networks(states)
     count = len(states)
     if count < FEWEST:
         return Sampling(np.nan, np.nan, np.nan, np.nan, count)

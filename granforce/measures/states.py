@@ -16,7 +16,8 @@ from granforce.tolerances import REVERSED
 from granforce.types import Floats, Integers
 
 
-def _some(states: Any) -> Floats:
+def networks(states: Any) -> Floats:
+    """States (S, N_c, 2) as an array; InputError for another shape, and for records."""
     for name in ("flat", "states"):
         if not isinstance(states, np.ndarray) and hasattr(states, name):
             raise InputError(
@@ -29,6 +30,11 @@ def _some(states: Any) -> Floats:
             f"states must have shape (S, N_c, 2), got {states.shape}; take the states of all "
             "chains one after the other (`flat` of a sample)"
         )
+    return states
+
+
+def _some(states: Any) -> Floats:
+    states = networks(states)
     if not states.size:
         raise InputError("nothing to measure: there are no states, or no contacts")
     largest = max(states.max(), -states.min())
@@ -63,11 +69,10 @@ def eta2(states: Floats) -> float:
 
 
 def _alike(one: Floats, other: Floats) -> None:
-    """InputError unless both arrays have the same shape, as for one packing."""
-    if np.shape(one) != np.shape(other):
-        raise InputError(
-            f"shapes {np.shape(one)} and {np.shape(other)} differ; take both from one packing"
-        )
+    """InputError unless both are arrays of the same shape, as for one packing."""
+    shapes = [np.shape(refuse_hidden(array, "the array")) for array in (one, other)]
+    if shapes[0] != shapes[1]:
+        raise InputError(f"shapes {shapes[0]} and {shapes[1]} differ; take both from one packing")
 
 
 def _bounds(low: Any, high: Any) -> tuple[Floats, Floats]:
@@ -181,6 +186,7 @@ class Growth:
     def add(self, state: Floats) -> tuple[float, float, float]:
         """Add a state (N_c, 2); return (η1, η2, η3) of all states so far."""
         if not self.count:
+            float_array(state, (-1, 2), "state")
             self._first, self._low, self._high = state, state, state
             self._shift, self._square = np.zeros(state.shape), np.zeros(len(state))
         self.count += 1
@@ -210,7 +216,7 @@ def growing(states: Floats) -> dict[str, Floats]:
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
     """Position of each f_n in its interval, from 0 (least) to 1 (largest).
 
-    NaN where the force is determined: ΔF_n is at most REVERSED of the largest force.
+    NaN where the force is determined: ΔF_n is at most 10⁻⁶ of the largest force.
     normal_forces (N_c,); low, high (N_c, 2). Raises InputError as `eta3` does, and for another
     number of forces.
     """

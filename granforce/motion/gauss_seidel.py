@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from typing import Any
 
@@ -13,7 +14,16 @@ from granforce.motion import sweeps
 from granforce.motion.box_motion import BOX_MASS
 from granforce.motion.contact_dynamics import StepProblem, add_forces, set_stiffness
 from granforce.numerics.lanes import MANY, ONE, room
-from granforce.records import InputError, Relaxation, choice, positive, random_seed, takes, whole
+from granforce.records import (
+    InputError,
+    Relaxation,
+    choice,
+    positive,
+    random_seed,
+    refuse_options,
+    takes,
+    whole,
+)
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
 from granforce.types import Cancel, Floats
@@ -33,14 +43,15 @@ def gauss_seidel(
     """One step of contact dynamics from rest, by sweeps until it has ended; a Relaxation.
 
     start (N_c, 2): first guess, force. order: "sequential" or "random" (a new permutation each
-    sweep, from seed). options: tolerance (BALANCED), the residual in ⟨f_n⟩ that counts as balance;
-    rest (AT_REST), the residual from which the nearest network replaces further sweeps, None to
+    sweep, from seed). options: tolerance (10⁻¹⁰), the residual in ⟨f_n⟩ that counts as balance;
+    rest (10⁻³), the residual from which the nearest network replaces further sweeps, None to
     sweep down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also
     True if grains move steadily: then no equilibrium is near, and the residual shows it. cancel()
     returning True raises Cancelled.
 
     Raises InputError if the whole stress is prescribed or forces are known.
     """
+    refuse_options(gauss_seidel, options, [*inspect.signature(SideBySide).parameters][2:])
     order = choice(order, ("sequential", "random"), "order")
     start = ensemble.network(start, "start")
     seed, alone = random_seed(seed), SideBySide(ensemble, 1, **options)

@@ -35,6 +35,7 @@ from granforce.records import (
     make_packing,
     positive,
     real_array,
+    refuse_hidden,
 )
 from granforce.system.plain import counted
 from granforce.tolerances import TOUCHING
@@ -65,7 +66,7 @@ def blocks(
     masses are in proportion, and gravity points along −y. materials (N,): labels of the materials
     of the bodies, and friction: μ of pairs of them if it is not mu, {("stone", "wood"): 0.4, …}.
     tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
-    default TOUCHING times the largest body. balanced: whether to look for a network; otherwise
+    default 10⁻⁹ times the largest body. balanced: whether to look for a network; otherwise
     forces are 0, even if nothing balances. An edge on an edge touches at both ends of the shared
     part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
     contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. names: of the bodies, for
@@ -74,7 +75,14 @@ def blocks(
     Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights, and
     UndecidedError (an InputError, too) where rounding leaves this open, close to the limit.
     """
+    try:
+        bodies = list(bodies)
+    except TypeError:
+        words = f"a list of corners (k, 2) and disks (x, y, r), got {brief(bodies)}"
+        raise InputError(f"bodies must be {words}") from None
     names = [str(k) for k in range(len(bodies))] if names is None else names
+    if len(names) != len(bodies):
+        raise InputError(f"give the name of each of the {len(bodies)} bodies")
     outlines = [_outline(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]
     if not outlines:
         raise InputError("there are no bodies; give at least one")
@@ -108,7 +116,7 @@ def blocks(
         [np.inf, np.inf],
         contacts,
         np.zeros((len(gap), 2)),
-        _frictions(mu, materials, friction or {}, contacts),
+        _frictions(mu, materials, {} if friction is None else friction, contacts),
         load=load,
         info={"bodies": len(x), "tolerance": float(tolerance), **doubts},
         shapes=Shapes(
@@ -151,6 +159,8 @@ def _frictions(
     mu: Any, materials: Sequence[Any] | None, pairs: Mapping[Any, Any], contacts: Contacts
 ) -> Any:
     """μ, or the friction coefficients (N_c,) of pairs of materials, and μ of all other pairs."""
+    if not isinstance(pairs, Mapping):
+        raise InputError(f'friction must be {{("stone", "wood"): 0.4, …}}, got {brief(pairs)}')
     if materials is None and not pairs:
         return mu
     named = [] if materials is None else list(materials)
@@ -225,7 +235,7 @@ def _measured(body: Floats) -> tuple[float, Floats, float, float]:
 
 
 def _fixed(fixed: npt.ArrayLike, count: int) -> Mask:
-    numbers = np.asarray(fixed).ravel()
+    numbers = np.asarray(refuse_hidden(fixed, "fixed")).ravel()
     if not are_whole(numbers, count - 1).all():
         raise InputError(f"fixed bodies are numbers from 0 to {count - 1}")
     held = np.zeros(count, dtype=bool)

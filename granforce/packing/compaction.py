@@ -124,20 +124,20 @@ def pack(
     radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii.
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
-    farther than STRIDE. accuracy: largest violation of the laws of Signorini and Coulomb after a
-    step, as a velocity relative to the fastest carrying grain; sweeps: maximum per step. For
-    the defaults of dt and sweeps see `default_steps`. drag_below: drag takes the place of inertia
-    once no grain's momentum changes by more than this in a step, in ⟨f_n⟩; only for μ above
-    NEARLY_FRICTIONLESS, and by default NEARLY_BALANCED, less from SEVERAL disks on. box: "square",
-    or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
-    jammed against shear too.
+    farther than 0.02. accuracy: largest violation of the laws of Signorini and Coulomb after a
+    step, as a velocity relative to the fastest carrying grain; sweeps: maximum per step. By
+    default dt is 0.1 and sweeps 600; from μ = 0.2 on, 0.03 and 150. drag_below: drag takes the
+    place of inertia once no grain's momentum changes by more than this in a step, in ⟨f_n⟩; only
+    for μ above 10⁻⁴, and by default 0.02, less from 2000 disks on. box: "square", or "isotropic",
+    whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear
+    too.
     progress(steps done, None) is called repeatedly, as the total is unknown, and watch(Glimpse) at
-    least every WATCH_EVERY steps; neither changes a bit of the result. cancel() returning True
-    raises Cancelled.
+    least every 5 steps; neither changes a bit of the result. cancel() returning True raises
+    Cancelled.
 
-    Returns a Packing whose forces balance to BALANCED ⟨f_n⟩, whose overlaps are below OVERLAP, and
-    whose contacts are certain: `info` contains their `margin`, and the fraction of steps that ended
-    before they were accurate (`unfinished_steps`).
+    Returns a Packing whose forces balance to 10⁻¹⁰ ⟨f_n⟩, whose overlaps are below 10⁻⁹ of the
+    largest radius, and whose contacts are certain: `info` contains their `margin`, and the fraction
+    of steps that ended before they were accurate (`unfinished_steps`).
 
     Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
     """
@@ -238,10 +238,9 @@ def check_drag(drag_below: float | None, mu: float) -> float | None:
     if drag_below is None:
         return None
     if mu <= NEARLY_FRICTIONLESS:
-        raise InputError(
-            f"drag_below is not used at μ ≤ {NEARLY_FRICTIONLESS:g}, where linear programs finish "
-            "the packing; leave it out"
-        )
+        why = "where linear programs finish the packing; leave it out"
+        words = f"is not used at μ ≤ {NEARLY_FRICTIONLESS:g}, {why}"
+        raise InputError.of("drag_below", drag_below, words)
     return positive(drag_below, "drag_below", most=1.0)
 
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from granforce.forces.balance import left_open_in
 from granforce.records import InputError, Packing, float_array, refuse_shapes, takes
-from granforce.system.files import written
+from granforce.system.files import expanded, written
 from granforce.system.plain import counted
 from granforce.types import Floats
 
@@ -107,6 +107,8 @@ def _forces(packing: Packing, forces: npt.ArrayLike | None) -> Floats:
 def _write(*files: tuple[str | Path, bytes]) -> None:
     """Write both files or neither."""
     (first, one), (second, two) = files
+    if expanded(first) == expanded(second):
+        raise InputError(f"{first}: give each of the two files its own name")
     with written(first) as file, written(second) as other:
         file.write(one)
         other.write(two)

@@ -99,7 +99,7 @@ class Response(NamedTuple):
     kept: Mask  # (N_c,) bool, sticking contacts
     breach: float  # largest violation of Coulomb's law, relative to the fastest contact
     fastest: float  # largest relative displacement at a contact
-    converged: bool  # breach ≤ STEADY
+    converged: bool  # breach ≤ 0.001
 
 
 # A generator for `works.follow` that yields flows, is sent their outcomes, and returns a result.
@@ -344,7 +344,7 @@ def response(
     force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
     above the limit load if the bracket ends there). critical: the CriticalForce, computed if not
     given. The motion is that of one step of contact dynamics from rest, followed until the
-    violation of Coulomb's law is at most STEADY times the fastest relative velocity. displacement
+    violation of Coulomb's law is at most 0.001 times the fastest relative velocity. displacement
     and rotation of rattlers are NaN, as nothing moves them: use `S.grains` for the others, or
     numpy's nanmax and nanmean. cancel() returning True raises Cancelled.
 

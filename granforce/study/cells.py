@@ -148,9 +148,11 @@ def row(parameters: Parameters, dataset: xr.Dataset, cached: bool) -> dict[str, 
 def scan_rows(store: Store) -> list[dict[str, Any]]:
     """The rows of a scan, by μ and seed, for every walk in a store.
 
-    Raises InputError for a store without walks, and for one whose walks differ in more than μ and
-    seed, because means over them would be meaningless.
+    Raises InputError for a missing store, for one without walks, and for one whose walks differ in
+    more than μ and seed, because means over them would be meaningless.
     """
+    if not store.path.is_dir():
+        raise InputError(f"there is no store at {store.path}; check the path")
     entries = store.find("walk")
     if not entries:
         raise InputError(f"no walks in {store.path}; granforce scan --out STORE makes some")

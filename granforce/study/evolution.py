@@ -68,7 +68,7 @@ def evolution(
     read: list[tuple[int, Snapshot, list[StudyCell]]] = []
     for number in snapshots.numbers if numbers is None else numbers:
         try:
-            snapshot = snapshots.snapshot(number)
+            snapshot = snapshots.chosen(number)
         except InputError as error:
             failed.append((number, str(error)))
             continue

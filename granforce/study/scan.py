@@ -93,6 +93,8 @@ def scan(
     """
     refuse_options(scan, packing, [*signature(kinds.PACKING.parameters).parameters][3:])
     seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
+    if not mus:
+        raise InputError("give at least one friction coefficient")
     worker_count(workers)
     check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
     cells = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -25,7 +26,15 @@ from granforce.experiment.remeasured import remeasured
 from granforce.experiment.repair import KINDS
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
-from granforce.records import InputError, brief, friction, positive, random_seed, whole
+from granforce.records import (
+    InputError,
+    InputWarning,
+    brief,
+    friction,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.study import entries
 from granforce.study.cells import Kind, StudyCell, get
 from granforce.study.keys import Parameters
@@ -84,7 +93,8 @@ def _inferred(
     columns = chosen.pop("columns", None)
     frames = open_frames(parameters["positions"], parameters["adjacency"], columns=columns)
     number = parameters["frame"] if len(frames.frames) > 1 else None
-    photoelastic = read_pegs(frames, frame=number, **chosen)
+    with warnings.catch_warnings(action="ignore", category=InputWarning):  # the dataset has them
+        photoelastic = read_pegs(frames, frame=number, **chosen)
     return infer_frame(
         photoelastic,
         states=parameters["states"],

@@ -13,11 +13,10 @@ def edges(given: Sequence[float]) -> list[float]:
     try:
         x0, x1, y0, y1 = (float(edge) for edge in given)
     except (TypeError, ValueError):
-        raise InputError("a slice is given by four numbers x0,x1,y0,y1") from None
+        raise InputError.of("slice", given, "must be four numbers x0,x1,y0,y1") from None
     if not (0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1):
-        raise InputError(
-            f"slice {x0:g},{x1:g},{y0:g},{y1:g} must satisfy 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1"
-        )
+        words = f"{x0:g},{x1:g},{y0:g},{y1:g} must satisfy 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1"
+        raise InputError.of("slice", given, words)
     return [x0, x1, y0, y1]
 
 

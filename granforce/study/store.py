@@ -69,7 +69,8 @@ def default_path() -> Path:
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
     """The Store in a folder, which is created with the first saved entry if it is missing.
 
-    path: by default $GRANFORCE_CACHE, otherwise the user's cache folder. A folder without write
+    path: by default $GRANFORCE_CACHE, otherwise the user's cache folder. readonly: to read only,
+    which refuses a missing store, such as a mistyped one. A folder without write
     permission can be opened; saving to it raises InputError.
 
     Raises InputError for a file, for a folder with other contents, for one that cannot be created,

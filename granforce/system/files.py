@@ -8,9 +8,9 @@ import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-from granforce.records import InputError
+from granforce.records import InputError, brief
 
 # Files that are already open, by any of their names.
 _OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
@@ -61,6 +61,7 @@ def content_of(path: str | os.PathLike[str], most: int | None = None) -> bytes:
     most: largest number of bytes; by default unlimited for a file, otherwise MOST_STREAMED. Raises
     InputError if there are more, or the file cannot be read.
     """
+    path = path_text(path)
     try:
         with open(path, "rb") as file:
             if most is None and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -154,10 +155,17 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
+def path_text(path: Any) -> str:
+    """A path as text; InputError for anything else, such as a number, which opens a descriptor."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"a path must be text or a pathlib.Path, got {brief(path)}")
+    return os.fspath(path)
+
+
 def expanded(path: str | Path) -> Path:
     """The path with ~ and ~user expanded; InputError for an invalid path."""
     try:
-        full = Path(path).expanduser()
+        full = Path(path_text(path)).expanduser()
     except RuntimeError:
         raise InputError(f"{path}: there is no such user, or none with a home folder") from None
     if "\0" in str(full):

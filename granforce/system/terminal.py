@@ -98,7 +98,10 @@ def one_line(
 
 
 class Bar:
-    """A tqdm bar on stderr that a progress(done, total) callable drives; invisible until used."""
+    """A tqdm bar on stderr that a progress(done, total) callable drives.
+
+    Invisible until used, and where stderr is no terminal.
+    """
 
     _drawn: ClassVar[set[int]] = set()  # those whose line has not ended
     restarts: ClassVar[int] = 0
@@ -115,7 +118,8 @@ class Bar:
 
     def __init__(self, label: str, unit: str) -> None:
         # Created now, so that its rate counts from the beginning, and shown at the first call.
-        self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, delay=math.inf)
+        shown = {"delay": math.inf, "disable": None}  # None: unless it is a terminal
+        self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, **shown)
         self._restarted = Bar.restarts
 
     def __enter__(self) -> Self:
@@ -130,6 +134,8 @@ class Bar:
 
     def __call__(self, done: float, total: float | None) -> None:
         """Set the progress; total may be unknown (None)."""
+        if self.bar.disable:
+            return
         self._drawn.add(id(self))
         self.bar.delay, self.bar.total = 0, total
         # Set, not added: quarters of cells would turn integers into 2.0.

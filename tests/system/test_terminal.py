@@ -3,8 +3,16 @@
 import json
 import math
 import re
+import sys
+
+import pytest
 
 from granforce.system.terminal import Bar, one_line, print_list, print_report
+
+
+@pytest.fixture(autouse=True)
+def of_terminal(capsys, monkeypatch):
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: True)
 
 
 def shown(capsys):
@@ -16,6 +24,16 @@ def test_a_bar_that_is_not_used_is_not_seen(capsys):
     with Bar("cells", "cell"):
         pass
     assert shown(capsys) == []
+
+
+def test_a_bar_is_not_seen_in_a_file(capsys, monkeypatch):
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: False)
+    with Bar("cells", "cell") as progress:
+        progress.note("η1 = 0.2104")
+        progress(1, 2)
+        Bar.restart()
+        progress(2, 2)
+    assert shown(capsys) == [] and Bar.line_end() == ""
 
 
 def test_rates_count_from_the_beginning(capsys):

@@ -1,7 +1,9 @@
 """Commands that make, import and export packings."""
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from granforce.experiment.walls import read_wall_force
 from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
-from granforce.records import InputError, Packing, whole
+from granforce.records import InputError, InputWarning, Packing, whole
 from granforce.system.terminal import print_notes, print_report
 
 
@@ -100,6 +102,14 @@ _NO_OPTIONS = ("command", "format", "run", "json", "grains", "contacts", "out")
 _NO_OPTIONS += ("frames", "states", "walk_seed", "csv", "workers", "scheduler", "cache")
 
 
+@contextmanager
+def _notes_last() -> Iterator[None]:
+    """Without the warnings of importers, whose notes are printed after the report."""
+    with warnings.catch_warnings(action="ignore", category=InputWarning):
+        yield
+
+
+@_notes_last()
 def import_(arguments: argparse.Namespace) -> int | None:
     """Import one packing or many, report and save. Returns 1 if one of many failed."""
     if getattr(arguments, "frames", None) is None:

@@ -1,6 +1,7 @@
 """Pictures of packings, and Figure 1 of a scan."""
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from granforce.cli.results import check_outputs
@@ -28,6 +29,11 @@ def plot(arguments: argparse.Namespace) -> None:
     from granforce.figures import picture, save
 
     check_outputs(arguments.out)
+    if Path(arguments.packing).is_dir():
+        raise InputError(
+            f"{arguments.packing} is a folder; plot draws the file of a packing (.npz), figures "
+            "the store of a scan: granforce figures FOLDER --out …"
+        )
     packing = importers.load_packing(arguments.packing)
     networks: dict[str, Any] = {}
     if arguments.states is not None:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.packing.assemblies import area, blocks, nearly_touching
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.text import Source, Table, read_csv, read_text
 from granforce.records import InputError, Packing, brief, positive
 from granforce.system.plain import counted
@@ -27,6 +28,7 @@ class _Bodies(NamedTuple):
     friction: dict[Any, Any]  # of pairs of materials
 
 
+@packing_noted
 def read_blocks(
     source: Source, *, mu: Any, density: Any = None, tolerance: float | None = None
 ) -> Packing:
@@ -38,7 +40,7 @@ def read_blocks(
     disk [x, y, r], and optionally density, fixed (true or false) and material, and in the object
     "friction" of pairs of materials, [["stone", "wood", 0.4], …]. mu: friction coefficient of all
     other contacts. density: mass per area of the bodies that have none in the file, by default 1.
-    tolerance: as for `blocks`. packing.info has notes on pairs in doubt, and lists them.
+    tolerance: as for `blocks`. InputWarnings report pairs in doubt, which packing.info lists.
 
     Raises InputError naming the line or the body, NotJammedError if nothing balances the weights.
     """

@@ -27,6 +27,7 @@ import numpy.typing as npt
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import check_disks, components, listed, once
 from granforce.packing.importers.network import LOAD_MISFIT, adopt, refuse_idle_reverse
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -76,6 +77,7 @@ class _OnWalls(NamedTuple):
     names: Sequence[str]  # of the walls in the files
 
 
+@packing_noted
 def read_yade(
     bodies: Source,
     interactions: Source,
@@ -97,12 +99,12 @@ def read_yade(
     Bodies that interact but are not listed are walls, if the list has ids. Their forces on grains
     become the grains' load or, with `walls`, contact forces: each wall is then one more grain,
     "held" (its balance is not required, so it takes any force) or "pressing" (its load is its force
-    in the simulation). packing.info has notes about this.
+    in the simulation). An InputWarning (also in packing.info) says so.
     Raises InputError naming file and line.
     """
     cell = _cell(box, tilt)
     tables = _yade_bodies(bodies), _yade_links(interactions, bool(columns))
-    grains, links = renamed(columns or {}, _BODY + _INTERACTION, *tables)
+    grains, links = renamed({} if columns is None else columns, _BODY + _INTERACTION, *tables)
     grains.require("x", "y", "z", "r")
     links.require(*_INTERACTION)
     plane = _plane(grains, 3)
@@ -151,6 +153,7 @@ def _yade_forces(links: Table, plane: str) -> tuple[Floats, Floats]:
     return normal, shear
 
 
+@packing_noted
 def read_mercury(
     data: Source,
     fstat: Source,
@@ -176,7 +179,7 @@ def read_mercury(
         reverse=reverse,
         most_grains=most_grains,
     )
-    packing = found.snapshot(frame).packing
+    packing = found.chosen(frame).packing
     refuse_idle_reverse(packing.forces, reverse)
     return packing
 

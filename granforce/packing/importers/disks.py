@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from granforce.packing.importers.geometry import check_disks, doubtful, largest_gap, touching
 from granforce.packing.importers.network import find
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.scenes import places_behind
 from granforce.records import (
     InputError,
@@ -20,6 +21,7 @@ from granforce.records import (
     make_contacts,
     make_packing,
     positive,
+    real_array,
 )
 from granforce.tolerances import LARGEST_UNIT, LISTED_TOUCHING
 from granforce.types import Floats
@@ -27,6 +29,7 @@ from granforce.types import Floats
 WALLS = ("floor", "box")
 
 
+@packing_noted
 def from_disks(
     x: npt.ArrayLike,
     r: npt.ArrayLike,
@@ -36,19 +39,19 @@ def from_disks(
     tilt: float = 0.0,
     walls: str | npt.ArrayLike | None = None,
     gravity: float = 0.0,
-    pressure: float = 1.0,
+    pressure: float | None = None,
     tolerance: float = LISTED_TOUCHING,
 ) -> Packing:
     """A Packing of disks, with the force network nearest to equal normal forces.
 
     x (N, 2): centres. r (N,): radii. mu: friction coefficient. Disks closer than tolerance (in
-    largest radii) touch. box: sides (L_x, L_y) of a periodic cell at this pressure, and its tilt;
-    by default the set is open and needs walls and gravity. walls: "floor", "box" (a floor and two
-    sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held: behind each
-    place that a disk touches is one more grain, whose balance is not required. gravity: g times the
-    mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
+    largest radii) touch. box: sides (L_x, L_y) of a periodic cell at this pressure (by default 1),
+    and its tilt; by default the set is open and needs walls and gravity. walls: "floor", "box" (a
+    floor and two sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held:
+    behind each place that a disk touches is one more grain, whose balance is not required. gravity:
+    g times the mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
     nearly_touching [i, j, gap]: gaps within a factor of 100 of the tolerance, and far above those
-    of other contacts.
+    of other contacts; an InputWarning says so.
 
     Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
     network exists.
@@ -59,6 +62,8 @@ def from_disks(
     check_disks(x, r, cell, lambda k: f"disk {k}")
     contacts = touching(x, r, cell, tolerance)
     closed = bool(np.all(np.isfinite(cell.box)))
+    if pressure is not None and not closed:
+        raise InputError("pressure applies to periodic boxes: leave it out, or give the box")
     packing = make_packing(
         x,
         r,
@@ -66,7 +71,7 @@ def from_disks(
         contacts,
         np.zeros((len(contacts.i), 2)),
         mu,
-        positive(pressure, "pressure") if closed else np.nan,
+        positive(1.0 if pressure is None else pressure, "pressure") if closed else np.nan,
         info={"source": "disks"},
         tilt=cell.tilt,
     )
@@ -121,9 +126,10 @@ def enclosed(
 def _segments(packing: Packing, walls: str | npt.ArrayLike) -> Floats:
     """Ends (k, 4) of walls."""
     if not isinstance(walls, str):
-        return float_array(np.atleast_2d(np.asarray(walls)), (-1, 4), "walls")
+        return float_array(np.atleast_2d(real_array(walls, "walls")), (-1, 4), "walls")
     if walls not in WALLS:
-        raise InputError(f"walls must be {', '.join(WALLS)}, or segments, got {brief(walls)}")
+        words = f"must be {', '.join(WALLS)}, or segments, got {brief(walls)}"
+        raise InputError.of("walls", walls, words)
     left, bottom = (packing.x - packing.r[:, None]).min(axis=0)
     right, top = (packing.x + packing.r[:, None]).max(axis=0)
     floor = (left, bottom, right, bottom)

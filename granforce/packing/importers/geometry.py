@@ -60,7 +60,8 @@ def largest_gap(tolerance: float) -> float:
     """The tolerance, in largest radii, as a float; InputError unless it is > 0 and at most 1."""
     tolerance = positive(tolerance, "tolerance")
     if tolerance > 1:
-        raise InputError(f"tolerance is in largest radii and must not exceed 1, got {tolerance:g}")
+        words = f"is in largest radii and must not exceed 1, got {tolerance:g}"
+        raise InputError.of("tolerance", tolerance, words)
     return tolerance
 
 

@@ -16,6 +16,7 @@ from granforce.packing.importers.network import (
     refuse_idle_reverse,
     with_edge,
 )
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -95,6 +96,7 @@ class Dump(NamedTuple):
         )
 
 
+@packing_noted
 def read_lammps(
     particles: Source,
     contacts: Source,
@@ -119,14 +121,14 @@ def read_lammps(
     bounds of the box are 0. The box may be tilted in the plane (xy).
     Directions that are not periodic are open; unbalanced forces of grains become their load there.
     packing.info contains timestep, residual and violation (in ⟨f_n⟩), contacts_skipped
-    and notes. most_grains: largest number of grains.
+    and notes, which are also InputWarnings. most_grains: largest number of grains.
 
     Raises InputError naming file and line.
     """
     found = open_lammps(
         particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
     )
-    packing = found.snapshot(frame).packing
+    packing = found.chosen(frame).packing
     refuse_idle_reverse(packing.forces, reverse)
     return packing
 
@@ -155,7 +157,7 @@ def open_lammps(
         atoms = _table(first.name, items, "ATOMS")
         entries = second.items(step)
         pairs = _table(second.name, entries, _label(entries))
-        atoms, pairs = renamed(columns or {}, NAMES, atoms, pairs)
+        atoms, pairs = renamed({} if columns is None else columns, NAMES, atoms, pairs)
         check_grains(len(atoms.rows), most_grains, first.name)
         box = box_of(first.name, items)
         x, r, index = _disks(atoms, box)

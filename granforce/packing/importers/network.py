@@ -166,7 +166,7 @@ def report(packing: Packing) -> dict[str, Any]:
     largest radii (`Packing.r`), residual and violation of the packing's own network in ⟨f_n⟩.
     mean_normal_force: ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure.
     largest_contact_gap, least_other_gap: the `margin` of its contacts, undefined for soft disks
-    (overlaps beyond RIGID_OVERLAP) and for bodies of other shapes.
+    (overlaps beyond 10⁻⁵ of the largest radius) and for bodies of other shapes.
 
     Raises NotJammedError if no admissible network exists.
     """

@@ -23,7 +23,7 @@ from granforce.records import (
     make_packing,
     takes,
 )
-from granforce.system.files import expanded, written
+from granforce.system.files import expanded, path_text, written
 from granforce.types import Floats
 
 _GRAINS = ("x", "r", "P", "mu")
@@ -47,7 +47,8 @@ def load_packing(
     unpacked: most bytes of all arrays together; most_grains: largest number of grains.
     Raises InputError naming the error.
     """
-    name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
+    opened = hasattr(source, "read")
+    name = str(getattr(source, "name", "the given file")) if opened else path_text(source)
     arrays = _arrays(source, name, unpacked, most_grains)
     missing = [key for key in (*_GRAINS, *_CONTACTS) if key not in arrays]
     if missing or not ("L" in arrays or {"Lx", "Ly"} <= set(arrays)):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from granforce import notebook
+from granforce.packing.importers.notes import noted
 from granforce.records import InputError, Packing
 from granforce.types import Floats
 
@@ -27,8 +28,16 @@ class Snapshots(NamedTuple):
     read: Callable[[int], Snapshot]
     lost: str = ""  # description of what was cut off after the last of them
 
+    @noted(lambda snapshot: snapshot.packing.info)
     def snapshot(self, number: int | None = None) -> Snapshot:
-        """One Snapshot, by default the last; InputError for a number that is not in the files."""
+        """One Snapshot, by default the last; InputError for a number that is not in the files.
+
+        Notes on its packing are InputWarnings.
+        """
+        return self.chosen(number)
+
+    def chosen(self, number: int | None = None) -> Snapshot:
+        """The same without warnings."""
         if number is None:
             last = self.numbers[-1]
             note = f"{self.lost}; {self.word} {last} is read" if self.lost else None

@@ -12,6 +12,7 @@ from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
 from granforce.packing.importers.network import adopt, find, refuse_idle_reverse, with_edge
+from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.text import (
     Source,
     Table,
@@ -38,6 +39,7 @@ NAMES += ("i", "j", "nx", "ny", "length", "f_n", "f_t")
 _SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
 
 
+@packing_noted
 def read_table(
     grains: Source,
     contacts: Source | None = None,
@@ -51,7 +53,7 @@ def read_table(
     pressure: float = 1.0,
     walls: str | npt.ArrayLike | None = None,
     gravity: float = 0.0,
-    tolerance: float = LISTED_TOUCHING,
+    tolerance: float | None = None,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from a CSV of grains and, optionally, a CSV of contacts (paths or open files).
@@ -60,23 +62,28 @@ def read_table(
     1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
     numbers from 0 without an id column); optionally nx, ny, length (otherwise nearest images are
     joined) and f_n, f_t (or fn, ft). Without contacts, grains closer than tolerance (in largest
-    radii) touch.
+    radii, by default 10⁻⁶) touch.
     box: (L_x, L_y), inf for an open direction; None: open. tilt: of the cell, whose upper side
     begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
     forces: whether to read f_n, f_t, by default if present; they then determine the pressure (in an
     open set: the loads). reverse: change the sign of f_t. Without forces, the network nearest to
     equal normal forces at the given pressure (or loads) is computed; pressure is not used with f_n,
     f_t. walls ("floor", "box" or segments) and gravity are for tables without forces, as in
-    `from_disks`. most_grains: largest number of grains. packing.info has notes on
-    overlaps and on pairs in doubt, which nearly_touching lists [i, j, gap]: gaps within a factor of
-    100 of the tolerance, and far above those of other contacts.
+    `from_disks`. most_grains: largest number of grains. InputWarnings, whose
+    texts are also in packing.info["notes"], report forces that do not balance, overlaps, and pairs
+    in doubt, which packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100
+    of the tolerance, and far above those of other contacts.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
+    if tolerance is None:
+        tolerance = LISTED_TOUCHING
+    elif contacts is not None and walls is None:
+        raise InputError("tolerance has no effect with a table of contacts: leave it out")
     pressure = positive(pressure, "pressure")
-    found = [read_csv(source) for source in (grains, contacts) if source is not None]
-    table, *pairs = renamed(_full(columns or {}), NAMES, *found)
+    found = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
+    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *found)
     pairs = [_with_full_names(one) for one in pairs]
     _check_columns(table, "x", "y", "r")
     for one in pairs:

@@ -20,7 +20,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from granforce.records import InputError, are_whole
-from granforce.system.files import content_of
+from granforce.system.files import content_of, path_text
 from granforce.types import Floats, Integers, Mask
 
 # Larger numbers cannot be lengths or forces, and their squares would overflow.
@@ -228,7 +228,7 @@ def read_text(source: Source) -> tuple[str, str]:
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
-        name, content = os.fspath(source), content_of(source)
+        name, content = path_text(source), content_of(source)
     name = os.path.basename(name) or name
     try:
         if not isinstance(content, str):

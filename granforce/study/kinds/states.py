@@ -7,19 +7,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from granforce import glossary
 from granforce.experiment import remeasured
 from granforce.experiment.carrying import carrying
 from granforce.experiment.infer import infer
 from granforce.experiment.informative import informative
+from granforce.explore import random_walk
 from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import LEAST_ACCURACY, volume
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, spread_of
-from granforce.forces.nearest import nearest
-from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.glossary import typed_relaxation
-from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.records import InputError, brief, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
@@ -30,17 +29,14 @@ from granforce.study.store import Store
 from granforce.system import cancelling
 from granforce.system.clock import timed
 from granforce.system.memory import check_memory
-from granforce.tolerances import EQUILIBRIUM
 from granforce.types import Progress
 
 # Least memory of a walk per state and disk: f_n and f_t of 1.5 contacts, twice (during the walk and
 # in the result).
 STATE_BYTES = 48
-RELAXATIONS: dict[str, dict[str, Any]] = {
-    "gauss_seidel": {"relax": gauss_seidel},
-    "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
-    "nearest": {"relax": nearest_piqp},
-    "accelerated": {"relax": nearest},
+# Arguments of `walk`, by the name of the relaxation in keys of results.
+RELAXATIONS = {
+    stored: random_walk.RELAXATIONS[name] for name, stored in glossary.RELAXATIONS.items()
 }
 
 
