@@ -97,10 +97,15 @@ def one_line(
     return f"{Bar.line_end()}granforce: {' '.join(str(message).split())}\n"
 
 
-class Bar:
-    """A tqdm bar on stderr that a progress(done, total) callable drives.
+# Progress where stderr is no terminal: a line every so many seconds, not one for each step.
+LOGGED_EVERY = 60.0
+LOGGED = "{desc}: {n_fmt}/{total_fmt}{unit} [{elapsed}<{remaining}{postfix}]\n"
 
-    Invisible until used, and where stderr is no terminal.
+
+class Bar:
+    """A tqdm bar on stderr that a progress(done, total) callable drives; invisible until used.
+
+    Where stderr is no terminal, a line every LOGGED_EVERY seconds takes its place.
     """
 
     _drawn: ClassVar[set[int]] = set()  # those whose line has not ended
@@ -118,7 +123,10 @@ class Bar:
 
     def __init__(self, label: str, unit: str) -> None:
         # Created now, so that its rate counts from the beginning, and shown at the first call.
-        shown = {"delay": math.inf, "disable": None}  # None: unless it is a terminal
+        self._logged = not sys.stderr.isatty()
+        shown: dict[str, Any] = {"delay": math.inf}
+        if self._logged:
+            shown = dict(delay=LOGGED_EVERY, mininterval=LOGGED_EVERY, bar_format=LOGGED)
         self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, **shown)
         self._restarted = Bar.restarts
 
@@ -134,10 +142,10 @@ class Bar:
 
     def __call__(self, done: float, total: float | None) -> None:
         """Set the progress; total may be unknown (None)."""
-        if self.bar.disable:
-            return
-        self._drawn.add(id(self))
-        self.bar.delay, self.bar.total = 0, total
+        if not self._logged:
+            self._drawn.add(id(self))
+            self.bar.delay = 0
+        self.bar.total = total
         # Set, not added: quarters of cells would turn integers into 2.0.
         self.bar.n = int(done) if done == int(done) else done
         if self._restarted != Bar.restarts:

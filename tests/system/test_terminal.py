@@ -26,7 +26,18 @@ def test_a_bar_that_is_not_used_is_not_seen(capsys):
     assert shown(capsys) == []
 
 
-def test_a_bar_is_not_seen_in_a_file(capsys, monkeypatch):
+def test_a_file_gets_a_line_of_progress_each_minute(capsys, monkeypatch):
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: False)
+    with Bar("cells", "cell") as progress:
+        progress(1, 3)
+        progress.bar.start_t -= 90.0
+        progress.bar.last_print_t -= 90.0
+        progress(2, 3)
+    first, *others = shown(capsys)
+    assert re.fullmatch(r"cells: 2/3 cell \[01:30<00:45\]", first) and len(others) <= 1
+
+
+def test_short_work_is_not_seen_in_a_file(capsys, monkeypatch):
     monkeypatch.setattr(type(sys.stderr), "isatty", lambda self: False)
     with Bar("cells", "cell") as progress:
         progress.note("η1 = 0.2104")
