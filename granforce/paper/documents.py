@@ -32,7 +32,14 @@ from granforce.paper.claims.groups import (
     excesses,
     outside,
 )
-from granforce.paper.claims.outcomes import MIXED, OUTCOMES, VERDICTS, by_claim, score, together
+from granforce.paper.claims.outcomes import (
+    OUTCOMES,
+    SYMBOLS,
+    by_claim,
+    decided,
+    decisive,
+    score,
+)
 from granforce.paper.claims.verdicts import FEW, UNMEASURED
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
@@ -566,15 +573,15 @@ def certificates(table: StudyTable) -> str:
 
 
 def verdict_counts(claims: Rows) -> str:
-    """How many claims have which verdict: all samplers together, and each, as a table."""
+    """How many claims have which verdict, and how many by each sampler, as a table."""
     heads = _used(claims)
     columns = [
-        [together(by_sampler) for by_sampler in by_claim(claims).values()],
+        [claim["verdict"] for claim in decided(claims)],
         *([c["verdict"] for c in claims if c["sampler"] == name] for name in heads),
     ]
     lines = [
-        [word, *(str(verdicts.count(word)) for verdicts in columns)]
-        for word in (*VERDICTS[:3], MIXED, *VERDICTS[3:])
+        [f"{symbol} {word}", *(str(verdicts.count(word)) for verdicts in columns)]
+        for word, symbol in SYMBOLS.items()
         if any(word in verdicts for verdicts in columns)
     ]
     lines.append(["all", *(str(len(verdicts)) for verdicts in columns)])
@@ -582,14 +589,15 @@ def verdict_counts(claims: Rows) -> str:
 
 
 def verdict_table(claims: Rows) -> str:
-    """The verdict on each claim, all samplers together, and by each: a table for each outcome."""
+    """The symbols of the verdicts on each claim, and by each sampler: a table for each outcome."""
     heads = [name for name in _used(claims) if name]
     columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
     grouped: dict[str, list[list[str]]] = {}
     for (statement, source, _), by_sampler in by_claim(claims).items():
-        cells = [by_sampler[name]["verdict"] if name in by_sampler else "" for name in heads]
-        verdict = together(by_sampler)
-        grouped.setdefault(verdict, []).append([statement, source, f"**{verdict}**", *cells])
+        verdicts = {name: claim["verdict"] for name, claim in by_sampler.items()}
+        verdict = decisive(by_sampler)["verdict"]
+        cells = [SYMBOLS[verdicts[name]] if name in verdicts else "" for name in heads]
+        grouped.setdefault(verdict, []).append([statement, source, SYMBOLS[verdict], *cells])
     parts = []
     for outcome, verdicts in OUTCOMES.items():
         rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]

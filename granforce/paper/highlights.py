@@ -12,7 +12,7 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.packing.compaction import SETTLED_FROM
 from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
-from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED
+from granforce.paper.claims.verdicts import DIFFERS, FEW, REPRODUCED, STRONGLY
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
@@ -129,8 +129,8 @@ def _rising_eta2(of: _Numbers) -> Highlight:
         word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
         for word, chosen in (
             ("does", lambda verdict: verdict == REPRODUCED),
-            ("does not", lambda verdict: verdict in (DIFFERS, FAILED)),
-            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, FAILED)),
+            ("does not", lambda verdict: verdict in (DIFFERS, STRONGLY)),
+            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, STRONGLY)),
         )
         if any(map(chosen, verdicts.values()))
     }
@@ -234,7 +234,7 @@ def _sentence(words: str) -> str:
 def _alike(of: _Numbers) -> Highlight:
     constant = {name: of.row(f"{name}/η3 is nearly constant", "nearest") for name in ("η1", "η2")}
     does = [name for name, row in constant.items() if row["verdict"] == REPRODUCED]
-    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, FAILED)]
+    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, STRONGLY)]
     if len(does) == 2:
         first = "η1 and η2 are nearly proportional to η3"
     elif does and does_not:
