@@ -73,9 +73,9 @@ CAPTIONS = {
     "network in S (exact), and that of the original network, which was made under pressure alone; "
     "and this and that of uniform states as fractions of the largest in the same packing; "
     f"{_POINTS}.",
-    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, and ln V per grain of the "
-    "backbone against the friction coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V "
-    f"per grain against the number N of disks; {_POINTS}.",
+    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, against the friction "
+    "coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V per grain of the backbone "
+    f"against the number N of disks; {_POINTS}.",
     "tails": "Distribution of the normal forces of uniform states of S, in ⟨f_n⟩, where the "
     "pressure and where the whole stress is prescribed, semi-logarithmic; grey, exponential and "
     "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "

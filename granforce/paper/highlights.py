@@ -34,7 +34,7 @@ class Highlight(NamedTuple):
     """A finding: its sentence, the figure that shows it and the part of the method behind it."""
 
     sentence: str
-    figure: str  # name in data/figures
+    figure: str  # name in data/figures; empty if only the table shows it
     method: str  # anchor in the method
 
 
@@ -143,7 +143,7 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
         f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
-        "figure1_uniform",
+        "samplers",
         "measures",
     )
 
@@ -157,7 +157,7 @@ def _free_forces(of: _Numbers) -> Highlight:
         f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
         f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
         f"{of.mean('exact', 'dimension', most)} at μ = {most:g}{_later_drag(of, most)}.",
-        "figure1_exact",
+        "",
         "ensemble",
     )
 
@@ -298,7 +298,7 @@ def _stability(of: _Numbers) -> Highlight:
 
 def _shear(of: _Numbers) -> Highlight:
     base = "shear stress over pressure"
-    part = of.row(f"{SHEARED} the original network has, {MID}")
+    part = of.row(f"shear stress of the original network, {SHEARED}, {MID}")
     if part["high"] >= 1:
         raise KeyError(base)
     return Highlight(
@@ -312,7 +312,7 @@ def _shear(of: _Numbers) -> Highlight:
 
 
 def _volume(of: _Numbers) -> Highlight:
-    name = "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩, {} μ"
+    name = "width of S, in ⟨f_n⟩, {} μ"
     small, middle, large = (of.row(name.format(w)) for w in ("small", "intermediate", "large"))
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
         raise KeyError(name)

@@ -578,8 +578,6 @@ def test_volumes_tell_where_they_are_largest_and_what_they_follow():
             rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
     table = tables.StudyTable({}, rows, {}, [], {}, {})
     told = {finding.statement: finding.value for finding in findings.volume(table)}
-    assert told["μ where ln V per grain, forces in ⟨f_n⟩ is largest"] == pytest.approx(0.1)
-    extent = told["μ where width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩ is largest"]
-    assert 0.03 < extent < 0.5
-    follows = "rank correlation over packings of all μ, "
-    assert abs(told[follows + "ln V per grain with z"]) < 0.6 < told[follows + "width of S with η2"]
+    assert 0.03 < told["μ where S is widest"] < 0.5
+    assert told["rank correlation of the width of S with η2, over packings of all μ"] > 0.6
+    assert not any("ln V" in statement for statement in told)  # not comparable between μ

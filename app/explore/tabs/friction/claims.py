@@ -62,8 +62,8 @@ def summary() -> str:
     marks = ", ".join(f"{mark} {words}" for words, mark in list(outcomes.SYMBOLS.items())[:-1])
     return (
         f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Below each claim: "
-        f"the number that is judged, and the range of its interval for {outcomes.SYMBOLS[REPRODUCED]}. "
-        f"Each cell: verdict, value, 95 % interval over packings. {marks}."
+        "the number that is judged, and the range of its interval for "
+        f"{outcomes.SYMBOLS[REPRODUCED]}. Each cell: verdict, value, 95 % interval over packings. {marks}."
     )
 
 
