@@ -32,7 +32,7 @@ def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
     """
     sources = [(word, rows, "solid") for word, rows in groups.items()]
-    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per state", 1.0))
+    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per network", 1.0))
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
@@ -103,7 +103,7 @@ def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
         backend,
         title="Distance from the centre of S",
         x="μ",
-        y="distance / that of uniform states",
+        y="distance / that of uniform networks",
         logx=True,
         legend="top_right",
     )
@@ -136,8 +136,8 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     words = {
         "friction": "largest, exact",
         "own_shear": "original network",
-        "largest_shear": "uniform states, largest",
-        "mean_shear": "uniform states, mean",
+        "largest_shear": "uniform networks, largest",
+        "mean_shear": "uniform networks, mean",
     }
     frames = []
     for title, label, drawn in panels:

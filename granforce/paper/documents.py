@@ -270,10 +270,10 @@ def sweeps(table: StudyTable) -> str:
     means over packings.
     """
     known_parts = [part for part in plans.SWEEPS if table.part(part)]
-    heads = ["μ", "packings", "sweeps per network", "excess"]
-    # Other tables have η2 for one residual.
-    more = ["residual", "η2", "relative to the nearest-network walk"]
-    heads += more if len(known_parts) > 1 else []
+    heads = ["residual", "μ", "packings", "sweeps per network", "excess", "η2"]
+    heads += ["relative to the nearest-network walk"]
+    # For a single residual, other tables have η2.
+    shown = slice(None) if len(known_parts) > 1 else slice(1, 5)
     lines = []
     for part in known_parts:
         known, beyond = excesses(table, part), outside(table, part)
@@ -285,13 +285,13 @@ def sweeps(table: StudyTable) -> str:
                 for some, name in ((rows, "eta2"), (compared, "ratio"))
             ]
             cells = [
-                *(f"{mu:g}", str(len(rows))),
+                *(_power(plans.SWEEPS[part]), f"{mu:g}", str(len(rows))),
                 _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
                 _excess(*known[mu]) if mu in known else "",
-                *(_power(plans.SWEEPS[part]), *eta),
+                *eta,
             ]
-            lines.append(cells[: len(heads)])
-    return f"{_swept(table)}\n{markdown_table(heads, lines)}"
+            lines.append(cells[shown])
+    return f"{_swept(table)}\n{markdown_table(heads[shown], lines)}"
 
 
 def _swept(table: StudyTable) -> str:
