@@ -242,12 +242,12 @@ def _alike(of: _Numbers) -> Highlight:
     elif does_not:
         first = "η1, η2 and η3 are not all proportional to each other"
     else:
-        first = "Whether η1, η2 and η3 are proportional to each other is undecided"
+        first = "it is undecided whether η1, η2 and η3 are proportional to each other"
     texts = listed(
         [f"{name}/η3 varies by a factor of {_quoted(row)}" for name, row in constant.items()]
     )
     return Highlight(
-        f"{first}: for {WORDS['nearest']} and μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
+        f"For {WORDS['nearest']}, {first}: at μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
         "figure1_exact",
         "measures",
     )
