@@ -101,9 +101,7 @@ COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "compaction_frictions": (
         ("n", "mu", "seeds", "failed", "seconds", "slowest", "phi", "z", "h"),
     ),
-    "compaction_growth": (
-        ("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h", "exponent"),
-    ),
+    "compaction_growth": (("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h"),),
 }
 CONSTANT = ("n", "mu", "packings", "states", "unknowns")  # stated above a table if all rows agree
 # Part → a column without which a row shows nothing.
@@ -201,6 +199,13 @@ def _table(part: str, rows: Any) -> str:
         return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
     if part in NEEDED:
         rows = [row for row in rows if row.get(NEEDED[part]) is not None]
+    if part == "compaction_growth":  # the exponent of the fit is below the times, as in `growth`
+        fitted = [
+            {"n": "exponent", "mu": row["mu"], "seconds": row["exponent"]}
+            for row in rows
+            if row["n"] == "fit"
+        ]
+        rows = [*(row for row in rows if row["n"] != "fit"), *fitted]
     remark = _below(part, rows) + _worst(part, rows)
     every = tuple(dict.fromkeys(name for row in rows for name in row))
     chosen = COLUMNS.get(part, (every,))

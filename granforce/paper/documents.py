@@ -626,11 +626,16 @@ def detail_table(claims: Rows) -> str:
     """
     rows = []
     for claim in decided(claims):
-        criterion = claim["criterion"].replace("[", "(").replace("]", ")")
-        number, packings = _number(claim), str(claim.get("packings") or "")
-        verdict, by = SYMBOLS[claim["verdict"]], _HEADS[claim["sampler"]]
         rows.append(
-            [claim["statement"], claim["measured"], criterion, number, packings, verdict, by]
+            [
+                claim["statement"],
+                measured({claim["sampler"]: claim}),
+                claim["criterion"].replace("[", "(").replace("]", ")"),
+                _number(claim) + (f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""),
+                str(claim["packings"] or ""),
+                SYMBOLS[claim["verdict"]],
+                _HEADS[claim["sampler"]],
+            ]
         )
     heads = ("claim", "number", "criterion", "value", "n", "verdict", "decided by")
     text = markdown_table(heads, rows)
