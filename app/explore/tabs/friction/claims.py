@@ -63,7 +63,8 @@ def summary() -> str:
     return (
         f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Below each claim: "
         "the number that is judged, and the range of its interval for "
-        f"{outcomes.SYMBOLS[REPRODUCED]}. Each cell: verdict, value, 95 % interval over packings. {marks}."
+        f"{outcomes.SYMBOLS[REPRODUCED]}. Each cell: verdict, value, 95 % interval over packings. "
+        f"{marks}."
     )
 
 
