@@ -14,7 +14,7 @@ const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["
 
 class Lesson {
   constructor(model, view) {
-    Object.assign(this, { model, source: new Source(model, view), progress: new Progress(), asked: 0 })
+    Object.assign(this, { model, source: new Source(model, view), progress: new Progress(), openings: 0 })
     this.root = createElement("div", { className: model.alone ? "course alone" : "course" })
     this.list = createElement("ol", {})
     const nav = createElement("nav", { ariaLabel: "Chapters" })
@@ -66,7 +66,7 @@ class Lesson {
 
   async open(number) {
     this.close()
-    const chapter = CHAPTERS[number], turn = ++this.asked
+    const chapter = CHAPTERS[number], turn = ++this.openings
     this.number = number
     this.show()
     const parts = this.lay(chapter)
@@ -79,14 +79,14 @@ class Lesson {
       parts.voice.textContent = error.message
       return
     }
-    if (turn !== this.asked) return experiment.stop()
+    if (turn !== this.openings) return experiment.stop()
     parts.pictures.classList.remove("waiting")
     const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.textContent = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
-    const kept = (more) => { this.progress.set(chapter.name, more); this.show() }
-    const again = () => { kept({ prediction: null, done: false }); this.open(number) }
-    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { kept, again, drawn: () => this.paint() })
+    const save = (more) => { this.progress.set(chapter.name, more); this.show() }
+    const again = () => { save({ prediction: null, done: false }); this.open(number) }
+    this.mechanism = new PredictDoSee({ ...chapter, x }, experiment, parts, this.progress.of(chapter.name), { save, again, drawn: () => this.paint() })
     this.sized.observe(parts.picture)
     this.ahead ??= this.fetch()
   }

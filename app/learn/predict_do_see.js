@@ -10,11 +10,11 @@ const STAGES = ["Predict", "Do", "See"]
 export class PredictDoSee {
   /**
    * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row, foot, after}: their elements; progress: {prediction,
-   * done} of an earlier visit; kept({prediction, done}): called to store progress; drawn(): called to repaint;
+   * done} of an earlier visit; save({prediction, done}): called to store progress; drawn(): called to repaint;
    * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, voice, row, foot, after }, { prediction, done }, { kept, drawn, again }) {
-    Object.assign(this, { chapter, experiment, host: plot, voice, row, foot, after, kept, drawn, prediction, predicted: false, ready: true, told: done })
+  constructor(chapter, experiment, { plot, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
+    Object.assign(this, { chapter, experiment, host: plot, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
     this.stages = createElement("span", { className: "stages" })
@@ -48,7 +48,7 @@ export class PredictDoSee {
 
   /** The prediction is made; dragging is enabled. */
   async begin() {
-    this.kept({ prediction: this.prediction, done: false })
+    this.save({ prediction: this.prediction, done: false })
     const unlocked = this.unlock()
     this.plot.dot.focus({ preventScroll: true })
     await unlocked
@@ -84,8 +84,8 @@ export class PredictDoSee {
   /** Update everything from the experiment. */
   show() {
     const { experiment, stage, prediction } = this, { picture } = experiment
-    const news = stage === 2 && !this.told
-    if (news) this.kept({ prediction, done: (this.told = true) })
+    const news = stage === 2 && !this.announced
+    if (news) this.save({ prediction, done: (this.announced = true) })
     const words = picture.words ?? `now ${this.named(experiment.value)}`
     const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
     const answer = stage === 2 ? { value: experiment.answer, words: this.named(experiment.answer) } : null

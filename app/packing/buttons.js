@@ -182,9 +182,9 @@ export class Buttons {
   tellHeld(held) { this.root.classList.toggle("held", held) }
 
   /** Whether two networks are requested, and whether they are shown. */
-  tellSplit(asked, there) {
-    if (asked) this.part("extras").open = true
-    this.part("split").classList.toggle("on", asked)
+  showSplit(requested, there) {
+    if (requested) this.part("extras").open = true
+    this.part("split").classList.toggle("on", requested)
     this.root.classList.toggle("two", there)
   }
 

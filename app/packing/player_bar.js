@@ -4,7 +4,7 @@ import { button, createElement } from "../browser/dom.js"
 
 const ICONS = { back: "M18 5v14L8 12z", play: "M7 4v16l13-8z", pause: "M6 5h4v14H6zM14 5h4v14h-4z", step: "M6 5v14l10-7z" }
 const OUTSIDE = ({ states, origin }) => `Networks have the numbers 1 to ${states}; 0 is the network ${origin}.`
-const NEAREST = (asked, found) => `${asked} is not stored: showing ${found}.`
+const NEAREST = (requested, shown) => `${requested} is not stored: showing ${shown}.`
 
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 
@@ -29,7 +29,7 @@ export class PlayerBar {
     this.speedInput = createElement("input", { className: "speed", type: "range", min: 0, max: 6, step: 0.25, value: 0, ariaLabel: "speed" })
     this.rate = createElement("span", { className: "rate" })
     this.stored = createElement("span", { className: "stored", role: "status" })
-    this.keep = button("Keep all", () => actions.keep(this.missed?.asked ?? this.replay.walk.number[this.replay.frame]), { className: "keep", title: "compute and store every network" })
+    this.keep = button("Keep all", () => actions.keep(this.missed?.requested ?? this.replay.walk.number[this.replay.frame]), { className: "keep", title: "compute and store every network" })
     this.playButton = iconButton("play", "space", () => actions.play())
     const along = createElement("label", { className: "at" }), speed = createElement("label", { title: "networks per second" })
     const more = createElement("span", { className: "more" })
@@ -53,24 +53,24 @@ export class PlayerBar {
 
   /** Go to the network whose number was typed, or to the nearest stored one. */
   go() {
-    const asked = Number(this.number.value), { replay } = this
+    const requested = Number(this.number.value), { replay } = this
     if (!replay) return
     const { walk } = replay
-    if (this.number.value.trim() === "" || !Number.isInteger(asked) || asked < 0 || asked > walk.states) {
+    if (this.number.value.trim() === "" || !Number.isInteger(requested) || requested < 0 || requested > walk.states) {
       this.number.value = walk.number[replay.frame]
       return this.say(OUTSIDE(walk))
     }
-    const position = replay.positionOf(asked), found = walk.number[position]
+    const position = replay.positionOf(requested), shown = walk.number[position]
     this.actions.scrub(position)
-    this.number.value = found
-    this.missed = found === asked ? null : { asked, found }
+    this.number.value = shown
+    this.missed = shown === requested ? null : { requested, shown }
     this.showStored()
   }
 
   /** Beside the button that stores all networks: which ones are stored, or that the requested one is not. */
   showStored() {
     const { missed, replay: { stride, walk } } = this, usual = stride > 1 ? `every ${ordinal(stride)} of ${walk.states} is stored` : ""
-    this.stored.textContent = missed ? NEAREST(missed.asked, missed.found) : usual
+    this.stored.textContent = missed ? NEAREST(missed.requested, missed.shown) : usual
   }
 
   showPlaying(playing) {
@@ -104,7 +104,7 @@ export class PlayerBar {
   show(replay) {
     this.scrub.value = replay.position
     this.place.textContent = this.place.title = replay.place
-    if (this.missed && this.missed.found !== replay.walk.number[replay.frame]) {
+    if (this.missed && this.missed.shown !== replay.walk.number[replay.frame]) {
       this.missed = null
       this.showStored()
     }

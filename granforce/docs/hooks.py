@@ -24,7 +24,7 @@ GALLERY = HERE / "pages" / "gallery.md"
 DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
-DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.png)\)")  # as linked in the sources
+DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.(?:png|json))\)")  # as in the sources
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
 # Sections of the library reference, by the module that a name comes from.
@@ -42,14 +42,18 @@ SECTIONS = {
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add generated pages and the study's figures."""
+    """Add generated pages, the study's figures and its claims."""
     for name, text in (
         ("reference/library.md", library()),
         ("reference/cli.md", command_line()),
         ("reference/symbols.md", symbols()),
     ):
         files.append(File.generated(config, name, content=text))
-    for path in (*sorted((DATA / "figures").glob("*.png")), DATA / "bench.png"):
+    for path in (
+        *sorted((DATA / "figures").glob("*.png")),
+        DATA / "bench.png",
+        DATA / "claims.json",
+    ):
         files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
     for name, picture in gallery():
         files.append(File.generated(config, f"figures/{name}.png", content=picture))

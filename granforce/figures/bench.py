@@ -10,14 +10,16 @@ import holoviews as hv
 from granforce.figures import style
 from granforce.types import Rows
 
+FEWEST = 3  # points of a curve
+
 
 def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout | None:
     """One frame for each part of the results of `granforce.bench.run` that has a figure.
 
     relaxation: time against μ by solver; scaling: against N; compaction: mean overlap against time;
     intervals: fraction of the exact mean ΔF_n seen by walks against time, per μ; uniform: processor
-    time per effective state against h; uniform_growth: against N. None if the results have none of
-    these parts.
+    time per effective state against h; uniform_growth: against N. Frames whose curves have fewer
+    than FEWEST points are left out; None if no frame remains.
     """
     style.ready(backend)
     frames: list[hv.Overlay] = []
@@ -30,20 +32,20 @@ def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layo
 def _relaxation(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "solver", "mu", "seconds")
     words = {"title": "One relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
-    yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
+    yield from _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
 def _scaling(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
     words = {"title": "One relaxation, dependence on N", "x": "N", "y": "time / s"}
-    yield _frame(series, backend, words, logx=True, logy=True)
+    yield from _frame(series, backend, words, logx=True, logy=True)
 
 
 def _compaction(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
     series = _by(named, "name", "seconds", "overlap")
     words = {"title": "Compaction", "x": "time / s", "y": "mean overlap / r_max"}
-    yield _frame(series, backend, words, legend="top_right", logx=True, logy=True)
+    yield from _frame(series, backend, words, legend="top_right", logx=True, logy=True)
 
 
 def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
@@ -52,20 +54,20 @@ def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
         series = _by(chosen, "method", "seconds", "extent_part")
         words = {"title": f"Intervals covered by walks, μ = {mu:g}", "x": "time / s"}
         words["y"] = "fraction of the exact ⟨ΔF_n⟩"
-        yield _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(0, 1.1))
+        yield from _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(0, 1.1))
 
 
 def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "method", "h", "seconds_per_state")
-    words = {"title": "Uniform sampling", "x": "h", "y": "processor time per effective state / s"}
-    yield _frame(series, backend, words, room=200.0, logx=True, logy=True)
+    words = {"title": "Uniform sampling", "x": "h", "y": "CPU time per effective network / s"}
+    yield from _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
 def _uniform_growth(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state")
     words = {"title": "Uniform sampling, dependence on N", "x": "N"}
-    words["y"] = "processor time per effective state / s"
-    yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
+    words["y"] = "CPU time per effective network / s"
+    yield from _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
 _DRAWN = {
@@ -95,8 +97,10 @@ def _frame(
     legend: str = "top_left",
     room: float = 1.0,
     **axes: Any,
-) -> hv.Overlay:
-    """A frame of series; room: factor by which a logarithmic axis exceeds the data."""
+) -> Iterator[hv.Overlay]:
+    """A frame of series, or none; room: factor by which a logarithmic axis exceeds the data."""
+    if max(map(len, series.values()), default=0) < FEWEST:
+        return
     drawn = []
     y = [point[1] for points in series.values() for point in points]
     if room > 1:
@@ -108,4 +112,4 @@ def _frame(
         colour = style.COLOURS[k % len(style.COLOURS)]
         drawn.append(style.line(sorted(points), name, colour, backend))
         drawn.append(style.dots(sorted(points), name, colour, backend, style.MARKERS[k % 5]))
-    return style.frame(drawn, backend, legend=legend, **words, **axes)
+    yield style.frame(drawn, backend, legend=legend, **words, **axes)

@@ -138,7 +138,8 @@ def extents(
     axes = {"x": f"ΔF_n / {unit or '⟨ΔF_n⟩'}", "y": "P(ΔF_n)"}
     # As in the paper's insets.
     ranges = [[mu for mu in series if (mu > _SMALL) + (mu > _MIDDLE) == k] for k in range(3)]
-    frames = [_densities(series, series, False, backend, title="Distribution of ΔF_n", **axes)]
+    words: dict[str, Any] = {"title": "Distribution of ΔF_n", "legend": "top_right"}
+    frames = [_densities(series, series, False, backend, **words, **axes)]
     for some in ranges:
         if some:
             word = f"μ = {min(some):g} to {max(some):g}" if len(some) > 1 else f"μ = {some[0]:g}"
@@ -147,7 +148,8 @@ def extents(
                 "legend": "top_right",
                 "ylim": (None, 20 * top),
             }  # above falling curves
-            frames.append(_densities(series, some, True, backend, title=word, **room, **axes))
+            room["title"] = f"{word}, tail ~ exp(−(λ ΔF_n)^b)"
+            frames.append(_densities(series, some, True, backend, **room, **axes))
     return style.page(frames, backend, columns=2)
 
 

@@ -41,7 +41,7 @@ def possible_forces(
         ratio = states[:, chosen] / original[chosen]
         points = [(a, b) for a, column in enumerate(ratio.T, 1) for b in column if b <= largest]
         colour = style.COLOURS[k % len(style.COLOURS)]
-        drawn = [style.dots(points, "states", colour, backend, size=2)]
+        drawn = [style.dots(points, "networks", colour, backend, size=2)]
         frames.append(_ratios(mu, drawn, original, least, extent, chosen, largest, backend))
     return style.page(frames, backend, columns=2)
 
@@ -65,7 +65,7 @@ def force_densities(
         image = hv.Image((x, middles, np.where(part > 0, part, np.nan)), ["x", "y"], "part")
         look = {"cmap": "viridis_r", "clim": (1e-3, 1), "logz": True}
         look["colorbar"] = k % 2 == 1 or len(groups) == 1  # there is room at the right edge
-        drawn = [image.opts(backend=backend, clabel="fraction of the states", **look)]
+        drawn = [image.opts(backend=backend, clabel="fraction of the networks", **look)]
         frames.append(_ratios(mu, drawn, original, least, extent, chosen, LARGEST, backend))
     return style.page(frames, backend, columns=2)
 
@@ -155,7 +155,7 @@ def places(
 def overlaid(
     groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]], *, backend: str = "bokeh"
 ) -> hv.Layout:
-    """Figure 5: the positions of strong forces, f_n > 2⟨f_n⟩, and undetermined ones, ΔF_n > ⟨ΔF_n⟩.
+    """Figure 5: the positions of contacts with f_n > 2⟨f_n⟩ (strong), and with ΔF_n > ⟨ΔF_n⟩.
 
     groups: as for `places`; both are drawn in one frame, and the title counts them.
     """
@@ -175,7 +175,7 @@ def overlaid(
             style.frame(
                 drawn + outline(packing, backend),
                 backend,
-                title=f"μ = {mu:g}: {strong.sum()} strong, {loose.sum()} undetermined",
+                title=f"μ = {mu:g}: {strong.sum()} strong, {loose.sum()} with ΔF_n above the mean",
                 legend=style.legend_position("top_right", backend) if last else None,
                 **_axes(packing, backend),
             )

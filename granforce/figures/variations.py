@@ -32,7 +32,7 @@ def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
     """
     sources = [(word, rows, "solid") for word, rows in groups.items()]
-    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per state", 1.0))
+    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per network", 1.0))
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
@@ -103,7 +103,7 @@ def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
         backend,
         title="Distance from the centre of S",
         x="μ",
-        y="distance / that of uniform states",
+        y="distance / that of uniform networks",
         logx=True,
         legend="top_right",
     )
@@ -136,8 +136,8 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     words = {
         "friction": "largest, exact",
         "own_shear": "original network",
-        "largest_shear": "uniform states, largest",
-        "mean_shear": "uniform states, mean",
+        "largest_shear": "uniform networks, largest",
+        "mean_shear": "uniform networks, mean",
     }
     frames = []
     for title, label, drawn in panels:
@@ -159,18 +159,15 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
 
 
 def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
-    """Width of S per free dimension and ln V per grain against μ, and ln V per grain against N.
+    """Width of S per free dimension against μ, and ln V per grain against N.
 
     rows: dicts with mu, n, extent and log_volume_per_grain; larger: rows for other numbers n.
     """
     style.ready(backend)
-    by_mu = (("extent", "width / ⟨f_n⟩", True), ("log_volume_per_grain", "ln V / grain", False))
-    frames = []
-    axes: dict[str, Any]
-    for name, label, logy in by_mu:
-        series = [(statistics.means(rows, name), label, style.COLOURS[0], "solid", 0)]
-        axes = {"x": "μ", "y": label, "logx": True, "logy": logy}
-        frames.append(style.graph(series, backend, title=label, **axes))
+    label = "width / ⟨f_n⟩"
+    width = [(statistics.means(rows, "extent"), label, style.COLOURS[0], "solid", 0)]
+    axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "logy": True}
+    frames = [style.graph(width, backend, title="Width of S", **axes)]
     frictions = sorted({row["mu"] for row in larger})
     series = [
         (

@@ -101,9 +101,7 @@ COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "compaction_frictions": (
         ("n", "mu", "seeds", "failed", "seconds", "slowest", "phi", "z", "h"),
     ),
-    "compaction_growth": (
-        ("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h", "exponent"),
-    ),
+    "compaction_growth": (("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h"),),
 }
 CONSTANT = ("n", "mu", "packings", "states", "unknowns")  # stated above a table if all rows agree
 # Part → a column without which a row shows nothing.
@@ -118,6 +116,7 @@ WORST: dict[str, tuple[str, Callable[..., Any]]] = {
     "knowledge": ("off", max),
     "frames": ("told", min),
 }
+SHARED = ("differ", "off")  # differences between methods, not errors of the row's own
 # Part → what ratios below 1 mean, and the column. In parts whose ratio is the time of a baseline
 # over that of the row, those rows are slower; in others the time of the row is over granforce's.
 SLOWER, FASTER = "Slower than the baseline", "Faster than granforce"
@@ -145,9 +144,10 @@ SECTIONS = {
     "masonry": (
         "## Walls of blocks\n\n"
         "We compute bounds for 16 contacts, the horizontal load factor and 100 uniform networks of "
-        "dry-stone walls. The\nbaseline of the bounds is one HiGHS model that starts each program "
-        "from the last basis, and that of the load factor\n`scipy.optimize.linprog`; neither "
-        "certifies its result.\n\n"
+        "a dry-stone wall. For the\nbounds, the baseline is one HiGHS model that starts each "
+        "program from the last basis; for the load factor, it is\n`scipy.optimize.linprog`. "
+        "Neither certifies its result. An R̂ above 1.1 means that 100 networks are too few to\n"
+        "represent the uniform distribution.\n\n"
     )
 }
 _WORDS = {"hit_and_run": "coordinate hit-and-run"}
@@ -199,6 +199,13 @@ def _table(part: str, rows: Any) -> str:
         return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
     if part in NEEDED:
         rows = [row for row in rows if row.get(NEEDED[part]) is not None]
+    if part == "compaction_growth":  # the exponent of the fit is below the times, as in `growth`
+        fitted = [
+            {"n": "exponent", "mu": row["mu"], "seconds": row["exponent"]}
+            for row in rows
+            if row["n"] == "fit"
+        ]
+        rows = [*(row for row in rows if row["n"] != "fit"), *fitted]
     remark = _below(part, rows) + _worst(part, rows)
     every = tuple(dict.fromkeys(name for row in rows for name in row))
     chosen = COLUMNS.get(part, (every,))
@@ -275,9 +282,10 @@ def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
     if not known:
         return ""
     row = worst(known, key=lambda row: row[column])
+    method = "" if column in SHARED else _method(row)
     word = "Largest" if worst is max else "Lowest"
     head = _head(part, column).removeprefix("largest ").removeprefix("worst ")
-    return f"\n{word} {head}: {_cell(row[column])} ({_method(row)}{_place(row)}).\n"
+    return f"\n{word} {head}: {_cell(row[column])} ({method}{_place(row)}).\n"
 
 
 def _place(row: Mapping[str, Any]) -> str:

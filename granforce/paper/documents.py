@@ -6,8 +6,8 @@ against μ), "walks" (the paper's walk against μ), "others" and "further" (othe
 "headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (the
 verdict on each claim), "details" (the numbers behind them), "findings" (numbers beyond the claims),
 "sweeps" (the residual of the paper's walk, and its excess over S), "preparation" (how results
-depend on the packing), "counts" (number of packings in each part), "certificates" (largest gap of
-the exact bounds, convergence of uniform samples).
+depend on the packing), "counts" (number of packings of each kind of result), "certificates"
+(largest gap of the exact bounds, convergence of uniform samples).
 """
 
 import re
@@ -32,11 +32,18 @@ from granforce.paper.claims.groups import (
     excesses,
     outside,
 )
-from granforce.paper.claims.outcomes import MIXED, OUTCOMES, VERDICTS, by_claim, score, together
-from granforce.paper.claims.verdicts import FEW, UNMEASURED
+from granforce.paper.claims.outcomes import (
+    OUTCOMES,
+    SYMBOLS,
+    by_claim,
+    decided,
+    decisive,
+    score,
+)
+from granforce.paper.claims.verdicts import FEW
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
-from granforce.paper.tables import StudyTable, packings_at_each, seeds_at
+from granforce.paper.tables import StudyTable
 from granforce.records import InputError
 from granforce.types import Rows
 
@@ -47,6 +54,7 @@ _OUTSIDE = "outside S"
 _FEWER = re.compile(r" \((\d+)\)(?=$|,)")  # number of packings, if it is not the expected one
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
+TABLE = "#dependence-on-friction"  # of z, h and η on the results page
 HEADLINES = 4  # highlights in the README
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
@@ -67,11 +75,12 @@ _CONTENTS = {
     "response": "critical forces and first motions",
     "response_long": "critical forces, four times as many implicit steps",
     "perturb": "critical forces, longer load steps",
-    "sweeps_": "the paper's walk, to this residual",
-    "prepared_": "walks, packings made with other options",
-    "opened": "walks, frictionless packings with a larger μ in the Coulomb condition",
-    "opened_exact": "exact intervals, the same packings",
-    "widest_exact": "exact intervals, with the largest μ in the Coulomb condition",
+    "sweeps_": "the paper's walk",
+    "prepared_": "walks and exact intervals, packings made with other options",
+    "opened": "walks and exact intervals, frictionless packings with a larger μ in the Coulomb "
+    "condition",
+    "widest_exact": "exact intervals, packings of smaller μ with the largest μ in the Coulomb "
+    "condition",
     "stress": "stresses that the contacts can carry",
     "stress_uniform": "stresses of uniform networks",
     "frozen": "exact intervals inside a frozen boundary",
@@ -223,7 +232,6 @@ def further(table: StudyTable) -> str:
     walk, uniform = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform"))
     columns = (
         ("nearest-network walk/uniform η2", _over(walk, uniform, "eta2"), "ratio"),
-        ("ln V per grain", table.part("volume"), "log_volume_per_grain"),
         ("undetermined fraction, frozen boundary", table.part("frozen"), "undetermined_part"),
         ("largest shear stress/pressure", table.part("stress"), "friction"),
     )
@@ -261,31 +269,29 @@ def sweeps(table: StudyTable) -> str:
     Excess: how far the intervals of states exceed the exact ones, over the length of those, as
     means over packings.
     """
+    known_parts = [part for part in plans.SWEEPS if table.part(part)]
+    heads = ["residual", "μ", "packings", "sweeps per network", "excess", "η2"]
+    heads += ["relative to the nearest-network walk"]
+    # For a single residual, other tables have η2.
+    shown = slice(None) if len(known_parts) > 1 else slice(1, 5)
     lines = []
-    for part, residual in plans.SWEEPS.items():
+    for part in known_parts:
         known, beyond = excesses(table, part), outside(table, part)
         ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
         for mu, rows in _by_friction(table.part(part)).items():
+            compared = [row for row in ratios if row["mu"] == mu]
+            eta = [
+                _OUTSIDE if mu in beyond else _cell(some, name, 1.0, None, len(rows))
+                for some, name in ((rows, "eta2"), (compared, "ratio"))
+            ]
             cells = [
-                _power(residual),
-                f"{mu:g}",
-                str(len(rows)),
+                *(_power(plans.SWEEPS[part]), f"{mu:g}", str(len(rows))),
                 _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
                 _excess(*known[mu]) if mu in known else "",
+                *eta,
             ]
-            compared = [row for row in ratios if row["mu"] == mu]
-            eta = (
-                [_OUTSIDE] * 2
-                if mu in beyond
-                else [
-                    _cell(rows, "eta2", 1.0, None, len(rows)),
-                    _cell(compared, "ratio", 1.0, None, len(rows)),
-                ]
-            )
-            lines.append([*cells, *eta])
-    heads = ("residual", "μ", "packings", "sweeps per network", "excess")
-    text = markdown_table([*heads, "η2", "relative to the nearest-network walk"], lines)
-    return f"{_swept(table)}\n{text}"
+            lines.append(cells[shown])
+    return f"{_swept(table)}\n{markdown_table(heads[shown], lines)}"
 
 
 def _swept(table: StudyTable) -> str:
@@ -459,10 +465,14 @@ def _led(sentence: str) -> str:
 def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """All highlights as a numbered list, each with its figure and a link to its method."""
     return "".join(
-        f"{k}. {_led(one.sentence)} ([figure]({FIGURES}/{one.figure}.png), "
-        f"[method](method.md#{one.method}))\n"
+        f"{k}. {_led(one.sentence)} ({_shown(one.figure)}, [method](method.md#{one.method}))\n"
         for k, one in enumerate(highlights(table, claims, findings), 1)
     )
+
+
+def _shown(figure: str) -> str:
+    """A link to a figure, or to the table if there is none."""
+    return f"[figure]({FIGURES}/{figure}.png)" if figure else f"[table]({TABLE})"
 
 
 def finding_table(findings: Rows) -> str:
@@ -471,6 +481,7 @@ def finding_table(findings: Rows) -> str:
     others = []
     for finding in findings:
         statement, number = finding["statement"], _number(finding)
+        number += f": {FEW}" if number and finding["verdict"] == FEW else ""
         if statement.startswith(_LONG):
             continue
         for word, _ in RANGES:
@@ -487,39 +498,40 @@ def finding_table(findings: Rows) -> str:
 
 
 def _number(finding: dict[str, Any]) -> str:
+    """The value of a finding or claim with its interval, if it has one."""
     if not np.isfinite(finding["value"]):
         return ""
     known = np.isfinite(finding["low"])
     ends = f" ({finding['low']:.3g} … {finding['high']:.3g})" if known else ""
-    few = f": {FEW}" if finding["verdict"] == FEW else ""
-    return f"{finding['value']:.3g}{ends}{few}"
+    return f"{finding['value']:.3g}{ends}"
 
 
 def counts(table: StudyTable) -> str:
-    """Number of packings in each part at each μ, and their versions, as a table."""
-    lines = []
+    """Numbers of disks, of μ and of packings at each μ of all parts, by content, as a table."""
+    parts: dict[str, list[str]] = {}
     for part in table.parts():
-        rows = table.part(part)
-        for n in sorted({row["n"] for row in rows}):
-            some = [row for row in rows if row["n"] == n]
-            places, each = str(len(seeds_at(some))), packings_at_each(some)
-            versions = [_version(some, name) for name in ("version", "packing_version")]
-            lines.append([part, _content(part), str(n), places, each, *versions])
-    heads = ("part", "content", "disks", "values of μ", "packings at each")
-    heads += ("version", "version of packings")
-    return markdown_table(heads, lines)
+        parts.setdefault(_content(part), []).append(part)
+    lines = []
+    for content, names in parts.items():
+        seeds: dict[tuple[Any, ...], set[int]] = {}  # by part, disks, and μ of cones and packing
+        for row in table.part(*names):
+            place = row["part"], row["n"], row["mu"], row.get("packing_mu")
+            seeds.setdefault(place, set()).add(row["seed"])
+        disks = _span([n for _, n, *_ in seeds])
+        frictions = len({place[2:] for place in seeds})
+        lines.append([content, disks, str(frictions), _span(list(map(len, seeds.values())))])
+    return markdown_table(("content", "disks", "values of μ", "packings at each"), lines)
 
 
 def _content(part: str) -> str:
     """What a part contains; the longest beginning of its name that is known."""
     begins = [name for name in _CONTENTS if part.startswith(name)]
-    text = _CONTENTS[max(begins, key=len)] if begins else ""
-    bounds = part.startswith("prepared") and part.endswith("_exact")
-    return text.replace("walks", "exact intervals") if bounds else text
+    return _CONTENTS[max(begins, key=len)] if begins else part
 
 
-def _version(rows: Rows, name: str) -> str:
-    return ", ".join(f"{v:g}" for v in sorted({row[name] for row in rows if name in row}))
+def _span(numbers: Sequence[int]) -> str:
+    low, high = min(numbers), max(numbers)
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
@@ -557,8 +569,9 @@ def certificates(table: StudyTable) -> str:
     uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
     if uniform:
         text += (
-            f" The {len(uniform)} uniform samples have {table.plan['states']} networks each; over "
-            "all their force components, the largest split R̂ is "
+            f" Where S is more than one point, the {len(uniform)} uniform samples have "
+            f"{table.plan['states']} networks each; over all their force components, the largest "
+            "split R̂ is "
             f"{max(row['worst_r_hat'] for row in uniform):.3f}, and the smallest bulk effective "
             f"size {min(row['least_bulk_size'] for row in uniform):.0f}."
         )
@@ -566,15 +579,15 @@ def certificates(table: StudyTable) -> str:
 
 
 def verdict_counts(claims: Rows) -> str:
-    """How many claims have which verdict: all samplers together, and each, as a table."""
+    """How many claims have which verdict, and how many by each sampler, as a table."""
     heads = _used(claims)
     columns = [
-        [together(by_sampler) for by_sampler in by_claim(claims).values()],
+        [claim["verdict"] for claim in decided(claims)],
         *([c["verdict"] for c in claims if c["sampler"] == name] for name in heads),
     ]
     lines = [
-        [word, *(str(verdicts.count(word)) for verdicts in columns)]
-        for word in (*VERDICTS[:3], MIXED, *VERDICTS[3:])
+        [f"{symbol} {word}", *(str(verdicts.count(word)) for verdicts in columns)]
+        for word, symbol in SYMBOLS.items()
         if any(word in verdicts for verdicts in columns)
     ]
     lines.append(["all", *(str(len(verdicts)) for verdicts in columns)])
@@ -582,14 +595,15 @@ def verdict_counts(claims: Rows) -> str:
 
 
 def verdict_table(claims: Rows) -> str:
-    """The verdict on each claim, all samplers together, and by each: a table for each outcome."""
+    """The symbols of the verdicts on each claim, and by each sampler: a table for each outcome."""
     heads = [name for name in _used(claims) if name]
     columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
     grouped: dict[str, list[list[str]]] = {}
     for (statement, source, _), by_sampler in by_claim(claims).items():
-        cells = [by_sampler[name]["verdict"] if name in by_sampler else "" for name in heads]
-        verdict = together(by_sampler)
-        grouped.setdefault(verdict, []).append([statement, source, f"**{verdict}**", *cells])
+        verdicts = {name: claim["verdict"] for name, claim in by_sampler.items()}
+        verdict = decisive(by_sampler)["verdict"]
+        cells = [SYMBOLS[verdicts[name]] if name in verdicts else "" for name in heads]
+        grouped.setdefault(verdict, []).append([statement, source, SYMBOLS[verdict], *cells])
     parts = []
     for outcome, verdicts in OUTCOMES.items():
         rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]
@@ -606,24 +620,31 @@ def _used(claims: Rows) -> list[str]:
 
 
 def detail_table(claims: Rows) -> str:
-    """Claims with number, interval and verdict: one row per claim, one column per sampler.
+    """The number that decides each claim, as a table; below it, where walks leave S.
 
-    Below the table: where walks are not judged, as they leave S.
+    `claims.json` contains the numbers of all samplers, and how verdicts change.
     """
-    heads = _used(claims)
     rows = []
-    for (statement, _, criterion), by_sampler in by_claim(claims).items():
-        criterion = criterion.replace("[", "(").replace("]", ")")
-        cells = [_verdict(by_sampler[name]) if name in by_sampler else "" for name in heads]
-        rows.append([statement, measured(by_sampler), criterion, *cells])
-    columns = [_HEADS[name] for name in heads]
-    text = markdown_table(["claim", "number", "criterion", *columns], rows)
-    unjudged = {claim["sampler"]: _split(claim["why"])[1] for claim in claims}
+    for claim in decided(claims):
+        rows.append(
+            [
+                claim["statement"],
+                measured({claim["sampler"]: claim}),
+                claim["criterion"].replace("[", "(").replace("]", ")"),
+                _number(claim) + (f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""),
+                str(claim["packings"] or ""),
+                SYMBOLS[claim["verdict"]],
+                _HEADS[claim["sampler"]],
+            ]
+        )
+    heads = ("claim", "number", "criterion", "value", "n", "verdict", "decided by")
+    text = markdown_table(heads, rows)
+    beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
     notes = [
         f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S, at μ = "
-        f"{listed(unjudged[name].removeprefix(OUTSIDE).split(', '))}."
-        for name in heads
-        if unjudged.get(name)
+        f"{listed(beyond[name].split(', '))}."
+        for name in _used(claims)
+        if beyond.get(name)
     ]
     return text + "".join(f"\n{note}\n" for note in notes)
 
@@ -654,22 +675,3 @@ def _different(text: str, usual: str) -> str:
         elif part not in known:
             parts.append(part)
     return ", ".join(dict.fromkeys(parts))
-
-
-def _split(why: str) -> tuple[str, str]:
-    """Why a claim has its verdict, and where its sampler is not judged."""
-    before, mark, where = why.partition(OUTSIDE)
-    return before.removesuffix("; "), mark + where
-
-
-def _verdict(claim: dict[str, Any]) -> str:
-    why, _ = _split(claim["why"])
-    why = f" ({why})" if why else ""
-    if not np.isfinite(claim["value"]) or claim["verdict"] == UNMEASURED:
-        return claim["verdict"] + why
-    known = np.isfinite(claim["low"])
-    ends = [f"{claim['low']:.3g} … {claim['high']:.3g}"] if known else []
-    ends += [f"n = {claim['packings']}"] if claim.get("packings") else []
-    ends += [f"μ = {claim['mu']:g}"] if claim.get("mu") is not None else []
-    quoted = f" ({'; '.join(ends)})" if ends else ""
-    return f"{claim['value']:.3g}{quoted}: {claim['verdict']}{why}"

@@ -25,18 +25,19 @@ _TAILS = (
     "errors over packings; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the upper "
     "quartile"
 )
-# Caption of each figure, stored in its file; {walk}: how states of the walk were relaxed. Figures 1
-# to 6 are the paper's, by its own relaxation if the study has it at every μ.
+# Caption of each figure, stored in its file; {walk}: how networks of the walk were relaxed. Figures
+# 1 to 6 are the paper's, by its own relaxation if the study has it at every μ.
 CAPTIONS = {
-    "figure1": "Indeterminacy η1, η2 and 0.15 η3 of the random walk's states ({walk}), "
-    f"{_POINTS}; and the coordination z of the backbone, against the friction coefficient μ.",
+    "figure1": "Indeterminacy η1, η2 and 0.15 η3 (as the paper finds η1 ≈ 0.15 η3) of the random "
+    f"walk's networks ({{walk}}), {_POINTS}; and the coordination z of the backbone, against the "
+    "friction coefficient μ.",
     "figure2": "Mean critical force of pushed contacts in ⟨f_n⟩, and exponent α of the decay "
     "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of the "
     "friction coefficient μ; bars are standard errors over packings.",
     "figure2_limit": "As Figure 2, with the limit load (dashed) beside the critical force.",
     "figure3": "Normal forces that contacts can have over those they have in the original "
     "network: the interval seen (bars), and by its colour which fraction of the "
-    "states of the random walk ({walk}) has which ratio, for several friction "
+    "networks of the random walk ({walk}) has which ratio, for several friction "
     "coefficients μ; every contact, from weak to strong. The ordinate is cut at 3; "
     "titles count the contacts that reach beyond.",
     "figure4": "Distribution of the extent ΔF_n of normal forces, in units of ⟨f_n⟩, that the "
@@ -45,21 +46,21 @@ CAPTIONS = {
     "contacts. Lengths are in largest radii.",
     "figure6": "Correlation over contacts of the original f_n with its extent ΔF_n against the "
     "friction coefficient μ ({walk}); bars reach from the least to the largest with any other "
-    "state of the walk in place of the original network; dotted, two standard deviations of what "
+    "network of the walk in place of the original network; dotted, two standard deviations of what "
     "as many packings with shuffled forces give.",
-    "samplers": "Indeterminacy η1, η2 and 0.15 η3 of states drawn in several ways, against the "
+    "samplers": "Indeterminacy η1, η2 and 0.15 η3 of networks drawn in several ways, against the "
     f"friction coefficient μ; {_POINTS}.",
-    "effort": "Acceptance rate of the attempts, and sweeps per accepted state, of walks by "
+    "effort": "Acceptance rate of the attempts, and sweeps per accepted network, of walks by "
     f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
     "figure1_exact": "As Figure 1 for the nearest-network walk; dashed, 0.15 η3 of the exact "
     "intervals; dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
-    "figure1_uniform": "As Figure 1 for the nearest-network walk; dashed, those of uniform states.",
+    "figure1_uniform": "As Figure 1 for the nearest-network walk; dashed, uniform networks.",
     "figure4_mean": "Distribution of the extent ΔF_n of normal forces, in units of its mean, that "
     f"the random walk ({{walk}}) has seen, {_TAILS}.",
     "figure4_exact": "Distribution of the exact extent ΔF_n of normal forces, in units of ⟨f_n⟩, "
     f"{_TAILS}.",
     "figure6_exact": "As Figure 6 for the nearest-network walk, with exact intervals and uniform "
-    "states.",
+    "networks.",
     "places": "Where the tenth of the contacts with the largest forces f_n is, and the tenth with "
     "the largest extents ΔF_n ({walk}); grey, all contacts. Lengths are in largest radii.",
     "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the nearest-network walk, and 0.15 η3 of the "
@@ -71,17 +72,17 @@ CAPTIONS = {
     "standard errors over packings.",
     "stresses": "Shear stress over pressure against the friction coefficient μ: the largest of any "
     "network in S (exact), and that of the original network, which was made under pressure alone; "
-    "and this and that of uniform states as fractions of the largest in the same packing; "
+    "and this and that of uniform networks as fractions of the largest in the same packing; "
     f"{_POINTS}.",
-    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, and ln V per grain of the "
-    "backbone against the friction coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V "
-    f"per grain against the number N of disks; {_POINTS}.",
-    "tails": "Distribution of the normal forces of uniform states of S, in ⟨f_n⟩, where the "
+    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, against the friction "
+    "coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V per grain of the backbone "
+    f"against the number N of disks; {_POINTS}.",
+    "tails": "Distribution of the normal forces of uniform networks, in ⟨f_n⟩, where the "
     "pressure and where the whole stress is prescribed, semi-logarithmic; grey, exponential and "
     "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "
     "the last bin with ten forces or more: {tails}.",
     "distances": "Distance of the original network and of the nearest-network walk from the centre "
-    "of S, in units of that of uniform states; bars are standard errors over packings.",
+    "of S, in units of that of uniform networks; bars are standard errors over packings.",
 }
 _SWEPT = {
     "sweeps_1e-3": "paper's walk to 1e-3",

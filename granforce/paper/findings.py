@@ -51,7 +51,7 @@ WORDS = {
     "exact": "exact",
 }
 WALKS = ("nearest", "gauss_seidel")
-SHEARED = "fraction of the largest shear stress that"
+SHEARED = "as a fraction of the largest possible"
 
 
 def measured(table: StudyTable) -> list[Claim]:
@@ -191,42 +191,32 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     yield from _by_range(groups, f"largest {statement}")
     yield from _by_range(_values(rows, "own_shear"), f"{statement} of the original network")
     for some, name, word in (
-        (rows, "own_shear", "the original network has"),
-        (uniform, "mean_shear", "uniform networks have on average"),
-        (uniform, "largest_shear", "uniform networks have at most"),
+        (rows, "own_shear", "shear stress of the original network"),
+        (uniform, "mean_shear", "mean shear stress of uniform networks"),
+        (uniform, "largest_shear", "largest shear stress in uniform networks"),
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction")
-        yield from _by_range(parts, f"{SHEARED} {word}", FRACTION)
+        yield from _by_range(parts, f"{word}, {SHEARED}", FRACTION)
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
-    """The number of networks: the width of S and the entropy of forces per grain."""
+    """The width of S, and whether ln V per grain depends on N; it is not comparable between μ."""
     rows = table.part("volume")
-    for name, statement in (
-        ("extent", "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩"),
-        ("log_volume_per_grain", "ln V per grain, forces in ⟨f_n⟩"),
-    ):
-        groups = _values(rows, name)
-        if len(groups) > 2:
-            # Logarithms may have either sign: the largest value on the grid.
-            top = peak if name == "extent" else _largest
-            yield _trend(f"μ where {statement} is largest", top, groups, POSITIVE)
-        yield from _by_range(groups, statement, POSITIVE if name == "extent" else ANY)
+    groups = _values(rows, "extent")
+    if len(groups) > 2:
+        yield _trend("μ where S is widest", peak, groups, POSITIVE)
+    yield from _by_range(groups, "width of S, in ⟨f_n⟩")
     walked = statistics.paired(rows, table.part("walk"))
     wide = [(row, walk) for row, walk in walked if row.get("extent")]
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         yield from _by_range(_quotients(wide, "extent", name), f"width of S over {label}")
-    for name, other, what in (
-        ("log_volume_per_grain", "coordination", "ln V per grain with z"),
-        ("log_volume_per_grain", "eta2", "ln V per grain with η2"),
-        ("extent", "eta2", "width of S with η2"),
-    ):
-        pairs = [(row[name], walk[other]) for row, walk in walked if name in row and other in walk]
-        if len(pairs) > 2:
-            statement = f"rank correlation over packings of all μ, {what}"
-            yield _finding(
-                statement, lambda some: statistics.rank_correlation(*np.transpose(some)), [pairs]
-            )
+    pairs = [(row["extent"], walk["eta2"]) for row, walk in wide if "eta2" in walk]
+    if len(pairs) > 2:
+        yield _finding(
+            "rank correlation of the width of S with η2, over packings of all μ",
+            lambda some: statistics.rank_correlation(*np.transpose(some)),
+            [pairs],
+        )
     for mu in sorted({row["mu"] for row in table.part("volume_size")}):
         sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
         largest = max(row["n"] for row in sized)
@@ -289,11 +279,6 @@ def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Valu
         if above in row and other.get(below):
             ratios.setdefault(row["mu"], []).append(row[above] / other[below])
     return ratios
-
-
-def _largest(frictions: Floats, means: Floats) -> float:
-    """μ on the grid at which the means over packings are largest."""
-    return float(frictions[int(np.argmax(means))])
 
 
 def _mean_width(_: Floats, moments: Floats) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.packing.compaction import SETTLED_FROM
 from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
-from granforce.paper.claims.verdicts import DIFFERS, FAILED, FEW, REPRODUCED
+from granforce.paper.claims.verdicts import DIFFERS, FEW, REPRODUCED, STRONGLY
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
@@ -34,7 +34,7 @@ class Highlight(NamedTuple):
     """A finding: its sentence, the figure that shows it and the part of the method behind it."""
 
     sentence: str
-    figure: str  # name in data/figures
+    figure: str  # name in data/figures; empty if only the table shows it
     method: str  # anchor in the method
 
 
@@ -129,8 +129,8 @@ def _rising_eta2(of: _Numbers) -> Highlight:
         word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
         for word, chosen in (
             ("does", lambda verdict: verdict == REPRODUCED),
-            ("does not", lambda verdict: verdict in (DIFFERS, FAILED)),
-            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, FAILED)),
+            ("does not", lambda verdict: verdict in (DIFFERS, STRONGLY)),
+            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, STRONGLY)),
         )
         if any(map(chosen, verdicts.values()))
     }
@@ -143,7 +143,7 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
         f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
-        "figure1_uniform",
+        "samplers",
         "measures",
     )
 
@@ -157,7 +157,7 @@ def _free_forces(of: _Numbers) -> Highlight:
         f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
         f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
         f"{of.mean('exact', 'dimension', most)} at μ = {most:g}{_later_drag(of, most)}.",
-        "figure1_exact",
+        "",
         "ensemble",
     )
 
@@ -234,7 +234,7 @@ def _sentence(words: str) -> str:
 def _alike(of: _Numbers) -> Highlight:
     constant = {name: of.row(f"{name}/η3 is nearly constant", "nearest") for name in ("η1", "η2")}
     does = [name for name, row in constant.items() if row["verdict"] == REPRODUCED]
-    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, FAILED)]
+    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, STRONGLY)]
     if len(does) == 2:
         first = "η1 and η2 are nearly proportional to η3"
     elif does and does_not:
@@ -242,12 +242,12 @@ def _alike(of: _Numbers) -> Highlight:
     elif does_not:
         first = "η1, η2 and η3 are not all proportional to each other"
     else:
-        first = "Whether η1, η2 and η3 are proportional to each other is undecided"
+        first = "it is undecided whether η1, η2 and η3 are proportional to each other"
     texts = listed(
         [f"{name}/η3 varies by a factor of {_quoted(row)}" for name, row in constant.items()]
     )
     return Highlight(
-        f"{first}: for {WORDS['nearest']} and μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
+        f"For {WORDS['nearest']}, {first}: at μ ≥ {LEAST_DYNAMIC:g}, {texts}.",
         "figure1_exact",
         "measures",
     )
@@ -298,7 +298,7 @@ def _stability(of: _Numbers) -> Highlight:
 
 def _shear(of: _Numbers) -> Highlight:
     base = "shear stress over pressure"
-    part = of.row(f"{SHEARED} the original network has, {MID}")
+    part = of.row(f"shear stress of the original network, {SHEARED}, {MID}")
     if part["high"] >= 1:
         raise KeyError(base)
     return Highlight(
@@ -312,7 +312,7 @@ def _shear(of: _Numbers) -> Highlight:
 
 
 def _volume(of: _Numbers) -> Highlight:
-    name = "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩, {} μ"
+    name = "width of S, in ⟨f_n⟩, {} μ"
     small, middle, large = (of.row(name.format(w)) for w in ("small", "intermediate", "large"))
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
         raise KeyError(name)

@@ -205,7 +205,7 @@ def test_run_writes_what_it_returns(tmp_path, capsys):
 
 def test_figures_are_drawn_from_rows_alone(tmp_path):
     row = {"mu": 0.1, "solver": "nearest", "seconds": 1.0}
-    rows = {"relaxation": [row, row | {"mu": 1.0}]}
+    rows = {"relaxation": [row | {"mu": mu} for mu in (0.1, 1.0, 10.0)]}
     assert bench.draw(tmp_path, rows)
     assert {path.name for path in tmp_path.iterdir()} == {"bench.png", "bench.html"}
     assert not bench.draw(tmp_path / "none", {"environment": {}})

@@ -36,18 +36,21 @@ def frames(figure):
     return figure.values()
 
 
-def test_the_benchmark_has_a_frame_for_each_part():
+def test_the_benchmark_has_a_frame_for_each_part_with_enough_points():
     rows = [
         {"mu": mu, "method": method, "seconds": seconds, "extent_part": part}
         for mu in (0.1, 1.0)
-        for method, seconds, part in (("exact", 4, 1.0), ("walk", 9, 0.5), ("walk", 1, 0.3))
+        for method, seconds, part in (
+            *(("exact", 4, 1.0), ("walk", 9, 0.5), ("walk", 1, 0.3), ("walk", 4, 0.4)),
+        )
     ]
-    sizes = [{"n": n, "solver": "ours", "seconds": n / 100} for n in (100, 400)]
+    sizes = [{"n": n, "solver": "ours", "seconds": n / 100} for n in (100, 200, 400)]
     results = {"intervals": rows, "scaling": [*sizes, {"n": "fit", "solver": "ours"}]}
+    results["uniform"] = [{"h": 60, "method": "billiard", "seconds_per_state": 1e-4}]  # one point
     figure = figures.benchmark(results)
     scaling, first, second = (curves(frame) for frame in frames(figure))
-    np.testing.assert_allclose(scaling["ours"], ([100, 400], [1, 4]))
-    np.testing.assert_allclose(first["walk"], ([1, 9], [0.3, 0.5]))
+    np.testing.assert_allclose(scaling["ours"], ([100, 200, 400], [1, 2, 4]))
+    np.testing.assert_allclose(first["walk"], ([1, 4, 9], [0.3, 0.4, 0.5]))
     np.testing.assert_allclose(second["exact"], ([4], [1.0]))
 
 
@@ -56,7 +59,7 @@ def test_pages_need_no_network(tmp_path):
     path = tmp_path / "figure.html"
     code = (
         "from granforce import figures\n"
-        "rows = [{'n': n, 'solver': 'ours', 'seconds': n / 100} for n in (100, 400)]\n"
+        "rows = [{'n': n, 'solver': 'ours', 'seconds': n / 100} for n in (100, 200, 400)]\n"
         f"figures.save(figures.benchmark({{'scaling': rows}}), {str(path)!r})\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -281,9 +284,9 @@ def test_variations_show_what_the_rows_hold():
     np.testing.assert_allclose(whole["largest, exact"], ([0.1, 2], [0.1, 2]))
     np.testing.assert_allclose(whole["original network"], ([0.1, 2], [0.025, 0.5]))
     np.testing.assert_allclose(parts["original network"], ([0.1, 2], [0.25, 0.25]))
-    np.testing.assert_allclose(parts["uniform states, largest"], ([2], [0.15]))
+    np.testing.assert_allclose(parts["uniform networks, largest"], ([2], [0.15]))
     _, parts = frames(figures.stresses(carried, []))
-    assert "uniform states, mean" not in curves(parts)
+    assert "uniform networks, mean" not in curves(parts)
     far = figures.distances([{"mu": 0.1, "original_ratio": 0.5, "walk_ratio": 1.5}])
     assert {label: y.tolist() for label, (_, y) in curves(far).items()} == {
         "original": [0.5],

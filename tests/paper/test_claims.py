@@ -203,7 +203,7 @@ def weak_first(mu, rng):
 )
 def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options):
     found = judged(synthetic(rise_and_fall, **options), [family])
-    assert found[statement] == verdicts.FAILED
+    assert found[statement] in (verdicts.DIFFERS, verdicts.STRONGLY)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options
                 "extent": lambda mu, r: np.linspace(0.5, 3, CONTACTS),
                 "place": lambda extent, rng: extent / 3,
             },
-            verdicts.FAILED,
+            verdicts.STRONGLY,
         ),
         (
             claims.patterns,
@@ -228,13 +228,13 @@ def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options
                 "normal": np.r_[np.full(CONTACTS - 300, 1.0), np.full(300, 5.0)],
                 "extent": weak_first,
             },
-            verdicts.FAILED,
+            verdicts.STRONGLY,
         ),
         (
             claims.relative,
             "ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ",
             {"extent": lambda mu, r: (0.1 + mu) * r.weibull(2.5, CONTACTS)},
-            verdicts.FAILED,
+            verdicts.DIFFERS,
         ),
         (
             claims.relative,
@@ -243,7 +243,7 @@ def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options
                 "normal": np.linspace(0.5, 1, CONTACTS),
                 "extent": lambda mu, r: np.linspace(0.5, 3, CONTACTS),
             },
-            verdicts.FAILED,
+            verdicts.STRONGLY,
         ),
     ],
 )
@@ -253,7 +253,7 @@ def test_what_a_figure_is_said_to_show_can_fail(family, statement, options, verd
 
 def test_a_power_law_and_an_exponential_are_told_apart(rng):
     r = 0.25 + 0.5 * np.arange(3, 17)
-    for law, verdict in ((r**-0.7, verdicts.REPRODUCED), (np.exp(-r / 4), verdicts.FAILED)):
+    for law, verdict in ((r**-0.7, verdicts.REPRODUCED), (np.exp(-r / 4), verdicts.DIFFERS)):
         table = synthetic(rise_and_fall)
         decays = {}
         for k, row in enumerate(table.rows):
@@ -269,7 +269,7 @@ def test_a_power_law_and_an_exponential_are_told_apart(rng):
 
 @pytest.mark.parametrize(
     ("scatter", "longer", "verdict"),
-    [(0.01, 1.0, verdicts.REPRODUCED), (0.3, 1.3, verdicts.FAILED)],
+    [(0.01, 1.0, verdicts.REPRODUCED), (0.3, 1.3, verdicts.STRONGLY)],
 )
 def test_walks_are_repeated_in_the_same_packings(rng, scatter, longer, verdict):
     table = synthetic(rise_and_fall)
@@ -304,7 +304,7 @@ def test_cones_and_contacts_are_judged_each_by_itself():
     for row in table.part("opened_exact"):
         row["eta3"] = 30 - row["mu"]
     opened, contacts = claims.causes(table, "exact")
-    assert opened.verdict == verdicts.FAILED
+    assert opened.verdict == verdicts.STRONGLY
 
 
 def test_findings_compare_the_same_packings():
@@ -378,8 +378,8 @@ def test_what_rises_to_the_end_is_monotonic(rng):
         return verdicts.turns("", packings(noise))
 
     assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 1}).verdict == verdicts.REPRODUCED
-    assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 3}).verdict == verdicts.FAILED
-    assert turning({0.01: 3, 0.1: 2, 1: 1, 10: 0.5}).verdict == verdicts.FAILED
+    assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 3}).verdict == verdicts.DIFFERS
+    assert turning({0.01: 3, 0.1: 2, 1: 1, 10: 0.5}).verdict == verdicts.DIFFERS
     # It rises for certain, and whether it falls again nobody knows.
     plateau = turning({0.01: 0.1, 0.1: 1, 1: 2, 10: 2})
     assert plateau.verdict == verdicts.UNDECIDED
@@ -412,7 +412,8 @@ def test_a_verdict_at_a_knife_edge_is_undecided(rng):
     """A slope of 0.5 ± 0.02: clear of an end of the range, across it, and turned by one μ."""
     clear = packings({mu: mu**0.5 * np.exp(0.1 * rng.normal(size=10)) for mu in (0.1, 1, 10, 100)})
     assert over_all(clear, (0.3, 0.7)).verdict == verdicts.REPRODUCED
-    assert over_all(clear, (0.7, 0.9)).verdict == verdicts.FAILED
+    assert over_all(clear, (0.7, 0.9)).verdict == verdicts.DIFFERS  # there is no wider range
+    assert over_all(clear, (0.7, 0.9), (0.6, 1)).verdict == verdicts.STRONGLY
     assert over_all(clear, (0.7, 0.9), (0.2, 0.9)).verdict == verdicts.DIFFERS
     edge = over_all(clear, (0.3, 0.5))
     assert edge.verdict == verdicts.UNDECIDED
@@ -444,14 +445,14 @@ def test_a_change_of_sign_at_one_friction_is_not_averaged_away(rng):
     claim = verdicts.at_each("", "", packings(values), good=(0, 1))
     assert claim.verdict == verdicts.REPRODUCED
     values[1] = 1.2 + 0.02 * rng.normal(size=10)
-    claim = verdicts.at_each("", "distance", packings(values), good=(0, 1))
+    claim = verdicts.at_each("", "distance", packings(values), good=(0, 1), fair=(0, 1.1))
     assert claim.verdict == verdicts.DIFFERS
-    assert claim.why == "not reproduced at 1; reproduced at 0.1, 10"
+    assert claim.why == "differs strongly at 1; reproduced at 0.1, 10"
     assert claim.value == pytest.approx(1.2, abs=0.05)
     assert claim.measured == "distance, at the deciding μ (1)"
     values = {mu: group + 1 for mu, group in values.items()}
-    claim = verdicts.at_each("", "", packings(values), good=(0, 1))
-    assert claim.verdict == verdicts.FAILED
+    claim = verdicts.at_each("", "", packings(values), good=(0, 1), fair=(0, 1.1))
+    assert claim.verdict == verdicts.STRONGLY
     assert verdicts.at_each("", "", packings(values, 1), good=(0, 1)).verdict == (verdicts.FEW)
 
 
@@ -495,7 +496,7 @@ def test_what_was_not_relaxed_was_not_measured():
     for row in table.part(SWEEPS):
         row |= {"skipped_part": 0.0, "eta2": 0.024}
     (claim,) = figure1.vanishing(table, "gauss_seidel")
-    assert (claim.verdict, claim.value) == (verdicts.FAILED, pytest.approx(0.024))
+    assert (claim.verdict, claim.value) == (verdicts.DIFFERS, pytest.approx(0.024))
 
 
 def test_eta3_is_compared_with_the_exact_one_of_the_same_packing():
@@ -503,7 +504,7 @@ def test_eta3_is_compared_with_the_exact_one_of_the_same_packing():
     for row in table.part(SWEEPS):
         table.rows.append(row | {"part": "exact", "eta3": row["eta3"] * 2})
     (claim,) = figure1.measure(table, "gauss_seidel")
-    assert (claim.verdict, claim.value) == (verdicts.FAILED, pytest.approx(0.5))
+    assert (claim.verdict, claim.value) == (verdicts.STRONGLY, pytest.approx(0.5))
 
 
 def test_the_papers_own_walks_are_compared_over_sizes():
@@ -515,7 +516,7 @@ def test_the_papers_own_walks_are_compared_over_sizes():
                 table.rows.append(row | larger)
     (claim,) = figure1.size(table, "gauss_seidel")
     assert claim.value == pytest.approx(0.5, abs=0.02)
-    assert claim.verdict == verdicts.FAILED
+    assert claim.verdict == verdicts.STRONGLY
 
 
 def test_few_disks_decide_nothing():
@@ -577,8 +578,6 @@ def test_volumes_tell_where_they_are_largest_and_what_they_follow():
             rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
     table = tables.StudyTable({}, rows, {}, [], {}, {})
     told = {finding.statement: finding.value for finding in findings.volume(table)}
-    assert told["μ where ln V per grain, forces in ⟨f_n⟩ is largest"] == pytest.approx(0.1)
-    extent = told["μ where width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩ is largest"]
-    assert 0.03 < extent < 0.5
-    follows = "rank correlation over packings of all μ, "
-    assert abs(told[follows + "ln V per grain with z"]) < 0.6 < told[follows + "width of S with η2"]
+    assert 0.03 < told["μ where S is widest"] < 0.5
+    assert told["rank correlation of the width of S with η2, over packings of all μ"] > 0.6
+    assert not any("ln V" in statement for statement in told)  # not comparable between μ

@@ -444,7 +444,7 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
     assert all("outside" not in line for line in others)
     for row, exact in zip(table.part("sweeps_1e-3"), table.part("exact"), strict=False):
         row, exact = row | {"part": "sweeps_1e-4"}, exact | {"mean_length": 2.0}
-        for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "outside S"), (1e-9, "< 0.001")):
+        for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "1.1"), (1e-9, "< 0.001")):
             rows = [row | {"excess": excess, "mu": 0.1, "seed": 1}, exact | {"mu": 0.1, "seed": 1}]
             *_, line = documents.sweeps(table._replace(rows=rows)).splitlines()
             assert told in line
@@ -496,39 +496,40 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     assert "from 10 to 20" in summary and "varied only at μ = 1." in summary
 
 
-def test_a_claim_has_one_verdict_and_one_for_each_sampler():
+def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     def claim(statement, sampler, verdict, value=1.0):
         words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
         return words | {"sampler": sampler, "verdict": verdict, "value": value}
 
     judged = [
-        claim("a", "nearest", verdicts.REPRODUCED),
-        claim("a", "exact", verdicts.UNDECIDED),
-        claim("b", "nearest", verdicts.REPRODUCED),
-        claim("b", "exact", verdicts.DIFFERS),
-        claim("c", "nearest", verdicts.FEW),
-        claim("c", "exact", verdicts.FAILED),
+        claim("a", "gauss_seidel", verdicts.REPRODUCED),
+        claim("a", "exact", verdicts.DIFFERS),
+        claim("b", "gauss_seidel", verdicts.FEW),
+        claim("b", "exact", verdicts.REPRODUCED),
+        claim("c", "gauss_seidel", verdicts.UNMEASURED),
+        claim("c", "nearest", verdicts.REPRODUCED),
+        claim("c", "exact", verdicts.STRONGLY),
         claim("c", "uniform", verdicts.MISSING, float("nan")),
+        claim("d", "", verdicts.DIFFERS),
     ]
     text = documents.verdict_table(judged)
-    heads = ["### Differ (1)", "### Depend on the sampler (1)", "### Reproduced (1)"]
+    heads = ["### Differ (2)", "### Open (1)", "### Reproduced (1)"]
     assert [line for line in text.splitlines() if line.startswith("#")] == heads
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    heads = ["claim", "source", "verdict", "nearest-network walk", "exact"]
-    assert rows[0] == rows[3] == rows[6] == heads  # no column without numbers
-    assert [row[2] for row in rows[2::3]] == [
-        f"**{word}**" for word in (verdicts.FAILED, outcomes.MIXED, verdicts.REPRODUCED)
-    ]
-    assert rows[2][3:] == [verdicts.FEW, verdicts.FAILED]
-    assert "tests 3 claims" in outcomes.score(judged)
-    assert "1 are reproduced (0 by the paper's own walk), 1 contradicted" in outcomes.score(judged)
+    heads = ["claim", "source", "verdict", "paper's walk, to 10⁻³", "nearest-network walk", "exact"]
+    assert rows[0] == rows[4] == rows[7] == heads  # no column without numbers
+    assert [rows[k][0] + rows[k][2] for k in (2, 3, 6, 9)] == ["c✗✗", "d✗", "b…", "a✓"]
+    assert rows[2][3:] == ["–", "✓", "✗✗"]
+    assert "tests 4 claims" in outcomes.score(judged)
+    assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
+    assert "The paper's own walk judges 2 of them;" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]
     counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
-    assert counted["reproduced"] == [1, 2, 0] and counted[outcomes.MIXED] == [1, 0, 0]
-    assert counted["undecided"] == [0, 0, 1] and counted["not reproduced"] == [1, 0, 1]
-    assert counted["all"] == [3, 3, 3] and "not measured" not in counted
+    assert counted["✓ reproduced"] == [1, 1, 1, 1, 0] and "? undecided" not in counted
+    assert counted["✗✗ differs strongly"] == [1, 0, 0, 1, 0]
+    assert counted["all"] == [4, 3, 1, 3, 1]
 
 
 def test_versions_are_not_mixed(done, table, tmp_path, capsys):

@@ -18,12 +18,12 @@ export class Bars {
     const most = Math.max(...finite, 1e-9) * 1.1, at = (v) => Number(((100 * Math.min(v, most)) / most).toFixed(2))
     this.rows.forEach((row, c) => {
       const [low, high] = both[c], value = F[2 * c]
-      row.tell("class", lit.has(c) ? "lit" : "")
-      row.tell("label", placeName(body.scene, c))
+      row.update("class", lit.has(c) ? "lit" : "")
+      row.update("label", placeName(body.scene, c))
       const wide = high - low < 1e-9 * body.scaleOf() ? 0 : Math.max(SEEN, (at(high) - at(low)) / 100)
-      row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
-      row.tell("dot", `translateX(${at(value)}%)`)
-      row.tell("value", `${number(value)}${range(low, high, body.scaleOf())}`)
+      row.update("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
+      row.update("dot", `translateX(${at(value)}%)`)
+      row.update("value", `${number(value)}${range(low, high, body.scaleOf())}`)
     })
   }
 
@@ -40,15 +40,15 @@ export class Bars {
     this.host.innerHTML = Array.from({ length: count }, (_, c) => `
       <div role="listitem" data-contact="${c}"><span class="label"></span><span class="rail"><i class="span"></i><i class="dot"></i></span><span class="value"></span></div>`).join("")
     this.rows = [...this.host.children].map((row) => {
-      const told = {}, part = (name) => row.querySelector(`.${name}`)
-      const tells = {
+      const shown = {}, part = (name) => row.querySelector(`.${name}`)
+      const write = {
         class: (text) => { row.className = text },
         label: (text) => { part("label").textContent = part("label").title = text },
         value: (text) => { part("value").textContent = text },
         span: (text) => { part("span").style.transform = text },
         dot: (text) => { part("dot").style.transform = text },
       }
-      return { tell: (what, text) => { if (told[what] !== text) tells[what]((told[what] = text)) } }
+      return { update: (what, text) => { if (shown[what] !== text) write[what]((shown[what] = text)) } }
     })
   }
 }

@@ -20,7 +20,7 @@ export function drawSegment(space) {
   g.font = "13px sans-serif"
   let before = null // words at the other end
   for (const side of ends.length > 1 ? body.sides : []) {
-    const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
+    const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.handler("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
     const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
     const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12

@@ -19,17 +19,17 @@ export function tall({ name, x, box }) {
 }
 
 export class Arrows {
-  constructor(root, told, ratio) {
-    this.told = told // told(what, …): called for pointer events
+  constructor(root, handler, ratio) {
+    this.handler = handler // handler(what, …): called for pointer events
     this.canvas = root
     this.easel = new Easel(root, ratio)
     this.hover = null
     this.held = null
     const at = (event) => this.easel.at(event)
     root.addEventListener("pointermove", (event) => this.moved(...at(event)))
-    root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; told("hover", null) } })
+    root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; handler("hover", null) } })
     root.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
-    for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
+    for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; handler("release") })
   }
 
   get context() { return this.easel.g }
@@ -401,12 +401,12 @@ export class Arrows {
 
   grabbed(px, py, event) {
     const found = this.find(px, py)
-    if (this.told("press", { found, at: this.back(px, py) })) {
+    if (this.handler("press", { found, at: this.back(px, py) })) {
       this.held = { taken: true }
       this.canvas.setPointerCapture(event.pointerId)
       return
     }
-    this.told("select", found)
+    this.handler("select", found)
     if (!found || found.loose) return
     this.held = found
     this.canvas.setPointerCapture(event.pointerId)
@@ -414,17 +414,17 @@ export class Arrows {
   }
 
   moved(px, py) {
-    if (this.held?.taken) return this.told("carry", { at: this.back(px, py) })
+    if (this.held?.taken) return this.handler("carry", { at: this.back(px, py) })
     if (this.held) return this.pull(px, py)
     const found = this.find(px, py)
     this.canvas.style.cursor = found && !found.loose ? "grab" : "default"
-    this.told("hover", found)
+    this.handler("hover", found)
   }
 
   pull(px, py) {
     const { contact, at, inward, across, grip } = this.held, [ax, ay] = this.px(...at)
     const unit = this.unit * this.forceUnit
     const force = [(px + grip[0] - ax) / unit, -(py + grip[1] - ay) / unit]
-    this.told("pull", { contact, normal: dot(force, inward), tangential: dot(force, across) })
+    this.handler("pull", { contact, normal: dot(force, inward), tangential: dot(force, across) })
   }
 }

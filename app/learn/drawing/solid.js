@@ -27,7 +27,7 @@ export function drawSolid(space) {
     g.setLineDash([])
     g.globalAlpha = 1
     if (side.cap) for (const k of side.corners) space.drawOn(places[k], 2)
-    if (front && lit) words.push(side.cap ? "no end this way" : space.told("words", side))
+    if (front && lit) words.push(side.cap ? "no end this way" : space.handler("words", side))
   }
   words.forEach((text, k) => space.write(space.easel.wide / 2, 18 + 17 * k, text, look.ink)) // clear of the body
 }

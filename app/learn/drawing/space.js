@@ -17,8 +17,8 @@ const ON = 34 // pixels of an arrow where S is unbounded
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer if that takes more than WORK multiplications
 
 export class Space {
-  constructor(canvas, told, ratio) {
-    this.told = told
+  constructor(canvas, handler, ratio) {
+    this.handler = handler
     this.canvas = canvas
     this.easel = new Easel(canvas, ratio)
     this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -32,7 +32,7 @@ export class Space {
     const at = (event) => this.easel.at(event)
     canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
     canvas.addEventListener("pointermove", (event) => this.moved(...at(event)))
-    canvas.addEventListener("pointerleave", () => { if (!this.held) told("side", null) })
+    canvas.addEventListener("pointerleave", () => { if (!this.held) handler("side", null) })
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { this.held = null })
     canvas.addEventListener("keydown", (event) => this.key(event))
   }
@@ -297,7 +297,7 @@ export class Space {
       const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
       const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
-      const text = side.cap ? "no end this way" : this.told("words", side)
+      const text = side.cap ? "no end this way" : this.handler("words", side)
       g.font = "13px sans-serif"
       // Words next to it, in short lines, if they would be illegible along it or are longer than
       // it.
@@ -355,8 +355,8 @@ export class Space {
     const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 24
     this.canvas.setPointerCapture(event.pointerId)
     this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
-    this.told("begin")
-    this.told("point", this.read)
+    this.handler("begin")
+    this.handler("point", this.read)
     if (!near && body.h !== 3) { // the point moves to the pointer
       this.held = { px: x, py: y, u: [...body.u] }
       this.moved(px, py)
@@ -369,15 +369,15 @@ export class Space {
     if (!body || body.empty) return
     if (!held) {
       const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 14
-      return near ? this.told("point", this.read) : this.told("side", this.sideAt(px, py))
+      return near ? this.handler("point", this.read) : this.handler("side", this.sideAt(px, py))
     }
     if (held.turns) {
       this.turn((px - held.px) * TURN, (py - held.py) * TURN)
       Object.assign(held, { px, py })
-      return this.told("turned")
+      return this.handler("turned")
     }
     const { unit } = this
-    this.told("go", this.moving(held.u, (px - held.px) / unit, -(py - held.py) / unit))
+    this.handler("go", this.moving(held.u, (px - held.px) / unit, -(py - held.py) / unit))
   }
 
   sideAt(px, py) {
@@ -392,9 +392,9 @@ export class Space {
     if (dx === undefined || !this.body || this.body.empty) return
     event.preventDefault()
     event.stopPropagation()
-    if (event.shiftKey && this.body.h === 3) { this.turn(0.1 * dx, -0.1 * dy); return this.told("turned") }
-    this.told("begin")
-    this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
+    if (event.shiftKey && this.body.h === 3) { this.turn(0.1 * dx, -0.1 * dy); return this.handler("turned") }
+    this.handler("begin")
+    this.handler("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
   }
 }
 

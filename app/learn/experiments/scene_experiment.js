@@ -17,7 +17,7 @@ export class SceneExperiment {
     Object.assign(this, { host, options, changed, way: [], locked: true, found: false, lit: new Set() })
     this.canvas = host.appendChild(document.createElement("canvas"))
     Object.assign(this.canvas, { role: "img", ariaLabel: "Disks, and the force on them at every contact" })
-    this.arrows = new Arrows(this.canvas, (what, given) => this.heard(what, given))
+    this.arrows = new Arrows(this.canvas, (what, given) => this.respond(what, given))
   }
 
   async load(source) {
@@ -108,7 +108,7 @@ export class SceneExperiment {
     this.changed()
   }
 
-  heard(what, given) {
+  respond(what, given) {
     if (what === "hover" && !this.arrows.held) {
       this.lit = new Set(given && !given.loose ? [given.contact] : [])
       this.changed()

@@ -30,8 +30,8 @@ class Workbench {
     this.gone = goneBanner(view, "What is in the page still moves.")
     root.prepend(this.gone)
     this.builder = new Builder(this.part("own"), (built) => this.build(built))
-    this.arrows = new Arrows(this.part("packing"), (what, given) => this.heard(what, given))
-    this.space = new Space(this.part("space"), (what, given) => this.heard(what, given))
+    this.arrows = new Arrows(this.part("packing"), (what, given) => this.respond(what, given))
+    this.space = new Space(this.part("space"), (what, given) => this.respond(what, given))
     this.bars = new Bars(this.part("bars"))
     this.axes = new Axes(this.part("plane"), (shadow) => this.cast(shadow))
     this.push = new PushHand()
@@ -256,7 +256,7 @@ class Workbench {
   get builds() { return this.hand?.scene.name === "own" && !this.push.on }
 
   /** Handle pointer events in a picture. */
-  heard(what, given) {
+  respond(what, given) {
     const { hand } = this
     if (what === "words") return stopping(hand.body, given)
     if (what === "press") return this.press(given)

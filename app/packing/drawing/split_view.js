@@ -44,7 +44,7 @@ export class Split {
   /** Apply the comparison and its look. */
   show() {
     const { on, player, other } = this, { model, buttons } = player
-    buttons.tellSplit(Boolean(model.split), on)
+    buttons.showSplit(Boolean(model.split), on)
     if (!on) return
     this.tell()
     if (other) this.showOther()

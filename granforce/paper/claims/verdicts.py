@@ -22,7 +22,7 @@ from granforce.paper.claims.groups import Ends, Groups
 from granforce.types import Floats
 
 REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
-FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"
+STRONGLY, FEW, MISSING = "differs strongly", "too few data", "no data"
 UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
@@ -63,16 +63,15 @@ class Ranges(NamedTuple):
     def verdict(self, low: float, high: float) -> str:
         """The verdict of an interval: UNDECIDED if it crosses an end of the good range.
 
-        An interval entirely outside that range differs, and has failed if it is also entirely
-        outside the wider range.
+        An interval entirely outside that range differs, strongly if it is also entirely outside a
+        wider range.
         """
         if self.good[0] <= low and high <= self.good[1]:
             return REPRODUCED
-        if high < self.fair[0] or low > self.fair[1]:
-            return FAILED
-        if high < self.good[0] or low > self.good[1]:
-            return DIFFERS
-        return UNDECIDED
+        if not (high < self.good[0] or low > self.good[1]):
+            return UNDECIDED
+        wide = self.fair != self.good
+        return STRONGLY if wide and (high < self.fair[0] or low > self.fair[1]) else DIFFERS
 
     def __str__(self) -> str:
         good, fair = _range(self.good), _range(self.fair)
@@ -140,7 +139,7 @@ def over_all(
     why = _turns(turned, verdict)
     if why:
         # A number that is certainly outside the good range does not become undecided.
-        outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
+        outside = {verdict, *turned.values()} <= {DIFFERS, STRONGLY}
         before, verdict = verdict, DIFFERS if outside else UNDECIDED
         why = why if verdict == before else f"{before}, but {why}"
     return claim._replace(verdict=verdict, why=why)
@@ -291,9 +290,9 @@ def _together(verdicts: Any) -> tuple[str, str]:
         return kinds.pop(), ""
     where = {kind: [f"{mu:g}" for mu in verdicts if verdicts[mu] == kind] for kind in kinds}
     why = "; ".join(f"{kind} at {', '.join(where[kind])}" for kind in sorted(kinds))
-    if FAILED in kinds and REPRODUCED not in kinds:
-        return FAILED, why
-    if kinds & {DIFFERS, FAILED}:
+    if STRONGLY in kinds and REPRODUCED not in kinds:
+        return STRONGLY, why
+    if kinds & {DIFFERS, STRONGLY}:
         return DIFFERS, why
     return FEW if FEW in kinds else UNDECIDED, why
 

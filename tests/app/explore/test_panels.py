@@ -31,7 +31,6 @@ from app.explore.tabs.export import export as export_view
 from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
-from app.explore.tabs.friction.claims import VERDICTS
 from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
@@ -498,7 +497,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
         assert f"at μ = {mu:g}" in view.first.object
     told = view.details.object
     assert "geometric mean of η<sub>2</sub>/η<sub>1</sub>" in told and "✓ if " in told
-    assert all(f"{mark} {words}" in told for words, mark in list(VERDICTS.items())[:4])
+    assert all(f"{mark} {words}" in told for words, mark in list(outcomes.SYMBOLS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
     shown = [c for about in study_data.ABOUT for c in study_data.claims(about)]

@@ -8,19 +8,11 @@ import numpy as np
 
 from granforce.paper import documents
 from granforce.paper.claims import outcomes
-from granforce.paper.claims.verdicts import FAILED, REPRODUCED
+from granforce.paper.claims.verdicts import REPRODUCED, STRONGLY
 from granforce.types import Rows
 
 from ....results import study_data
 
-VERDICTS = {
-    "reproduced": "✓",
-    "differs": "≈",
-    "not reproduced": "✗",
-    "undecided": "?",
-    "too few data": "…",
-    "not measured": "…",
-}
 # Columns: the sampler whose numbers a claim is judged by, and heading.
 SAMPLERS = {
     "gauss_seidel": "the paper’s walk, to 10⁻³",
@@ -32,7 +24,6 @@ SAMPLERS = {
 # Outcomes of claims, with the words after their number.
 OUTCOMES = {
     "reproduced": "reproduced",
-    "depend on the sampler": "by some samplers only",
     "differ": "contradicted",
     "open": "open",
 }
@@ -68,11 +59,12 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
 
 def summary() -> str:
     """The numbers of the paper's claims by outcome, and how to read the tables."""
-    marks = ", ".join(f"{mark} {words}" for words, mark in list(VERDICTS.items())[:-1])
+    marks = ", ".join(f"{mark} {words}" for words, mark in list(outcomes.SYMBOLS.items())[:-1])
     return (
         f"<b>{outcomes.score(study_data.claims())}</b> The paper is {PAPER}. Below each claim: "
-        f"the number that is judged, and the range of its interval for {VERDICTS[REPRODUCED]}. "
-        f"Each cell: verdict, value, 95 % interval over packings. {marks}."
+        "the number that is judged, and the range of its interval for "
+        f"{outcomes.SYMBOLS[REPRODUCED]}. Each cell: verdict, value, 95 % interval over packings. "
+        f"{marks}."
     )
 
 
@@ -85,14 +77,14 @@ def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number that a claim is judged by, and its ranges, in words."""
     criterion = next(iter(by_sampler.values()))["criterion"]
     good, wider, fair = criterion.removesuffix("]").partition(" [")
-    ranges = f"{VERDICTS[REPRODUCED]} if {good}"
+    ranges = f"{outcomes.SYMBOLS[REPRODUCED]} if {good}"
     if wider:
-        ranges += f", {VERDICTS[FAILED]} unless {fair}"
+        ranges += f", {outcomes.SYMBOLS[STRONGLY]} unless {fair}"
     return f"{documents.measured(by_sampler)}; {ranges.replace(' … ', UNBROKEN)}"
 
 
 def _cell(claim: dict[str, Any]) -> str:
-    words = VERDICTS.get(claim["verdict"], claim["verdict"])
+    words = outcomes.SYMBOLS[claim["verdict"]]
     if np.isfinite(claim["value"]):
         words += f" {_number(claim['value'])}"
     few = claim["verdict"] == "too few data"
