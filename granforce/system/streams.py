@@ -36,6 +36,9 @@ class _Stream:
     def flush(self) -> None:
         self._tried("flush")
 
+    def isatty(self) -> bool:
+        return self._stream is not None and self._stream.isatty()
+
     def _tried(self, method: str, *words: str) -> Any:
         try:
             if self._stream is None:
