@@ -1372,7 +1372,7 @@ def test_left_out_work_is_counted(library):
     text = left_out(replay_at(library, 0).summary)
     assert "forces along contacts" in text and f"{STATES} <span" in text
     assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
-    assert f"Played: {KEPT}" in text
+    assert "Played" not in text  # the only network has no error
 
 
 def test_every_relaxation_has_a_name_on_screen():
