@@ -24,7 +24,8 @@ from .gc_pauses import settle
 from .limits import LIMITS
 from .turns import Later, Turn, turn_of
 
-ESTIMATED = 2.0  # s of a stage after which its end can be estimated
+# Time, s, and part of a stage after which its end can be estimated: earlier, it is off by factors.
+ESTIMATED, ESTIMATED_PART = 4.0, 0.05
 LONGEST_LINE = 500  # characters of an error message on a page
 LONG = 3.0  # s after which a job is a long one
 _ASK = 0.2  # s between two polls
@@ -176,7 +177,7 @@ class Job:
         self.result: Any = None
         self._work: Callable[[Job], Any] | None = work
         self._pool, self._on_end = pool, on_end
-        self._begun = time.perf_counter()
+        self._counted: tuple[float, float] | None = None  # time and work done at the first `tell`
         self._cancel, self._ended = threading.Event(), threading.Event()
         self.keeps = False  # whether its partial result is a valid result
         self._stop = threading.Event()
@@ -196,22 +197,28 @@ class Job:
         return f"{WAITING}: {count} {'computation' if count == 1 else 'computations'} before it"
 
     def begin(self, stage: str) -> None:
-        """Enter a stage; its remaining time is counted from here."""
-        self.stage, self._begun = stage, time.perf_counter()
-        self.seconds_left = None
+        """Enter a stage, whose bar and remaining time start anew."""
+        self.stage, self._counted = stage, None
+        self.fraction = self.seconds_left = None
 
     def tell(
         self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
     ) -> None:
-        """Progress of the stage; part: begin and end of the stage on the whole bar."""
+        """Progress of the stage; part: begin and end of the stage on the whole bar.
+
+        Within a stage the bar never goes back, even if the total grows.
+        """
         if total is None:
-            self.fraction = self.seconds_left = None
             return
         begin, end = part
-        self.fraction = begin + (end - begin) * min(1.0, done / total)
-        spent = time.perf_counter() - self._begun
-        known = 0 < done <= total and spent > ESTIMATED
-        self.seconds_left = spent / done * (total - done) if known else None
+        reached = begin + (end - begin) * min(1.0, done / total)
+        self.fraction = max(reached, self.fraction or 0.0)
+        now = time.perf_counter()
+        if self._counted is None:
+            self._counted = now, done
+        spent, new = now - self._counted[0], done - self._counted[1]
+        known = new > ESTIMATED_PART * (total - self._counted[1]) and spent > ESTIMATED
+        self.seconds_left = spent / new * max(0.0, total - done) if known else None
 
     def cancel(self) -> None:
         """Request its end: at once if not yet begun, else within a second unless it is needed."""

@@ -77,6 +77,8 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     sampling = result_values.sampling(state)
     count = f"{state.replay.summary['states']} networks"
     heading = f"seen in all of S ({count})" if known else f"seen in all {count}"
+    if not state.replay.summary["dimension"]:
+        heading = "the only network"
     if sampling and sampling.verdict:
         heading += f", {term('r_hat', sampling.verdict)}"
     rows = [[heading, *_values(measures, "seen")]]
@@ -158,7 +160,7 @@ def left_out(summary: Summary) -> str:
             f" {term('failed', 'Failed attempts')}: {summary['rejected']} not in balance, "
             f"{summary['unconverged']} not finished."
         )
-    if summary["kept"] < summary["states"]:
+    if summary["kept"] < summary["states"] and summary["dimension"]:
         line += (
             f" Played: {summary['kept']} of the {summary['states']} networks, evenly spaced; ± and "
             f"R̂ are from these {summary['kept']}, the values from all {summary['states']}."

@@ -20,6 +20,12 @@ export function render({ model, view }) {
   root.append(failed, task, facts)
   let late = 0
 
+  /** A newer message replaces the one below the packing. */
+  function replace() {
+    if (model.failed) view.model.document.get_model_by_name("player")?.player?.say("")
+    show()
+  }
+
   function show() {
     const { fraction = null, words: said, keeps } = plain(model.progress), known = fraction !== null
     late = 0
@@ -43,7 +49,8 @@ export function render({ model, view }) {
   }
 
   if (!knows(NEW)) root.append(invitation())
-  model.on(["failed", "facts"], show)
+  model.on("facts", show)
+  model.on("failed", replace)
   model.on("progress", follow)
   show()
   return root

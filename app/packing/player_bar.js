@@ -38,6 +38,7 @@ export class PlayerBar {
     more.append(speed, this.stored, this.keep)
     this.root = createElement("div", { className: "bar" })
     this.root.append(
+      createElement("span", { className: "only", textContent: "One network: balance determines every force." }),
       iconButton("back", "one network back (←)", () => actions.back()), this.playButton,
       iconButton("step", "one network on (→)", () => actions.step()), this.scrub, along, this.place, more,
     )
@@ -93,6 +94,7 @@ export class PlayerBar {
     this.scrub.max = last
     this.scrub.step = swinging ? 0.01 : 1
     this.root.classList.toggle("swings", swinging)
+    this.root.classList.toggle("single", replay.walk.free === 0)
     this.missed = null
     this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)

@@ -42,6 +42,8 @@ WORDS = {
 UNPACKED = 8
 # Bytes and rows examined to recognise photoelastic files.
 LOOKED_AT, ROWS = 4000, 20
+# Options of the command and arguments of the function in a message: " (--walls floor, or walls=)".
+_OPTIONS = re.compile(r" \((?:--|\w+=)[^()]*\)")
 
 
 class Brought(NamedTuple):
@@ -90,8 +92,8 @@ def _columns(content: bytes) -> set[str]:
     return {word.strip().strip('"') for word in words.split(",")}
 
 
-def needs_box(files: Files) -> bool:
-    """Whether these are tables without anything that confines the disks: no load, no force."""
+def loose(files: Files) -> bool:
+    """Whether these are tables in which nothing holds the disks: no load, no force."""
     named = [_columns(files[part][1]) for part in ("grains", "joined") if part in files]
     return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn", "f_n"}
 
@@ -149,12 +151,15 @@ def read(
     box: tuple[float, float] | None = None,
     tilt: float = 0.0,
     pressure: float = 1.0,
+    walls: str | None = None,
+    gravity: float = 0.0,
     limits: Limits = LIMITS,
 ) -> Packing:
     """The Packing in files {role: (name, content)}.
 
-    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt and pressure: for
-    a table. Raises InputError, naming file and line, for invalid files and beyond the limits.
+    mu: friction coefficient, which an NPZ contains; box (L_x, L_y) or None, tilt, pressure, walls
+    and gravity: for a table, as in `read_table`. Raises InputError, naming file and line, for
+    invalid files and beyond the limits.
     """
     limits.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
@@ -175,10 +180,17 @@ def read(
             box=box,
             tilt=tilt,
             pressure=pressure,
+            walls=walls,
+            gravity=gravity,
             most_grains=limits.n,
         )
     limits.check(mu=packing.mu, n=len(packing.r))
     return packing
+
+
+def without_options(line: str) -> str:
+    """A message without the names of options and arguments in brackets: the page has fields."""
+    return _OPTIONS.sub("", line)
 
 
 def opened(name: str, content: bytes) -> io.BytesIO:

@@ -319,7 +319,7 @@ class AppState(param.Parameterized):
     def _computed(self, shown: Shown) -> None:
         """Show states that were just computed, then their exact intervals if they are quick."""
         self.refresh(shown)
-        if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
+        if shown.replay.normal.shape[1] <= EXACT_FOLLOW:
             self.compute_exact()
 
     @property

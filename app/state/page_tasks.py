@@ -148,4 +148,7 @@ class Work(param.Parameterized):
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+    """In whole seconds below ten, tens of seconds below two minutes, and minutes."""
+    if seconds < 10:
+        return f"{max(1.0, seconds):.0f} s"
+    return f"{round(seconds, -1):.0f} s" if seconds < 115 else f"{seconds / 60:.0f} min"

@@ -88,8 +88,9 @@ export function render({ model }) {
   }
 
   function press(event) {
-    const [node, keys] = found(event.composedPath().slice(0, DEEP))
-    if (event.pointerType !== "touch" || !node || node === at) return hide()
+    const [node, keys] = found(event.composedPath().slice(0, DEEP)), touched = event.pointerType === "touch"
+    if (!node || (touched ? node === at : !node.matches(".term"))) return hide()
+    clearTimeout(waiting)
     show(node, keys)
   }
 

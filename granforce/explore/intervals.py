@@ -169,7 +169,9 @@ def intervals(
     bounds = given | solve(upper)
     # With watch, lower bounds are computed early and replaced afterwards if f_n = 0 is seen: the
     # result is the same, for one or two more programs in a hundred.
-    bounds |= solve([key for key in lower if not zero(key)] + tangential)
+    needed = [key for key in lower if not zero(key)]
+    solver.total -= len(lower) - len(needed)
+    bounds |= solve(needed + tangential)
     zero_keys = [key for key in lower if zero(key)]
     for key in zero_keys:
         bounds[key] = (max(0.0, float(known.least[key[0]])), 0.0)

@@ -43,8 +43,6 @@ _INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
 LEAST_ACCURACY = 0.01
 # Paths on each rung to find the next one, of which the first are left out of the mean of q.
 _PILOT, _FORGOTTEN = 48, 16
-# Rungs of a ladder over √h, for progress before it is built: 36 for h = 227.
-_RUNGS = 2.4
 # Initial paths on each rung, and number of batches whose scatter gives the error.
 _FIRST, _BATCHES = 256, 16
 # Number of paths whose speeds are drawn together; after each such batch rounding is corrected.
@@ -105,7 +103,8 @@ def volume(
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
-    number. progress(done, total) counts paths; total is an estimate that later rounds may raise.
+    number. progress(done, total) counts paths, weighted by their costs; total is None until the
+    first paths show how many are needed, and an estimate from then on.
 
     Raises InputError for an accuracy below 0.01 and unbounded forces, NotJammedError if S
     is empty.
@@ -129,16 +128,22 @@ def volume(
         )
     top, log_top, top_variance = _top(polytope, np.random.default_rng([seed, 0]))
     stores = uniform.stores_for(polytope, workers, workers)
-    paths = _Paths(progress)
-    rungs = _climbed(polytope, stores[0], top, seed, paths)
-    rungs = _extended(polytope, stores, rungs, np.full((2, len(rungs[0])), _FIRST), paths)
+    work = _Work(progress)
+    rungs = _climbed(polytope, stores[0], top, seed, work)
+    first = np.full((2, len(rungs[0])), _FIRST)
+    rungs = _extended(polytope, stores, rungs, first, np.ones(len(rungs[0])), work)
     for _ in range(_MOST_ROUNDS):
         ladders, variance = _summed(rungs)
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
         allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
-        rungs = _extended(polytope, stores, rungs, _more(rungs, variance, allowed), paths)
+        cost = _costs(rungs)
+        have, aim = _paths_on(rungs), _needed(rungs, variance, cost, allowed)
+        work.expect(float((np.maximum(aim - have, 0.05 * have) * cost).sum()))
+        more = np.ceil(np.clip(aim - have, 0.05 * have, (_GROWTH - 1) * have)).astype(int)
+        rungs = _extended(polytope, stores, rungs, more, cost, work)
+    work.expect(0)
     ladders += polytope.units + log_top
     log_volume, two_errors = float(ladders.mean()), 2 * np.sqrt(variance.sum())
     agree = abs(ladders[1] - ladders[0]) <= AGREE * two_errors
@@ -175,23 +180,28 @@ def _top(polytope: Walls, rng: np.random.Generator) -> tuple[float, float, float
     return beta, log, (1 - part) / (part * _COUNTED)
 
 
-class _Paths:
-    """Counts paths for a progress callback; threads share it."""
+class _Work:
+    """The work on paths for a progress callback; threads share it."""
 
     def __init__(self, progress: Progress | None) -> None:
-        self._progress, self._total = progress, 0
-        self._flown: list[int] = []  # appending needs no lock
+        self._progress = progress
+        self._total: float | None = None
+        self._done: list[float] = []  # appending needs no lock
 
-    def expect(self, more: int) -> None:
-        """So many paths are still to come."""
-        self._total = sum(self._flown) + more
+    def expect(self, more: float) -> None:
+        """Announce the work that is still to come."""
+        self._total = sum(self._done) + more
+        self._report()
 
-    def add(self, count: int) -> None:
-        """So many have been flown."""
-        self._flown.append(count)
+    def add(self, work: float) -> None:
+        """Count work as done."""
+        self._done.append(work)
+        self._report()
+
+    def _report(self) -> None:
         if self._progress is not None:
-            done = sum(self._flown)
-            self._progress(done, max(done, self._total))
+            done = sum(self._done)
+            self._progress(done, None if self._total is None else max(done, self._total))
 
 
 class _Rung(NamedTuple):
@@ -207,26 +217,24 @@ class _Rung(NamedTuple):
 
 
 def _climbed(
-    polytope: Walls, rows: billiard.RowStore, top: float, seed: int, paths: _Paths
+    polytope: Walls, rows: billiard.RowStore, top: float, seed: int, work: _Work
 ) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
     down: list[_Rung] = []
-    paths.expect(int(_RUNGS * np.sqrt(polytope.dimension)) * 2 * (_PILOT + _FIRST))
     beta, slacks, reach = top, np.ones(polytope.count), float(np.sqrt(polytope.dimension / top))
     while not down or down[-1].beta > 0:
         down.append(_settled(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
-        paths.add(_PILOT)
+        work.add(_PILOT)
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
         spread = max(float(q.std()), 1e-300)
         # Wider distributions have wider q: the last step is short, and none is too long.
         beta = 0.0 if beta * spread < STEP else max(0.5 * beta, beta - 2 * STEP / spread)
     up = []
-    paths.expect(len(down) * (_PILOT + 2 * _FIRST))
     for number in range(len(down) - 1, -1, -1):
         beta, reach = down[number].beta, down[number].reach
         up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
-        paths.add(_PILOT)
+        work.add(_PILOT)
         slacks = up[-1].end.slacks
     rungs = down, up[::-1]
     # New paths: those that built the ladder are not used in the result.
@@ -321,18 +329,25 @@ def _log_mean(values: Floats) -> tuple[float, Floats]:
     return most + np.log(mean), weight / mean
 
 
-def _more(rungs: list[list[_Rung]], variance: Floats, wanted: float) -> Integers:
-    """Number of further paths (2, rungs) per rung for the wanted variance at the least cost."""
-    have = np.array([[len(rung.q) for rung in way] for way in rungs])
+def _paths_on(rungs: list[list[_Rung]]) -> Integers:
+    """Number of paths (2, rungs)."""
+    return np.array([[len(rung.q) for rung in way] for way in rungs])
+
+
+def _costs(rungs: list[list[_Rung]]) -> Floats:
+    """Mean cost (rungs,) of a path."""
     turns = np.array([[rung.turns for rung in way] for way in rungs])
-    cost = (turns / have + _PATH_COST).mean(axis=0)
+    return np.asarray((turns / _paths_on(rungs) + _PATH_COST).mean(axis=0))
+
+
+def _needed(rungs: list[list[_Rung]], variance: Floats, cost: Floats, wanted: float) -> Floats:
+    """Number of paths (rungs,) for the wanted variance at the least cost."""
+    have = _paths_on(rungs)
     # Neighbours are similar, and their mean is less noisy.
     each = np.convolve(
         np.pad((variance * have).mean(axis=0), 2, mode="edge"), np.ones(5) / 5, "valid"
     )
-    aim = np.sqrt(each / cost) * 2 * np.sum(np.sqrt(each * cost)) / (0.95 * wanted)
-    more = np.clip(aim - have, 0.05 * have, (_GROWTH - 1) * have)
-    return np.ceil(more).astype(int)
+    return np.asarray(np.sqrt(each / cost) * 2 * np.sum(np.sqrt(each * cost)) / (0.95 * wanted))
 
 
 def _extended(
@@ -340,9 +355,10 @@ def _extended(
     stores: Sequence[Any],
     rungs: list[list[_Rung]],
     more: Integers,
-    paths: _Paths,
+    cost: Floats,
+    work: _Work,
 ) -> list[list[_Rung]]:
-    """The rungs with this many more paths each, on threads."""
+    """The rungs with this many more paths each, at this cost per path, on threads."""
     count = len(rungs[0])
     # Neighbours in different threads, as the widest take longest.
     order = [
@@ -351,14 +367,13 @@ def _extended(
         for k in range(first, count, len(stores))
         for way in (0, 1)
     ]
-    tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
-    paths.expect(int(more.sum()))
+    tasks = [(rungs[way][k], int(more[way, k]), float(cost[k])) for way, k in order]
 
-    def flown(some: list[tuple[_Rung, int]], rows: billiard.RowStore) -> list[_Rung]:
+    def flown(some: list[tuple[_Rung, int, float]], rows: billiard.RowStore) -> list[_Rung]:
         flying = []
-        for rung, number in some:
+        for rung, number, each in some:
             flying.append(_flown(polytope, rows, rung, number))
-            paths.add(number)
+            work.add(number * each)
         return flying
 
     parts = uniform.shared(stores, tasks, flown)

@@ -1124,10 +1124,15 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
 
     def work(job):
         job.begin("counting")
-        job.tell(1, 4)
-        assert job.seconds_left is None  # too early to say
-        job._begun -= 400
-        job.tell(1, 4)
+        job.tell(0, 100)
+        job._counted = job._counted[0] - 400, 0
+        job.tell(4, 100)
+        assert job.seconds_left is None  # too little to say
+        job.tell(25, 100)
+        assert job.seconds_left == pytest.approx(1200, rel=0.01)
+        job.tell(25, 200)
+        assert job.fraction == 0.25  # not back
+        job.tell(25, 100)
         told.set()
         while not job.cancelled():
             time.sleep(0.01)
@@ -1367,7 +1372,7 @@ def test_left_out_work_is_counted(library):
     text = left_out(replay_at(library, 0).summary)
     assert "forces along contacts" in text and f"{STATES} <span" in text
     assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
-    assert f"Played: {KEPT}" in text
+    assert "Played" not in text  # the only network has no error
 
 
 def test_every_relaxation_has_a_name_on_screen():

@@ -27,7 +27,7 @@ export class Playback {
   /** Begin or end. */
   run(on) {
     const { stage } = this, { replay } = stage
-    this.running = on && replay !== null
+    this.running = on && replay !== null && replay.walk.free !== 0 // a single network has nothing to play
     this.resting = null
     if (replay && !this.running) this.settle(replay)
     stage.changed(this.running)

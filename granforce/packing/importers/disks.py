@@ -103,7 +103,9 @@ def enclosed(
     if not len(behind.disk):
         raise InputError("no disk touches a wall; correct the walls, or raise the tolerance")
     if not load.any():  # NaN counts: an open balance may press
-        raise InputError("nothing presses on the walls: add --gravity 1 (gravity=1), or loads")
+        raise InputError(
+            "nothing presses on the walls: add gravity (--gravity 1, or gravity=1), or loads"
+        )
     r = np.concatenate([packing.r, behind.r])
     outer = make_contacts(
         behind.disk,

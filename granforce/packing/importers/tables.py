@@ -121,8 +121,8 @@ def read_table(
         return find(packing, forces="found")
     if walls is not None or gravity:
         raise InputError(
-            "--walls and --gravity (walls=, gravity=) apply to tables without forces: leave out "
-            "f_n and f_t"
+            "walls and gravity (--walls and --gravity, or walls=, gravity=) apply to tables "
+            "without forces: leave out f_n and f_t"
         )
     refuse_idle_reverse(packing.forces, reverse)
     found = adopt(packing, reverse=reverse, forces="given")
@@ -130,8 +130,8 @@ def read_table(
         return found
     return with_edge(
         found,
-        "; for walls and weights instead, leave out the forces and give --walls and --gravity "
-        "(walls=, gravity=)",
+        "; for walls and weights instead, leave out the forces and give walls and gravity "
+        "(--walls and --gravity, or walls=, gravity=)",
     )
 
 

@@ -199,13 +199,40 @@ def test_disks_without_a_box_ask_for_it(state):
     view = upload_view.View(state)
     view.mu.value = "0.1"
     view._dropped([("disks.csv", table(packing))])
-    assert view.waiting.visible and view.waiting.title.startswith("Enter the sides")
+    assert view.waiting.visible and "Enter the sides" in view.waiting.title
     assert view.box.visible and view.box.error_state and view.read.visible
     assert not view.error.visible and not view.task.running
     view.box.value = ", ".join(map(repr, map(float, packing.box)))
     press(view.read)
     wait_for(state, lambda: "disks.csv" in view.report.object)
     assert not view.waiting.visible and not view.box.error_state
+
+
+def test_disks_on_a_floor_need_walls_and_gravity(state):
+    """Each option without use is refused, in words of the page; exact bounds follow."""
+    view = upload_view.View(state)
+    heap = b"x,y,r\n0.5,0.5,0.5\n1.5,0.5,0.5\n1,1.3660254037844386,0.5\n"
+    view._dropped([("heap.csv", heap)])
+    assert view.around.visible and view.gravity.visible
+    view.around.value = "floor"
+    press(view.read)
+    assert "Gravity" in view.waiting.title and not view.task.running
+    view.gravity.value, view.pressure.value = "1", "2"
+    press(view.read)
+    assert "leave it empty" in view.error.title and not view.task.running
+    view.pressure.value, view.box.value = "", "2, 3"
+    press(view.read)
+    wait_for(state, lambda: view.error.visible)
+    assert "leave out the box" in view.error.title
+    view.box.value, view.around.value = "", ""
+    press(view.read)
+    wait_for(state, lambda: view.error.visible)
+    assert "if walls hold the grains, give them" in view.error.title
+    assert "--" not in view.error.title and "walls=" not in view.error.title
+    view.around.value = "floor"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported and state.exact is not None)
+    assert state.replay.summary["contacts"] == 5
 
 
 def test_a_packing_without_stress_in_one_direction_has_a_warning(state):
@@ -357,7 +384,7 @@ def test_bodies_of_a_file_are_drawn_as_they_are():
 )
 def test_a_file_of_bodies_is_read(name, content):
     files = uploads.added({}, [(name, content)])
-    assert not uploads.missing(files) and not uploads.needs_box(files)
+    assert not uploads.missing(files) and not uploads.loose(files)
     assert len(uploads.read(files, mu=0.5).shapes.sides) == 2
 
 

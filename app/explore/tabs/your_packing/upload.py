@@ -26,13 +26,18 @@ contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, conta
 j and f_n, f_t; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
 for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
 (frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
-<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Files are
-read into memory. A packing is saved in the cache; a frame is saved only if you open it as a
-packing.
+<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Something
+must hold the disks of a table: enter a periodic box, or walls and gravity, or give columns fx, fy,
+torque with the load on each disk. Files are read into memory. A packing is saved in the cache; a
+frame is saved only if you open it as a packing.
 """
-BOX_WANTED = (
-    "Enter the sides of the periodic box in Box, such as 30, 30, and its tilt, if any; then press "
-    "Read. Disks without a box need columns fx, fy, torque with the load on each."
+HOLD_WANTED = (
+    "What holds the disks? Enter the sides of a periodic box in Box, such as 30, 30, and its tilt, "
+    "if any; or choose Walls and enter Gravity, such as 1. Then press Read. Disks without either "
+    "need columns fx, fy, torque with the load on each."
+)
+IDLE_PRESSURE = (
+    "Pressure applies only to a table in a periodic box, without forces and loads: leave it empty"
 )
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
@@ -45,6 +50,7 @@ WALLS = {
     "circle": "a circle",
     "open": "left open",
 }
+AROUND = {"": "none", "floor": "a floor", "box": "a floor and two sides"}
 SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 
 
@@ -67,7 +73,9 @@ class View:
         )
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
-        self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
+        self.pressure = pmui.TextInput(label="Pressure", placeholder="1", **SMALL)
+        self.around = Select(label="Walls", options=by_words(AROUND), width=190, margin=(4, 8))
+        self.gravity = pmui.TextInput(label="Gravity", placeholder="0", **SMALL)
         self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", margin=(8, 8), **PRIMARY)
@@ -86,7 +94,8 @@ class View:
         return pn.Column(
             self.dropper,
             pn.FlexBox(
-                *(self.mu, self.box, self.pressure, self.walls, self.reverse, self.read),
+                *(self.mu, self.box, self.pressure, self.around, self.gravity),
+                *(self.walls, self.reverse, self.read),
                 sizing_mode="stretch_width",
             ),
             self.error,
@@ -104,7 +113,8 @@ class View:
         kind = uploads.family(self.files) if self.files else None
         self.mu.visible = kind not in (None, "npz")
         self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
-        self.box.visible = self.pressure.visible = kind == "table"
+        for field in (self.box, self.pressure, self.around, self.gravity):
+            field.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
     def _dropped(self, new: list[tuple[str, bytes]]) -> None:
@@ -128,10 +138,10 @@ class View:
         except InputError as error:
             self._refuse(str(error))
             return
-        box_wanted = uploads.needs_box(self.files) and not options["box"]
-        self.box.error_state = box_wanted
-        self._wait(BOX_WANTED if box_wanted else "")
-        if box_wanted:
+        loose = uploads.loose(self.files) and not (options["box"] or options["gravity"])
+        self.box.error_state = loose
+        self._wait(HOLD_WANTED if loose else "")
+        if loose:
             return
         if uploads.family(self.files) in ("pegs", "solved"):
             self._clear()
@@ -147,19 +157,29 @@ class View:
         if kind in ("pegs", "solved"):
             options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
         if kind == "table":
-            sides = (self.box.value_input or self.box.value).replace(",", " ").split()
-            if len(sides) not in (0, 2, 3):
-                raise InputError(
-                    "enter the two sides of the box, such as 30, 30, and its tilt, if any; leave "
-                    "it empty for an open packing"
-                )
-            box = [positive(typed(side), "a side of the box") for side in sides[:2]]
-            options["box"] = box or None
-            options["tilt"] = (
-                make_cell(options["box"], _number(sides[2])).tilt if sides[2:] else 0.0
-            )
-            options["pressure"] = positive(typed(self.pressure.value), "the pressure")
+            options |= self._holding()
         return options
+
+    def _holding(self) -> dict[str, Any]:
+        """The options of a table on what holds its disks."""
+        sides = (self.box.value_input or self.box.value).replace(",", " ").split()
+        if len(sides) not in (0, 2, 3):
+            raise InputError(
+                "enter the two sides of the box, such as 30, 30, and its tilt, if any; leave "
+                "it empty for an open packing"
+            )
+        box = [positive(typed(side), "a side of the box") for side in sides[:2]] or None
+        gravity = (self.gravity.value_input or self.gravity.value).strip() or "0"
+        options = {
+            "box": box,
+            "tilt": make_cell(box, _number(sides[2])).tilt if box and sides[2:] else 0.0,
+            "walls": self.around.value or None,
+            "gravity": positive(typed(gravity), "Gravity", or_zero=True),
+        }
+        pressure = (self.pressure.value_input or self.pressure.value).strip()
+        if pressure and not (box and uploads.loose(self.files)):
+            raise InputError(IDLE_PRESSURE)
+        return options | ({"pressure": positive(typed(pressure), "Pressure")} if pressure else {})
 
     def _show(
         self, brought: uploads.Brought, frame: photoelastic_frames.Frame | None = None
@@ -207,6 +227,7 @@ class View:
         self.waiting.param.update(title=line, visible=bool(line))
 
     def _refuse(self, line: str) -> None:
+        line = uploads.without_options(line)
         self.error.param.update(title=line, visible=bool(line))
 
 
