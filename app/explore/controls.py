@@ -53,6 +53,12 @@ def differs(state: AppState) -> str:
     return differing(state.selection, state.cell and state.cell.selection)
 
 
+def _made(state: AppState) -> str:
+    """The line that opens the options, with the number of disks on screen."""
+    n = None if state.cell is None else state.cell.selection.packing.get("n")
+    return MADE if n is None else f"{n} disks · {MADE}"
+
+
 class Controls:
     """Widgets for the state's selection: the `line`, and `made`, which it opens."""
 
@@ -189,6 +195,7 @@ class Controls:
         known = state.cell is not None and state.cell.selection.packing == packing
         if selection.imported and known:
             self.n.value = state.replay.summary["n"]
+        self.opens.line = _made(state)
         self.n.param.update(disabled=selection.imported, visible=known or not selection.imported)
         self.seed.visible = self.packed.visible = not selection.imported
         self.packed.value = SAME if selection.same_mu else f"{packing['mu']:g}"

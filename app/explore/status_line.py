@@ -36,6 +36,7 @@ class StatusLine(Scripted):
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
         work.computation.param.watch(self._tell, "running")
         state.param.watch(self._look, "cell")
+        state.knowledge.param.watch(self._tell, ["known", "narrowed"])
         work.param.watch(self._report, ["message", "progress"])
         self._look()
         self._tell()
@@ -88,15 +89,19 @@ def facts(state: AppState) -> Iterator[str]:
 
 
 def bounds(state: AppState) -> str:
-    """The number of certified exact bounds, and their accuracy."""
-    exact = state.exact
+    """The number of certified exact bounds, their accuracy, and whether held forces narrow them."""
+    exact, known, whole = state.exact, "", state.knowledge.whole
     if exact is None:
         return "exact bounds: not computed"
+    if whole is not None:
+        exact, known = whole.after, " given the held forces"
+    elif state.knowledge.known:
+        known = " without the held forces"
     gap = exact["interval_gap"].values
     count, total = int(np.isfinite(gap).sum()), gap.size
     most = float(exact["max_gap"])
     of = "" if count == total else f" of {total}"
-    return f"{count}{of} {term('certified', 'bounds certified')}, gap ≤ {power(most)} ⟨fₙ⟩"
+    return f"{count}{of} {term('certified', 'bounds certified')}{known}, gap ≤ {power(most)} ⟨fₙ⟩"
 
 
 def power(value: float) -> str:

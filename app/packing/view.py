@@ -99,6 +99,7 @@ class PackingView:
             self._explain,
             ["colour", "thickness", "full", "stretch", "dark", "tab", "reference"],
         )
+        looks.param.watch(self._turn, "tab")
         state.param.watch(self._explain, ["shown", "exact", "loads", "measured"])
         state.knowledge.param.watch(self._explain, ["known", "narrowed"])
         state.hand.param.watch(self._explain, "pulls")
@@ -123,10 +124,10 @@ class PackingView:
         state, looks, replay = self.state, self.looks, self.state.shown
         if replay is None:
             return
-        exact = exact_intervals(state.possible, replay)
+        exact = exact_intervals(state.drawn, replay)
         changes = {
             "exact": exact,
-            "reduction": reduction(state.knowledge, replay),
+            "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
             "measured": measured(state, replay),
             "most": full_extent(replay, exact, looks.full),
             "between": None if looks.between is None else list(looks.between),
@@ -137,6 +138,11 @@ class PackingView:
             changes["walk"] = frames(replay, room)
         changes["keepable"] = state.keepable
         self.player.param.update(changes)
+
+    def _turn(self, event: Any) -> None:
+        """Hide the held forces in the tab of pushes, which ignore them, and show them in others."""
+        if self.state.knowledge.known and "perturb" in (event.old, event.new):
+            self._show()
 
     def _accompany(self, *events: Any) -> None:
         """Show another packing next to the one on screen."""
@@ -255,7 +261,7 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     looks = state.looks
     full = looks.full or FULL_CHANGE
     change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
-    most = full_extent(state.shown, exact_intervals(state.possible, state.shown), looks.full)
+    most = full_extent(state.shown, exact_intervals(state.drawn, state.shown), looks.full)
     return {
         "mobilised": MOBILISED,
         "extent": (
@@ -278,7 +284,9 @@ def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
 
 def _bounds(state: AppState) -> str:
     """The kind of the intervals that lines show, in words."""
-    return state.bounds if exact_intervals(state.possible, state.shown) else "seen"
+    if not exact_intervals(state.drawn, state.shown):
+        return "seen"
+    return state.bounds if state.obeys_held else "exact"
 
 
 def colours(pulled: str) -> dict[str, str]:
@@ -320,7 +328,9 @@ def legend(state: AppState, pulled: str = "") -> str:
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
     if looks.colour == "mobilised" and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    if looks.colour == "known" and state.knowledge.narrowed is None:
+    if looks.colour == "known" and not state.obeys_held:
+        bar = "(a push ignores held forces)"
+    elif looks.colour == "known" and state.knowledge.narrowed is None:
         bar = "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)

@@ -140,6 +140,16 @@ class AppState(param.Parameterized):
         """The kind of the bounds in `possible`, in words."""
         return "exact" if self.knowledge.narrowed is None else "exact given the held forces"
 
+    @property
+    def obeys_held(self) -> bool:
+        """Whether lines show the held forces; a push, which ignores them, does not."""
+        return self.looks.tab != "perturb"
+
+    @property
+    def drawn(self) -> Any:
+        """The exact intervals that lines show: `possible`, or those without the held forces."""
+        return self.possible if self.obeys_held or self.growing else self.exact
+
     def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue again; show what was just computed."""
         if shown is not None:

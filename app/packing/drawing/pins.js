@@ -24,6 +24,7 @@ export class Pins {
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
     if (this.player.pushable && !scene.frozen) this.push(context, scene)
+    if (this.player.pushes) return // which ignores held forces
     if (!contacts.length && !ranked.length) return
     const held = new Map(), rank = new Map(), { ratio } = scene
     for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])

@@ -7,9 +7,10 @@ import pytest
 from visitor import wait_for
 
 from app.explore.results_line import tables
+from app.explore.status_line import bounds
 from app.explore.tabs.intervals.intervals import View
-from app.explore.tabs.intervals.known_forces import words
-from app.packing.view import PackingView
+from app.explore.tabs.intervals.known_forces import meaning, words
+from app.packing.view import PackingView, legend
 from app.state import known
 from app.state.known import Statement
 from granforce.packing.importers import read_known
@@ -94,6 +95,20 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     wait_for(state)
     assert np.all(np.isfinite(intervals.drawing.bars.data["high"]))
     assert f"{h} = " in tables(state, None, False) and "given" not in lead.object
+
+
+def test_a_push_shows_no_held_forces(state):
+    view = PackingView(state)
+    state.looks.colour = "extent"
+    held(state, 4)
+    given = view.player.exact["high"]
+    assert "exact given the held forces" in legend(state) and "given the held" in bounds(state)
+    state.looks.tab = "perturb"
+    assert "(exact, this packing)" in legend(state)
+    assert view.player.reduction is None and np.all(view.player.exact["high"] >= given - 1e-6)
+    assert np.any(view.player.exact["high"] > given + 1e-3)
+    state.looks.tab = "intervals"
+    np.testing.assert_array_equal(view.player.exact["high"], given)
 
 
 def test_an_error_bar_narrows_less_and_leaves_the_dimension(state):
@@ -256,6 +271,9 @@ def test_which_to_measure_next_is_in_order_and_worth_it(state):
     wait_for(state)
     best = state.knowledge.ranked
     assert best.known == tuple(state.knowledge.known) and 4 not in best.contacts
+    assert meaning(best, False).startswith("Exact: mean interval")
+    some = best._replace(after=np.where(np.arange(len(best.after)) < 3, best.after, np.nan))
+    assert "best 3" in meaning(some, False) and "standard deviation" in meaning(some, False)
     assert np.all(np.diff(best.after) >= 0) and best.after[0] < best.before
     assert best.before == pytest.approx(state.knowledge.narrowed.mean[1], abs=1e-6)
     held(state, int(best.contacts[0]))

@@ -8,8 +8,8 @@ export function render({ model, view }) {
   root.className = "known"
   root.innerHTML = `
     <div class="chips"></div><div class="words" role="status"></div>
-    <button type="button" class="soft next">Which force to measure next?</button><ol class="ranked"></ol>`
-  const [chips, words, next, ranked] = root.children
+    <button type="button" class="soft next">Which force to measure next?</button><p class="meaning"></p><ol class="ranked"></ol>`
+  const [chips, words, next, meaning, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
   /** Mark a contact in the packing; null: the selected one. */
@@ -34,6 +34,7 @@ export function render({ model, view }) {
   const shown = {
     chips: () => chips.replaceChildren(...model.chips.map(chip)),
     words: () => { words.innerHTML = model.words },
+    meaning: () => { meaning.textContent = model.meaning },
     ranked: () => ranked.replaceChildren(...model.ranked.map(row)),
     asking: () => { next.disabled = model.asking },
   }

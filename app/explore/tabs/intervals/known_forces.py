@@ -27,6 +27,7 @@ class Known(Scripted):
     chips = param.List(doc="pairs (contact, words)")
     words = param.String(doc="effect on the other intervals, HTML")
     ranked = param.List(doc="pairs (contact, words), the best to measure first")
+    meaning = param.String(doc="of the numbers in `ranked`")
     asking = param.Boolean(doc="whether the best contacts to measure are being computed")
 
     def __init__(self, state: AppState, **params: Any) -> None:
@@ -62,6 +63,7 @@ class Known(Scripted):
             chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
             words=words(knowledge, number),
             ranked=[] if best is None else _ranks(best, number),
+            meaning="" if best is None else meaning(best, knowledge.ranking.running),
             asking=knowledge.ranking.running,
         )
 
@@ -104,10 +106,31 @@ def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
     ]
 
 
+def meaning(best: Ranked, running: bool) -> str:
+    """The meaning of the numbers in a list of contacts to measure, and which of them are exact."""
+    exact, listed = int(np.isfinite(best.after).sum()), len(best.after)
+    lines = []
+    if exact:
+        which = "" if exact == listed else f" for the best {exact}"
+        lines.append(f"Exact{which}: mean interval of all fₙ, now → with this force known.")
+    if exact < listed:
+        rest = "The others are" if exact else "These are"
+        why = (
+            "exact bounds of the best follow"
+            if running
+            else "exact bounds of every contact would take too long"
+        )
+        lines.append(
+            f"{rest} estimates from random networks, of how much the mean standard deviation of fₙ "
+            f"falls; {why}."
+        )
+    return " ".join(lines)
+
+
 def _worth(before: float, after: float, expected: float) -> str:
     """The value of knowing a contact."""
     if np.isnan(after) or np.isnan(before):
-        return f"would make errors about {expected:.1%} smaller (estimated from the networks)"
+        return f"standard deviations about {100 * expected:.1f} % smaller"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 
 

@@ -85,19 +85,30 @@ def _alpha(pushed: Pushed) -> str:
     """α over the ranges of the fit; a dash in boxes too small for a fit."""
     if not np.isfinite(pushed.exponent):
         return "–"
+    if not _decays(pushed):
+        return "no power law determined here"
     return f"{between(*pushed.spread)}, by range of r"
+
+
+def _decays(pushed: Pushed) -> bool:
+    """Whether a fit over any range of r has |u| fall with r."""
+    return bool(np.isfinite(pushed.exponent) and pushed.spread[0] > 0)
 
 
 def decay_sentence(pushed: Pushed) -> str:
     """Whether |u| decays as a power law or an exponential over the range of the fit, as HTML."""
     if not np.isfinite(pushed.exponent):
         return ""
-    r, u = _fitted(pushed)
     (inner, outer), (least, most) = pushed.fit, pushed.spread
-    falls = "falls like r⁻ᵅ" if least > 0 else "shows no clear decay: it is fitted by r⁻ᵅ"
+    if not _decays(pushed):
+        return (
+            "This push determines no power law: fits of r⁻ᵅ to mean |u| over different ranges of "
+            f"r give values of α from {least:.2f} to {most:.2f}."
+        ).replace("-", "−")
+    r, u = _fitted(pushed)
     text = (
-        f"Mean |u| {falls} with α = {between(least, most)}, depending on the range of r; the "
-        f"dashed line is the fit from r = {inner:.1f} to {outer:.1f} (shaded)."
+        f"Mean |u| falls like r⁻ᵅ with α = {between(least, most)}, depending on the range of r; "
+        f"the dashed line is the fit from r = {inner:.1f} to {outer:.1f} (shaded)."
     )
     power, exponential = statistics.decay_misfits(r, u)
     if not np.isfinite([power, exponential]).all():
@@ -125,7 +136,7 @@ def decay(pushed: Pushed, bodies: bool) -> Figure:
         pushed.radius[known], pushed.profile[known], color=ORIGINAL, line_width=2.5,
         legend_label="mean at this distance",
     )  # fmt: skip
-    if np.isfinite(pushed.exponent):
+    if _decays(pushed):
         r, u = _fitted(pushed)
         middle = np.exp(np.log(u).mean() + pushed.exponent * np.log(r).mean())
         inner, outer = pushed.fit
