@@ -59,7 +59,7 @@ def reloaded(page):
 def computes(page, address, seed):
     """Another computation is asked for, and succeeds."""
     page.goto(f"{address}?mu=0.2&n=30&states=5&seed={seed}")
-    there = re.compile(f"^N = 30, seed {seed}, 5 states")  # among the finished results
+    there = re.compile(f"^N = 30, seed {seed}, 5 networks")  # among the finished results
     page.locator("option", has_text=there).first.wait_for(state="attached")
 
 
