@@ -210,7 +210,10 @@ def test_behind_one_point_of_the_shadow_lie_other_forces(opening, lesson):
     change.click()
     page.get_by_text("The dot stayed").wait_for()
     assert float(dot(page).get_attribute("aria-valuenow")) == pytest.approx(float(at), abs=1e-9)
-    assert page.locator(".picture canvas").evaluate(drawn) != before
+    picture = page.locator(".picture canvas").element_handle()
+    page.wait_for_function(
+        f"([picture, before]) => ({drawn})(picture) !== before", arg=[picture, before]
+    )
 
 
 def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(opening, lesson):
