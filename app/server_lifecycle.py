@@ -6,11 +6,12 @@ At the start kernels are compiled, and the server ends at once if it could not s
 import argparse
 import importlib
 import sys
+import warnings
 from contextlib import suppress
 
 from panel import config
 
-from granforce.records import InputError
+from granforce.records import InputError, InputWarning
 from granforce.study.scan import warm_up
 from granforce.system.cancelling import end_everything
 from granforce.system.compiled import compile_ahead
@@ -53,6 +54,7 @@ def on_server_loaded(server_context: object) -> None:
             "the app computes in threads of its own, and cannot run with --num-threads or "
             "PANEL_NUM_THREADS: start panel serve without"
         )
+    warnings.simplefilter("ignore", InputWarning)  # notes on a visitor's files are on the page
     # xarray imports dask, if installed, with the first array it examines, which fails if two
     # threads do so at once.
     with suppress(ImportError):
