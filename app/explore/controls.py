@@ -56,7 +56,7 @@ def differs(state: AppState) -> str:
 def _made(state: AppState) -> str:
     """The line that opens the options, with the number of disks on screen."""
     n = None if state.cell is None else state.cell.selection.packing.get("n")
-    return MADE if n is None else f"{n} disks · {MADE}"
+    return MADE if n is None else f"{n} disks\n{MADE}"
 
 
 class Controls:

@@ -114,15 +114,15 @@ def meaning(best: Ranked, running: bool) -> str:
         which = "" if exact == listed else f" for the best {exact}"
         lines.append(f"Exact{which}: mean interval of all fₙ, now → with this force known.")
     if exact < listed:
-        rest = "The others are" if exact else "These are"
+        rest = "The others are estimated" if exact else "Estimated"
         why = (
             "exact bounds of the best follow"
             if running
             else "exact bounds of every contact would take too long"
         )
         lines.append(
-            f"{rest} estimates from random networks, of how much the mean standard deviation of fₙ "
-            f"falls; {why}."
+            f"{rest} from random networks: decrease of the mean standard deviation of all fₙ, with "
+            f"this force known; {why}."
         )
     return " ".join(lines)
 
