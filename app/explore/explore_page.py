@@ -174,6 +174,7 @@ class _Around:
         yield from tabs.filling(state.looks.tab)
         if state.looks.wide:
             yield from tabs.filling("plane")
-        self.panels.extend([self.address, Hints(), Unfolding()])
+        self.panels.append(Unfolding())
+        self.controls.extend([self.address, Hints()])  # not in the panels, which are isolated
         explanation.follow(state, self.header)
         state.read_ahead()

@@ -158,8 +158,10 @@ def _mean_extent(possible: xr.Dataset | None) -> str:
     if possible is None:
         return ""
     extent = (possible["high"] - possible["low"]).values[:, 0] / possible["force_scale"].item()
-    finite = extent[np.isfinite(extent)]
-    return short(float(finite.mean())) if len(finite) else ""
+    if np.isinf(extent).any():
+        return "∞"
+    certified = extent[np.isfinite(extent)]
+    return short(float(certified.mean())) if len(certified) else ""
 
 
 def unborne(replay: Replay) -> str:
@@ -184,7 +186,7 @@ def unborne(replay: Replay) -> str:
 
 def with_error(value: float, error: float) -> str:
     """A value and its standard error, to two digits of the error: "0.1021 ± 0.0012"."""
-    if not error > 0 or not math.isfinite(error):
+    if not error > 0 or not math.isfinite(error) or not math.isfinite(value):
         return short(value)
     digits = max(0, 1 - int(f"{error:.1e}".partition("e")[2]))
     return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")

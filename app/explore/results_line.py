@@ -1,5 +1,6 @@
 """The results for the states on screen as two tables: indeterminacy, and the packing."""
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -155,6 +156,8 @@ def left_out(summary: Summary) -> str:
         if (count := summary.get(key))
     ]
     line = f"Not counted: {', '.join(counts) or 'nothing'}."
+    if math.isnan(summary.get("eta1", 0.0)):
+        line = f"S is unbounded: some forces have no largest value, so η is undefined. {line}"
     if summary.get("rejected") or summary.get("unconverged"):
         line += (
             f" {term('failed', 'Failed attempts')}: {summary['rejected']} not in balance, "

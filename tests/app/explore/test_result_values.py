@@ -74,7 +74,7 @@ def test_errors_have_two_digits():
     ]  # fmt: skip
 
 
-def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
+def test_infinite_intervals_make_their_mean_infinite_and_are_drawn_as_the_longest():
     high = np.array([[3.0, 0.0], [np.inf, 0.0], [1.0, 0.0]])
     possible = xr.Dataset(
         {
@@ -83,7 +83,8 @@ def test_infinite_intervals_do_not_count_and_are_drawn_as_the_longest():
             "force_scale": 2.0,
         }
     )
-    assert result_values._mean_extent(possible) == "1.000"
+    assert result_values._mean_extent(possible) == "∞"
+    assert with_error(np.nan, 0.1) == "–"
     exact = {"low": np.zeros(3), "high": high[:, 0]}
     assert view.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
     assert np.isfinite(view.full_extent(None, exact))
