@@ -56,7 +56,9 @@ export class Sheet {
 
   /** The drawing as text, with colour bar, scale and caption below. */
   svg([left, right, bottom, top], { background, ink, bar, width, lines: told, unit, bodies }) {
-    const lines = told.flatMap(wrapped), scale = PIXELS / (right - left)
+    const [high, remark] = bar.high.split(/ (?=\()/) // which may be long
+    const lines = [remark ? `Colours: ${remark.slice(1, -1)}.` : "", ...told].filter(Boolean).flatMap(wrapped)
+    const scale = PIXELS / (right - left)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
     const element = ({ name, ...given }) =>
       `<${name} ${Object.entries(given).map(([key, value]) => `${key}="${written(value)}"`).join(" ")}/>`
@@ -71,7 +73,7 @@ export class Sheet {
       ...this.drawn.map(element),
       "</svg>",
       `<g fill="${ink}">`,
-      ...colourBar(bar),
+      ...colourBar({ ...bar, high }),
       ...widthBar(scale * unit * width),
       ...scaleBar(scale, SCALE_LENGTH * unit, bodies),
       ...lines.map((line, k) => `<text x="12" y="${PIXELS + BELOW + LINE * k}">${safe(line)}</text>`),

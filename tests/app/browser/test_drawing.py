@@ -551,7 +551,8 @@ def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
     text, widest = run(
         "packing/drawing/svg_context",
         """({ Sheet, PIXELS }, { lines }) => {
-            const bar = { low: "0", high: "1", stops: ["black", "white"] }, window = [-9, 9, -9, 9]
+            const high = "≥ 1.54⟨fₙ⟩ (exact given the held forces, this packing)", window = [-9, 9, -9, 9]
+            const bar = { low: "0", high, stops: ["black", "white"] }
             const given = { background: "white", ink: "black", bar, width: 0.23, lines, unit: 1 }
             const text = new Sheet().svg(window, given)
             document.body.innerHTML = text
@@ -564,6 +565,8 @@ def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
         lines=["A line of words. " * 12, 3 * address],
     )
     assert widest <= 1
+    assert ">≥ 1.54⟨fₙ⟩</text>" in text  # short, as the line with a width begins next to it
+    assert ">Colours: exact given the held forces, this packing.</text>" in text
     (force,) = re.findall(r"width: ([\d.]+) ⟨fₙ⟩", text)
     (drawn,) = re.findall(r'width="40" height="([\d.]+)"', text)
     assert float(drawn) == pytest.approx(float(force) * 0.23 * 50)
