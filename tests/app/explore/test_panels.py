@@ -960,6 +960,18 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     assert b"bk-" in page and b"ofAnotherPage" not in page
 
 
+def test_a_page_as_a_file_opens_at_the_network_on_screen(state, monkeypatch):
+    """Even if networks are left out of it."""
+    every = state.replay
+    monkeypatch.setattr(standalone, "FRAME_BYTES", every.normal[0].nbytes * 6)
+    few = standalone.thinned(every, 2)
+    assert 3 <= len(few.number) < len(every.number) and few.number[0] == 0
+    assert every.number[2] in few.number
+    state.looks.frame = 2
+    page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
+    assert f'"frame": {few.number.tolist().index(every.number[2])}' in page
+
+
 def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     state.looks.colour = "extent"

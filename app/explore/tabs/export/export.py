@@ -85,7 +85,7 @@ class Snapshot:
         """The view as a page that needs no server."""
         outlined, shown = None, self._shown
         if self.replay.summary["dimension"] > 0:
-            thinned_replay = standalone.thinned(self.replay)
+            thinned_replay = standalone.thinned(self.replay, self.view["frame"])
             principal = planes.principal(thinned_replay)
             outlined = planes.outline(self.library, self.cell, thinned_replay, principal)(job)
             if self.replay.outlines:

@@ -77,7 +77,7 @@ def html(
     thrust, as for the player.
     """
     intervals = exact_intervals(exact if narrowed is None else narrowed.after, replay)
-    thinned_replay = thinned(replay)
+    thinned_replay = thinned(replay, view["frame"])
     plane = planes.principal(thinned_replay)
     figures = still.figures(library, thinned_replay, exact, plane, outlined, view, narrowed)
     # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
@@ -85,10 +85,9 @@ def html(
     for figure in figures:
         bare.add_root(figure)
     script, plots = components(figures)
-    frame = min(view["frame"], len(thinned_replay.normal) - 1)
-    between = view["between"]
-    if len(thinned_replay.normal) < len(replay.normal):
-        frame, between = 0, None
+    number = replay.number[min(view["frame"], len(replay.number) - 1)]
+    frame = int(np.flatnonzero(thinned_replay.number == number)[0])
+    between = view["between"] if len(thinned_replay.normal) == len(replay.normal) else None
     same = ("contact", "colour", "thickness", "full", "stretch", "scale", "paused")
     names = set(Player.param) - set(Scripted.param)
     given = {name: Player.param[name].default for name in names}
@@ -128,12 +127,14 @@ def html(
     return text.encode()
 
 
-def thinned(replay: Replay) -> Replay:
-    """A Replay of at most FRAME_BYTES."""
+def thinned(replay: Replay, frame: int) -> Replay:
+    """A Replay of at most FRAME_BYTES; frame: one that is kept, as the first is."""
     count, contacts = replay.normal.shape
     pick = evenly(count, contacts, FRAME_BYTES)
     if len(pick) == count:
         return replay
+    if 0 < frame < count:
+        pick[1 + np.abs(pick[1:] - frame).argmin()] = frame
     rows: dict[str, Any] = {
         name: np.ascontiguousarray(getattr(replay, name)[pick])
         for name in ("normal", "tangential", "number", "residual")
