@@ -206,9 +206,11 @@ class Job:
     ) -> None:
         """Progress of the stage; part: begin and end of the stage on the whole bar.
 
-        Within a stage the bar never goes back, even if the total grows.
+        Within a stage the bar never goes back, even if the total grows. Without a total, the bar
+        stays where it is and nothing is estimated.
         """
         if total is None:
+            self.seconds_left = None
             return
         begin, end = part
         reached = begin + (end - begin) * min(1.0, done / total)

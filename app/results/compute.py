@@ -22,7 +22,8 @@ from .library import SOURCES, Cell, Library, Shown
 from .replays import first_replay
 from .selection import Selection
 
-# The share of a compaction in the progress bar, and the limit it approaches.
+# The share of a compaction in the progress bar, and the part of its expected steps, those of
+# another packing, up to which their number can be relied on.
 PACKING_SHARE, NEARLY = 0.5, 0.95
 
 
@@ -197,8 +198,8 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
     steps = library.expected_steps(packing["n"], packing["mu"])
 
     def tell(step: float, _: float | None) -> None:
-        if steps:
-            job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
+        guessed = steps if steps and step < NEARLY * steps else None
+        job.tell(step, guessed, part=(0, PACKING_SHARE))
 
     job.begin("compressing")
     feed = progress_feed.shared(progress_feed.Compaction, packing)

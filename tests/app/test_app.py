@@ -1132,6 +1132,8 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
         assert job.seconds_left == pytest.approx(1200, rel=0.01)
         job.tell(25, 200)
         assert job.fraction == 0.25  # not back
+        job.tell(30, None)
+        assert job.fraction == 0.25 and job.seconds_left is None
         job.tell(25, 100)
         told.set()
         while not job.cancelled():
