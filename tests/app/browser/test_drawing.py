@@ -551,7 +551,8 @@ def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
     text, widest = run(
         "packing/drawing/svg_context",
         """({ Sheet, PIXELS }, { lines }) => {
-            const high = "≥ 1.54⟨fₙ⟩ (exact given the held forces, this packing)", window = [-9, 9, -9, 9]
+            const high = "≥ 1.54⟨fₙ⟩ (exact given the held forces, this packing)"
+            const window = [-9, 9, -9, 9]
             const bar = { low: "0", high, stops: ["black", "white"] }
             const given = { background: "white", ink: "black", bar, width: 0.23, lines, unit: 1 }
             const text = new Sheet().svg(window, given)
