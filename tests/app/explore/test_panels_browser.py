@@ -363,3 +363,26 @@ def test_packing_and_plots_are_one_figure_of_a_chosen_width(visit, tmp_path):
     sheet = page.locator("iframe[title='The figure, to be printed']")
     sheet.wait_for(state="attached")
     assert "size: 180mm" in sheet.get_attribute("srcdoc")
+
+
+AT_ITS_MIDDLE = """(tip) => {
+    tip.style.pointerEvents = "auto"
+    const { left, top, width, height } = tip.getBoundingClientRect()
+    const middle = [left + width / 2, top + height / 2]
+    let found = document.elementFromPoint(...middle)
+    while (found.shadowRoot && found.shadowRoot.elementFromPoint(...middle) !== found) {
+        found = found.shadowRoot.elementFromPoint(...middle)
+    }
+    return tip.contains(found)
+}"""
+
+
+def test_definitions_lie_above_everything(visit):
+    page = visit()
+    for term in (".results [data-term=eta2]", ".status [data-term=accepted]"):
+        page.locator(term).first.hover()
+        tip = page.get_by_role("tooltip")
+        tip.wait_for()
+        assert tip.evaluate(AT_ITS_MIDDLE), term
+        page.mouse.move(5, 5)
+        tip.wait_for(state="hidden")
