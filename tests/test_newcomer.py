@@ -877,7 +877,7 @@ def test_the_library_scans_the_cells_of_the_command(cache):
 
 @pytest.mark.parametrize("walls", ["floor", "box"])
 def test_walls_on_which_nothing_presses_are_refused_with_what_to_add(walls):
-    with pytest.raises(gf.InputError, match=r"add --gravity 1 \(gravity=1\)"):
+    with pytest.raises(gf.InputError, match=r"add gravity \(--gravity 1, or gravity=1\)"):
         gf.from_disks([[0.5, 0.5], [0.5, 1.5]], [0.5, 0.5], mu=0.5, walls=walls)
 
 

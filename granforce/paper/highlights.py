@@ -107,8 +107,8 @@ def _maximum(of: _Numbers) -> Highlight:
     else:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
-        f" The default time step of the compaction changes at μ = {SETTLED_FROM:g}; with the longer"
-        " one throughout, this maximum would be at larger μ (see the limits of the study)."
+        f" Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step; with it "
+        "throughout, this maximum would be at larger μ (see the limits of the study)."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
@@ -168,8 +168,8 @@ def _later_drag(of: _Numbers, mu: float) -> str:
     if late is None or len(late) < FEWEST:
         return ""
     return (
-        f" (and {with_error(late)} if drag replaces inertia only when grains are a hundred times "
-        "closer to balance)"
+        f" (or {with_error(late)} if the last phase of the compaction, in which drag replaces "
+        "inertia, begins a hundred times closer to balance)"
     )
 
 
@@ -260,9 +260,9 @@ def _critical(of: _Numbers) -> Highlight:
         raise KeyError(claim)
     far = middle["high"] < small["low"] and large["high"] < small["low"]
     first = (
-        "Except at small friction, pushes move a packing well below their limit loads"
+        "Except at small friction, a packing moves well before a push reaches its limit load"
         if far
-        else "At intermediate friction, pushes move a packing below their limit loads"
+        else "At intermediate friction, a packing moves before a push reaches its limit load"
     )
     return Highlight(
         f"{first}: the mean critical force is {_quoted(small)} of the mean limit load at small, "

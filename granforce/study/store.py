@@ -150,7 +150,8 @@ def _refuse_foreign(path: Path) -> None:
     others = set(visible) - entry_names - root
     if others:
         raise InputError(
-            f"{path} is not a store: it contains {min(others)!r}; give an empty or a new folder"
+            f"{path} is not a store: it contains {min(others)!r}; give the folder of a scan, or an "
+            "empty or a new folder (results written by --out are read by xarray)"
         )
 
 

@@ -245,7 +245,7 @@ def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
         server.kill()
         page.get_by_role("alert").get_by_text("Connection lost").wait_for()
         page.get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
-        assert "(possible 0.393 to 3.536)" in value(page)
+        page.locator(".bars .value").first.filter(has_text="(possible 0.393 to 3.536)").wait_for()
         searched(page, "mu=0.8")
         choose(page, "box")
     with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
