@@ -156,7 +156,7 @@ def left_out(summary: Summary) -> str:
         if (count := summary.get(key))
     ]
     line = f"Not counted: {', '.join(counts) or 'nothing'}."
-    if math.isnan(summary.get("eta1", 0.0)):
+    if math.isnan(summary.get("eta1", 0.0)):  # only if S is certified to be unbounded
         line = f"S is unbounded: some forces have no largest value, so η is undefined. {line}"
     if summary.get("rejected") or summary.get("unconverged"):
         line += (

@@ -8,7 +8,7 @@ import numpy as np
 
 from granforce.paper import documents
 from granforce.paper.claims import outcomes
-from granforce.paper.claims.verdicts import REPRODUCED, STRONGLY
+from granforce.paper.claims.verdicts import FEW, REPRODUCED, STRONGLY
 from granforce.types import Rows
 
 from ....results import study_data
@@ -87,8 +87,7 @@ def _cell(claim: dict[str, Any]) -> str:
     words = outcomes.SYMBOLS[claim["verdict"]]
     if np.isfinite(claim["value"]):
         words += f" {_number(claim['value'])}"
-    few = claim["verdict"] == "too few data"
-    known = np.isfinite([claim["low"], claim["high"]]).all() and not few
+    known = claim["verdict"] != FEW and np.isfinite([claim["low"], claim["high"]]).all()
     details = [f"({_number(claim['low'])}{UNBROKEN}{_number(claim['high'])})"] if known else []
     details += [f"at μ\u00a0=\u00a0{claim['mu']:g}"] if np.isfinite(claim["mu"]) else []
     hover = "; ".join(filter(None, (claim["verdict"], claim["why"])))
