@@ -12,7 +12,7 @@ const DEEP = 14 // levels above the pointer to search for the word
 export function render({ model }) {
   const terms = plain(model.terms), labels = plain(model.labels)
   const tip = createElement("div", { className: "hint", role: "tooltip", hidden: true })
-  let waiting = 0, at = null
+  let waiting = 0, at = null, pointer = null, under = null
 
   const words = (node, part) => node?.querySelector(part)?.textContent.trim()
 
@@ -70,21 +70,50 @@ export function render({ model }) {
 
   function hide() {
     clearTimeout(waiting)
+    waiting = 0
     tip.hidden = true
     at = null
   }
 
+  /** The element under the pointer, inside any shadow root. */
+  function pointed() {
+    let node = null, root = document
+    while (root) {
+      const inner = root.elementFromPoint(pointer.clientX, pointer.clientY)
+      if (!inner || inner === node) break
+      node = inner
+      root = node.shadowRoot
+    }
+    return node
+  }
+
+  // What was under the pointer can be replaced or scrolled away while it rests.
+  function rest() {
+    waiting = setTimeout(() => {
+      const [node, keys] = found(outwards(pointed()))
+      waiting = 0
+      if (node) show(node, keys)
+    }, WAIT_MS)
+  }
+
   // Not pointerover and focusin, which are not dispatched here for moves within one shadow root.
 
-  let under = null
   function move(event) {
     const path = event.composedPath()
+    pointer = event
     if (event.pointerType === "touch" || path[0] === under) return
     under = path[0]
-    const [node, keys] = found(path.slice(0, DEEP))
+    const [node] = found(path.slice(0, DEEP))
     if (node === at && node) return
     hide()
-    if (node) waiting = setTimeout(() => show(node, keys), WAIT_MS)
+    if (node) rest()
+  }
+
+  function scroll() {
+    const rested = waiting
+    hide()
+    under = null
+    if (rested) rest()
   }
 
   function press(event) {
@@ -103,7 +132,7 @@ export function render({ model }) {
   }
 
   // Scrolling inside a shadow root is not heard here, but what causes it is.
-  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll: hide, wheel: hide, touchmove: hide }
+  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll, wheel: scroll, touchmove: hide }
   for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, true)
   model.on("remove", () => {
     for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)
