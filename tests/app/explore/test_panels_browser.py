@@ -378,10 +378,7 @@ AT_ITS_MIDDLE = """(tip) => {
 
 
 # While the pointer rests, before the definition opens: the page scrolls, and new results arrive.
-SCROLLED_AND_REPLACED = """term => {
-    const find = (root) => root.querySelector(term) ??
-        [...root.querySelectorAll("*")].reduce((found, { shadowRoot }) => found ?? (shadowRoot && find(shadowRoot)), null)
-    const node = find(document)
+SCROLLED_AND_REPLACED = """node => {
     node.replaceWith(node.cloneNode(true))
     window.dispatchEvent(new Event("scroll"))
 }"""
@@ -393,7 +390,7 @@ def test_definitions_lie_above_everything(visit):
     page.get_by_role("tooltip", include_hidden=True).wait_for(state="attached")
     for term in (".results [data-term=eta2]", ".status [data-term=accepted]"):
         page.locator(term).first.hover()
-        page.evaluate(SCROLLED_AND_REPLACED, term)
+        page.locator(term).first.evaluate(SCROLLED_AND_REPLACED)
         tip.wait_for()
         assert tip.evaluate(AT_ITS_MIDDLE), term
         page.mouse.move(5, 5)
