@@ -159,6 +159,14 @@ def scene(page, expression):
     )
 
 
+def expect(locator):
+    """Playwright's assertions on a locator, which wait: what a server answers comes later."""
+    from playwright import sync_api  # not at the top: most tests need no browser
+
+    sync_api.expect.set_options(timeout=PATIENCE)
+    return sync_api.expect(locator)
+
+
 def until(page, expression):
     """Wait for an expression of `scene`."""
     page.wait_for_function(

@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import at_rest, how_it_is_made, scales, until
+from serving import at_rest, expect, how_it_is_made, scales, until
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -61,7 +61,7 @@ def test_nothing_serious_while_something_is_computed_and_lists_are_open(visit):
     assert findings(page) == []
     page.get_by_role("button", name="Cancel").filter(visible=True).first.click()
     until(page, "!scene.hand.player.model.requested")
-    assert page.get_by_label("Disks N").first.input_value() == "30"
+    expect(page.get_by_label("Disks N").first).to_have_value("30")
 
 
 def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):

@@ -11,6 +11,7 @@ from serving import (
     ask,
     at_rest,
     column,
+    expect,
     frames,
     how_it_is_made,
     more,
@@ -125,8 +126,8 @@ def test_hovering_tells_grain_and_contact(page):
     tip = page.locator(".tip.on")
     tip.wait_for()
     assert str(scene(page, f"scene.geometry.backbone[{contact}]")) in tip.inner_text()
-    assert "normal force fₙ, mean = 1" in tip.inner_text()
-    assert "interval of fₙ, seen" in tip.inner_text()
+    expect(tip).to_contain_text("normal force fₙ, mean = 1")
+    expect(tip).to_contain_text("interval of fₙ, seen")
     grain, x, y, r = scene(
         page,
         "(k => ['grain', 'x', 'y', 'r'].map(name => scene.geometry[name][k]))"
@@ -134,7 +135,7 @@ def test_hovering_tells_grain_and_contact(page):
     )
     page.mouse.move(*at(page, x, y))
     page.get_by_text(f"{grain} (loose)").wait_for()
-    assert f"{r:.3f}" in tip.inner_text()
+    expect(tip).to_contain_text(f"{r:.3f}")
 
 
 def test_the_forces_on_a_disk_are_shown_and_balance(page):
@@ -174,7 +175,7 @@ def test_the_forces_on_a_disk_are_shown_and_balance(page):
     page.mouse.move(*at(page, *inside))
     tip = page.locator(".tip.on").filter(has_text="pressure / mean")
     tip.wait_for()
-    assert "shear / pressure" in tip.inner_text()
+    expect(tip).to_contain_text("shear / pressure")
     assert scene(page, "scene.pointed") >= 0
 
 
@@ -201,7 +202,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     wide, full = (scales(page).get_by_label(name) for name in ("widths times", "colours full at"))
     wide.fill("-3")
     wide.press("Enter")
-    assert wide.input_value() == "5"
+    expect(wide).to_have_value("5")
     full.fill("")
     full.press("Enter")
     no_more(page, "full=")
@@ -358,12 +359,12 @@ def test_step_back_and_restart(page):
     start = normal()
     page.locator("button.step").click()
     assert normal() != start
-    assert page.locator(".state").inner_text() == "of 30"
+    expect(page.locator(".state")).to_have_text("of 30")
     page.locator("button.step").click()
     page.locator("button.back").click()
     page.keyboard.press("Home")
     assert normal() == start
-    assert page.locator(".state").inner_text() == "of 30, as packed"
+    expect(page.locator(".state")).to_have_text("of 30, as packed")
 
 
 def test_keys_play_step_and_change_tabs(page):
@@ -372,9 +373,9 @@ def test_keys_play_step_and_change_tabs(page):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowLeft")
     state = page.locator(".state")
-    assert state.inner_text() == "of 30"
+    expect(state).to_have_text("of 30")
     page.keyboard.press("Home")
-    assert state.inner_text() == "of 30, as packed"
+    expect(state).to_have_text("of 30, as packed")
     page.keyboard.press(" ")
     page.locator(".stage.playing").wait_for()
     page.keyboard.press(" ")
@@ -389,7 +390,7 @@ def test_keys_typed_into_a_field_stay_there(page):
     typed = page.locator("input.typed")
     typed.fill("")
     typed.type("0.2 ")
-    assert page.locator(".stage.playing").count() == 0
+    expect(page.locator(".stage.playing")).to_have_count(0)
     assert "tab=" not in page.url
     typed.fill("0.1")  # as it was, or it would be computed when the field is left
 
@@ -411,10 +412,10 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
     for name, value in expected.items():
         assert float(page.locator(f"b.{name}").text_content()) == pytest.approx(value, abs=6e-4)
         assert column(page, "growth", name)[-1] == pytest.approx(value, rel=1e-3)
-    assert page.locator("b.played").text_content() == f"{KEPT} of {KEPT}"
+    expect(page.locator("b.played")).to_have_text(f"{KEPT} of {KEPT}")
     original = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)[0]
     apart = np.mean(np.abs(states[-1, :, 0] - original))
-    assert page.locator("b.apart").text_content() == f"{100 * apart:.0f} %"
+    expect(page.locator("b.apart")).to_have_text(f"{100 * apart:.0f} %")
     assert re.fullmatch(r"\de-\d+", page.locator("b.residual").text_content())
 
 
@@ -440,7 +441,7 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     mixed = np.array(scene(page, "Array.from(scene.mixed.normal)"))
     normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
     np.testing.assert_allclose(mixed, (normal[3] + normal[9]) / 2, atol=1e-5)
-    assert "50 % of the way" in page.locator(".state").inner_text()
+    expect(page.locator(".state")).to_contain_text("50 % of the way")
     page.locator("button.between").click()
     no_more(page, "swing")
 
@@ -475,7 +476,7 @@ def test_states_computed_while_the_page_is_on_its_way_are_shown(opening, served)
     page.wait_for_timeout(500)  # until the page's thread knows
     page.evaluate("answer()")
     until(page, "scene.geometry.states === 5")
-    assert "5 networks" in page.locator(".source").text_content()
+    expect(page.locator(".source")).to_contain_text("5 networks")
 
 
 def test_another_stored_mu_is_shown_by_a_key(page):
@@ -530,7 +531,7 @@ def test_a_copied_link_reopens_the_view(page, visit):
     until(again, "scene.selected !== null")
     assert scene(again, "scene.selected") == contact
     assert scene(again, "scene.view.half") == pytest.approx(scene(page, "scene.view.half"), 1e-4)
-    assert again.locator("input.number").input_value() == page.locator("input.number").input_value()
+    expect(again.locator("input.number")).to_have_value(page.locator("input.number").input_value())
 
 
 def test_the_command_line_is_copied(page):

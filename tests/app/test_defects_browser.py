@@ -8,6 +8,7 @@ from serving import (
     MODEL,
     ask,
     at_rest,
+    expect,
     free_port,
     how_it_is_made,
     no_more,
@@ -194,7 +195,7 @@ def test_number_fields_take_typing_after_enter(visit):
         page.keyboard.type(str(number))
         page.keyboard.press("Enter")
         searched(page, f"states={number}")
-        assert field.input_value() == str(number)
+        expect(field).to_have_value(str(number))
     inside = field.evaluate("e => e.scrollWidth <= e.clientWidth + 1")
     assert inside  # nothing is cut
 
@@ -206,7 +207,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     field.fill("many")
     field.press("Enter")
     page.get_by_text("Disks N must be a whole number").filter(visible=True).wait_for()
-    assert field.input_value() == before
+    expect(field).to_have_value(before)
 
 
 # 5: Uploaded packings
@@ -219,7 +220,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.locator("input[type=file]").set_input_files(files)
     searched(page, "packing=")
     page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
-    assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
+    expect(how_it_is_made(page).get_by_role("spinbutton", name="Disks N")).to_have_value("400")
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
     # Neither a look at Learn nor its link back loses the packing and the view.
     page.get_by_role("tab", name="Friction").click()
@@ -255,7 +256,7 @@ def test_who_goes_by_tab_means_the_widget(visit):
     wide = page.get_by_label("widths times")
     assert wide.evaluate("e => e.getRootNode().activeElement === e")
     page.keyboard.press(" ")
-    assert page.locator(".stage.playing").count() == 0
+    expect(page.locator(".stage.playing")).to_have_count(0)
 
 
 # 7: What is not computed yet

@@ -10,7 +10,7 @@ import sys
 import urllib.request
 
 import pytest
-from serving import CLOSED, free_port, painted, serve, wait_until_served
+from serving import CLOSED, expect, free_port, painted, serve, wait_until_served
 from small_store import ROOT
 
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
@@ -117,7 +117,7 @@ def test_a_link_with_the_largest_numbers_computes_nothing(page, address, names, 
     page.goto(f"{address}?{given}{'&'.join(f'{name}={LARGEST}' for name in names)}")
     painted(page)
     page.get_by_text(told).filter(visible=True).first.wait_for()
-    assert page.get_by_role("button", name=re.compile("Cancel|Discard")).count() == 0
+    expect(page.get_by_role("button", name=re.compile("Cancel|Discard"))).to_have_count(0)
 
 
 def test_the_largest_allowed_of_everything_can_be_cancelled(page, address):

@@ -1,6 +1,6 @@
 """In a browser: forces are held, intervals shrink, stresses."""
 
-from serving import MODEL, column, painted, picture, scene
+from serving import MODEL, column, expect, painted, picture, scene
 
 
 def select(page, contact):
@@ -36,7 +36,8 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page.get_by_text("All contacts as a table").click()
     page.locator("tr[data-contact]").nth(3).wait_for()
     groups, headings = page.locator(".frame thead tr").all()
-    assert "exact" in groups.inner_text() and "seen" in groups.inner_text()
+    expect(groups).to_contain_text("exact")
+    expect(groups).to_contain_text("seen")
     cut = "e => [...e.querySelectorAll('button')].some((b) => b.scrollWidth > b.clientWidth)"
     assert headings.inner_text().split().count("ΔFₙ") == 2 and not headings.evaluate(cut)
     cells = page.locator("tr[data-contact='4'] td").all_inner_texts()
@@ -63,7 +64,7 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
 def test_contacts_worth_measuring_are_numbered(visit):
     page = visit()
     asking = page.get_by_role("button", name="Which force to measure next?")
-    assert not asking.is_visible()  # before a contact is chosen there is nothing to say
+    expect(asking).to_be_hidden()  # before a contact is chosen there is nothing to say
     select(page, 9)
     asking.click()
     page.locator(".ranked li").first.wait_for()
@@ -77,7 +78,7 @@ def test_contacts_worth_measuring_are_numbered(visit):
 def test_a_contradiction_in_a_link_is_one_line(visit):
     page = visit("?known=4:0.5~9:80")
     page.get_by_role("alert").filter(has_text="satisfies all known forces").wait_for()
-    assert page.locator(".chip").count() == 0
+    expect(page.locator(".chip")).to_have_count(0)
 
 
 def test_the_plane_of_stresses(visit):

@@ -8,6 +8,7 @@ from serving import (
     at_rest,
     bars_drawn,
     column,
+    expect,
     here,
     laid_out,
     more,
@@ -66,7 +67,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     )
     during = normal(page)
     assert np.abs(during - before).max() > 1e-3 and during.min() > -1e-6
-    assert "point in force space pulled" in page.locator(".message").inner_text()
+    expect(page.locator(".message")).to_contain_text("point in force space pulled")
     # beyond the outline it stays on it
     page.mouse.move(u + 5000, v)
     until(page, "scene.hand.spot.at[0] < 1e3")
@@ -175,7 +176,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
     assert boxes[0]["width"] == pytest.approx(boxes[1]["width"], abs=1)
     assert boxes[0]["y"] == boxes[1]["y"] and boxes[0]["x"] < boxes[1]["x"]
-    assert "network" in page.locator(".twin .caption").inner_text()
+    expect(page.locator(".twin .caption")).to_contain_text("network")
     widths = "Array.from(scene.hand.player.split.twin.style.width)"
     pinned, contacts = scene(page, widths), scene(page, "scene.geometry.contacts")
     normals = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(-1, contacts)
@@ -194,7 +195,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
     more(page).locator("button.split").click()
     until(page, "!scene.hand.player.split.on")
-    assert page.locator(".twin").is_hidden()
+    expect(page.locator(".twin")).to_be_hidden()
 
 
 def widths(page, of):
@@ -269,7 +270,7 @@ def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
     shows(page, 10)
     seen = page.evaluate("beside")
     assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
-    assert page.locator(".twin").is_visible()
+    expect(page.locator(".twin")).to_be_visible()
 
 
 def test_exact_bounds_are_drawn_as_they_come(visit):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from serving import PATIENCE, column, painted, picture, scene, searched
+from serving import PATIENCE, column, expect, painted, picture, scene, searched
 from small_store import DISKS, KEPT, ROOT, STATES
 
 # What was taken along, to be looked at; ignored by git.
@@ -41,7 +41,7 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     alone.goto(path.as_uri())
     painted(alone)
     assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
-    assert alone.locator(".state").inner_text() == "of 30"  # the state that was on screen
+    expect(alone.locator(".state")).to_have_text("of 30")  # the state that was on screen
     alone.keyboard.press("Home")
     before = column(alone, "bars", "now"), column(alone, "here", "x")
     alone.locator("button.step").click()
@@ -60,7 +60,7 @@ def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
     path = taken(page, "Movie (WebM)", tmp_path)
     content = path.read_bytes()
     assert path.suffix == ".webm" and content[:4] == b"\x1a\x45\xdf\xa3" and len(content) > 5000
-    assert page.get_by_role("button", name="Movie (WebM)", exact=True).is_visible()
+    expect(page.get_by_role("button", name="Movie (WebM)", exact=True)).to_be_visible()
     # The player is where it was; the movie has its caption, and says how long it is.
     searched(page, "network=6")
     assert scene(page, "scene.hand.player.replay.position") == 3

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from serving import chain, scene, serve, until
+from serving import chain, expect, scene, serve, until
 
 WORDS = 70  # at most, before the hand acts
 # Name of each chapter: its heading; keys that carry the dot to the answer; the answer.
@@ -74,19 +74,19 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         question.wait_for()
         assert len(page.locator("article > p").first.inner_text().split()) <= WORDS, name
         found = page.get_by_text(re.compile(r"^It is "))
-        assert found.count() == 0  # nothing is told before
-        assert page.get_by_role("button", name="That is my prediction").is_disabled()
+        expect(found).to_have_count(0)  # nothing is told before
+        expect(page.get_by_role("button", name="That is my prediction")).to_be_disabled()
         predict(page)
         page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
         more = page.get_by_role("link", name="More with these disks")
-        assert more.filter(visible=True).count() == 0
+        expect(more.filter(visible=True)).to_have_count(0)
         dot(page).focus()
         for key in keys:
             page.keyboard.press(key)
             if (name, key) == ("friction", "ArrowRight"):
-                assert found.count() == 0  # both sides must be looked at
+                expect(found).to_have_count(0)  # both sides must be looked at
         found.wait_for()
-        assert more.filter(visible=True).count() == (name in COUNTS)
+        expect(more.filter(visible=True)).to_have_count(int(name in COUNTS))
         told = page.locator(".voice").inner_text()
         assert answer is None or f"It is {answer}." in told, name
         assert "You predicted" in told and COUNTS.get(name, "") in told
@@ -96,17 +96,17 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         assert ("− 2" in told and "+ 1" in told) == (name in ("thirteen", "four-hundred")), name
         if name != "push":
             page.get_by_role("button", name="Next").click()
-    assert page.get_by_title("done").count() == 7
+    expect(page.get_by_title("done")).to_have_count(7)
     # A finished chapter is shown with its answer again, until it is begun anew.
     for name, (_, _, answer) in CHAPTERS.items():
         page.goto(f"{lesson}?learn={name}")
         found.wait_for()
         told = page.locator(".voice").inner_text()
         assert f"It is {answer or answers[name]}." in told and "You predicted" in told, name
-        assert page.get_by_title("done").count() == 7
+        expect(page.get_by_title("done")).to_have_count(7)
     page.get_by_role("button", name="Predict again").click()
     page.get_by_role("button", name="That is my prediction").wait_for()
-    assert page.get_by_title("done").count() == 6
+    expect(page.get_by_title("done")).to_have_count(6)
     page.get_by_role("navigation").get_by_role("link", name="Build your own").click()
     page.get_by_role("radio", name="Gravity").wait_for()
 
@@ -118,7 +118,7 @@ def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_d
     page.locator("article strong").wait_for()
     assert in_view(page.get_by_role("button", name="That is my prediction"))
     predict(page, 30)
-    assert page.locator("path.exact").get_attribute("d") == ""
+    expect(page.locator("path.exact")).to_have_attribute("d", "")
     circle = dot(page).locator("circle")
     circle.scroll_into_view_if_needed()
     box = circle.bounding_box()
@@ -128,7 +128,7 @@ def test_a_chapter_is_dragged_with_the_mouse_and_only_what_was_touched_of_s_is_d
     assert in_view(page.get_by_text("Drag the dot"))
     page.mouse.move(x + 30, y, steps=4)
     assert page.locator("path.visited").get_attribute("d") != ""
-    assert page.locator("path.exact").get_attribute("d") == ""
+    expect(page.locator("path.exact")).to_have_attribute("d", "")
     page.mouse.move(x + 300, y, steps=4)
     page.mouse.up()
     verdict = page.get_by_text("It is 1.41.")
@@ -153,8 +153,8 @@ def test_back_goes_through_chapters_and_a_frame_shows_one_alone(opening, lesson)
     alone = opening("?learn=box&embed=1", 700, 700, at=lesson)
     alone.get_by_role("heading", name="How much can the floor carry?").wait_for()
     alone.locator("article strong").wait_for()
-    assert not alone.get_by_role("button", name="Next").is_visible()
-    assert alone.get_by_role("navigation").filter(visible=True).count() == 0
+    expect(alone.get_by_role("button", name="Next")).to_be_hidden()
+    expect(alone.get_by_role("navigation").filter(visible=True)).to_have_count(0)
 
 
 def test_the_way_back_from_more_disks_leads_to_the_same_chapter(opening, lesson):
@@ -198,12 +198,12 @@ def test_behind_one_point_of_the_shadow_lie_other_forces(opening, lesson):
     change = page.get_by_role("button", name="Change the other forces")
     predict(page)
     page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
-    assert not change.is_visible()
+    expect(change).to_be_hidden()
     press(page, RIGHT)
     change.click()
     page.get_by_text("only one set of forces").wait_for()  # the last point before the edge
     press(page, ["ArrowLeft"] * 15)
-    assert page.get_by_text("only one set of forces").count() == 0
+    expect(page.get_by_text("only one set of forces")).to_have_count(0)
     at = dot(page).get_attribute("aria-valuenow")
     drawn = "(canvas) => canvas.toDataURL()"
     before = page.locator(".picture canvas").evaluate(drawn)
@@ -221,7 +221,7 @@ def test_the_same_disks_are_pushed_from_other_forces_and_every_limit_stays(openi
     page.locator("article strong").wait_for()
     predict(page)
     other = page.get_by_role("button", name="Take other forces in S")
-    assert not other.is_visible()
+    expect(other).to_be_hidden()
     press(page, RIGHT)
     page.get_by_text("disks start to move").wait_for()
     allowed = page.locator("figure").get_by_text("S allows")

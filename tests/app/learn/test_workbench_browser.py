@@ -1,7 +1,7 @@
 """The workbench of small scenes, as a visitor sees it and has it in hand."""
 
 import pytest
-from serving import free_port, painted, searched, serve
+from serving import expect, free_port, painted, searched, serve
 
 import granforce as gf
 
@@ -48,7 +48,7 @@ def test_every_scene_fits_on_a_telephone_and_is_gone_back_to(look):
     page.go_back()
     page.go_back()
     free(page, 1)
-    assert page.get_by_role("textbox", name="μ").input_value() == "0.7"
+    expect(page.get_by_role("textbox", name="μ")).to_have_value("0.7")
 
 
 def test_friction_is_changed_under_the_eye(look):
@@ -191,7 +191,7 @@ def test_a_ladder_is_leant_by_keys_and_its_link_and_file_carry_it(look, tmp_path
         page.get_by_role("textbox", name=name).press("Enter")
     page.get_by_role("img", name="Disks").press("e")
     page.get_by_role("img", name="Disks").press("e")
-    assert page.get_by_role("textbox", name="degrees").input_value() == "-60"
+    expect(page.get_by_role("textbox", name="degrees")).to_have_value("-60")
     page.get_by_role("textbox", name="height").fill("thin")
     page.get_by_role("textbox", name="height").press("Enter")
     page.get_by_text("Type a number.").wait_for()

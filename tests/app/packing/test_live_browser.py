@@ -10,6 +10,7 @@ from serving import (
     bars_drawn,
     chain,
     column,
+    expect,
     how_it_is_made,
     laid_out,
     no_more,
@@ -134,8 +135,8 @@ def test_computed_states_are_shown_to_the_last(visit):
     page.wait_for_function(
         f"() => {MODEL}('growth').get_column('eta1').every((v, k) => !k || Number.isFinite(v))"
     )
-    assert page.locator(".stage.pale").count() == 0
-    assert not page.locator(".requested").inner_text()
+    expect(page.locator(".stage.pale")).to_have_count(0)
+    expect(page.locator(".requested")).to_be_empty()
 
 
 def test_discarded_the_old_packing_is_back_with_its_friction(visit):
@@ -146,8 +147,8 @@ def test_discarded_the_old_packing_is_back_with_its_friction(visit):
     page.get_by_role("button", name="Discard").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
     no_more(page, "0.47")
-    assert page.locator(".stage.pale").count() == 0
-    assert page.locator("input.typed").first.input_value() == "0.1"
+    expect(page.locator(".stage.pale")).to_have_count(0)
+    expect(page.locator("input.typed").first).to_have_value("0.1")
 
 
 def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
@@ -157,8 +158,8 @@ def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
     states = scene(page, "scene.geometry.states")
     searched(page, f"states={states}")
-    assert f"{states} networks" in page.locator(".source").text_content()
-    assert page.locator(".stage.pale").count() == 0
+    expect(page.locator(".source")).to_contain_text(f"{states} networks")
+    expect(page.locator(".stage.pale")).to_have_count(0)
 
 
 # A message is of three frames: the one that says that the page has come is half a second late.
@@ -219,7 +220,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(page):
     during = normal(page)
     assert before[contact] < during[contact] <= rail["upper"] + 1e-6
     assert np.abs(during - before).max() > 0 and np.all(during > -1e-6)
-    assert "pulled to" in page.locator(".message").inner_text()
+    expect(page.locator(".message")).to_contain_text("pulled to")
     picture(page, "live/dragging")
     page.mouse.up()
     searched(page, "pull=")
