@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -155,14 +156,14 @@ def run(
 ) -> list[tuple[StudyCell, str]]:
     """Compute cells into the store at path, on one processor each; stored ones are skipped.
 
-    workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
-    the same folder, to use instead of processes. dtypes: as for Store.save, for the states.
-    Cells are started in order; a cell whose packing is among them waits for it, and is skipped
-    silently if that fails. progress(done, total) counts quarters of the cells that are not stored
-    yet, and never decreases; on_done(position in cells, whether it was stored) is called after
-    each. Once enough() is true no further cell is started; running ones are finished (not called
-    with a scheduler, which gets all cells at once). An interruption loses only running cells, and
-    workers end with this process; the KeyboardInterrupt says how many cells are saved.
+    workers: processes on this machine; 1: this process. scheduler: address of a dask scheduler
+    whose workers see the same folder, to use instead of processes. dtypes: as for Store.save, for
+    the states. Cells are started in order; a cell whose packing is among them waits for it, and is
+    skipped silently if that fails. progress(done, total) counts quarters of the cells that are not
+    stored yet, and never decreases; on_done(position in cells, whether it was stored) is called
+    after each. Once enough() is true no further cell is started; running ones are finished (not
+    called with a scheduler, which gets all cells at once). An interruption loses only running
+    cells, and workers end with this process; the KeyboardInterrupt says how many cells are saved.
 
     Returns a list of (cell, error message). Raises InputError if the scheduler cannot be reached.
     """
@@ -196,7 +197,8 @@ def run(
         if scheduler is None:
             store.make()
             waits = Waits(needs, failed)
-            _over_processes(tasks, waits, workers, finished, tell, enough or (lambda: False))
+            over = _one_after_another if worker_count(workers) == 1 else _over_processes
+            over(tasks, waits, workers, finished, tell, enough or (lambda: False))
         else:
             with _client_of(scheduler) as client:
                 store.make()  # only once a scheduler has answered
@@ -252,6 +254,29 @@ def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
             progress(reached, total)
 
     return tell
+
+
+def _one_after_another(
+    tasks: Tasks,
+    waits: Waits,
+    workers: int,
+    finished: Callable[[int, Callable[[], bool]], object],
+    advanced: Callable[[float], object],
+    enough: Callable[[], bool],
+) -> None:
+    """Run tasks in this process, which needs no script that workers could import."""
+    left = dict(tasks)
+    while left and not enough():
+        k = waits.ready(list(left), left)
+        assert k is not None  # a packing waits for nothing
+        if not waits.lost(k):
+            tell = _from(len(tasks) - len(left), advanced)
+            finished(k, partial(run_cell, *tasks[k], advanced=tell))
+        del left[k]
+
+
+def _from(before: int, advanced: Callable[[float], object]) -> Callable[[float], object]:
+    return lambda part: advanced(before + part)
 
 
 def _over_processes(
@@ -325,8 +350,8 @@ def _one_pool(
             advanced(before + max(0.0, counter.value))
         if broken and counter.value == _NONE_BEGAN:
             raise InputError(
-                "worker processes ended before they began: call this in a script that is a file "
-                '(not read from stdin), under if __name__ == "__main__":'
+                "worker processes ended before they began: use workers=1, or call this in a script "
+                'that is a file (not read from stdin), under if __name__ == "__main__":'
             )
     except BaseException:
         # Workers would continue the current cell, whose result is lost anyway.
@@ -376,19 +401,38 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def run_cell(path: str | Path, cell: StudyCell, dtypes: Mapping[str, str] | None = None) -> bool:
-    """Compute one cell into the store at path, in a worker; return whether it was stored."""
-    if not Path(path, "zarr.json").exists():
-        raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
+def _counting() -> Callable[[float], object]:
+    """A function of the part of a cell that is done, which adds to the workers' counter."""
     reported = 0.0
 
-    def count(done: float, total: float | None) -> None:  # None: for a compaction
+    def count(part: float) -> None:
         nonlocal reported
-        if _counter is not None and total:
-            part = min(done / total, 1.0)
+        if _counter is not None:
             with _counter.get_lock():
                 _counter.value += part - reported
             reported = part
+
+    return count
+
+
+def run_cell(
+    path: str | Path,
+    cell: StudyCell,
+    dtypes: Mapping[str, str] | None = None,
+    advanced: Callable[[float], object] | None = None,
+) -> bool:
+    """Compute one cell into the store at path; return whether it was stored.
+
+    advanced(part): called with the part of it that is done; None: in a worker, which counts for
+    its parent.
+    """
+    if not Path(path, "zarr.json").exists():
+        raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
+    tell = _counting() if advanced is None else advanced
+
+    def count(done: float, total: float | None) -> None:  # None: for a compaction
+        if total:
+            tell(min(done / total, 1.0))
 
     store = open_store(path)
     _, cached = get(store, *cell, workers=1, dtypes=dtypes, progress=count)

@@ -38,6 +38,14 @@ def test_a_scan_gives_the_same_for_any_number_of_workers(tmp_path):
     assert [line["cached"] for line in found] == [True] * 4
 
 
+def test_one_worker_needs_no_script_that_is_a_file(tmp_path):
+    code = f"import granforce as gf; gf.scan({str(tmp_path / 's')!r}, 0.3, 1, 12, 3, workers=1)"
+    command = [sys.executable, "-"]
+    ran = subprocess.run(command, input=code, capture_output=True, text=True, check=True)
+    assert "Traceback" not in ran.stderr
+    assert len(open_store(tmp_path / "s")) == 2
+
+
 def test_a_failed_cell_leaves_the_others(tmp_path):
     # Three disks do not always jam: whatever happens to them, the other cell is there.
     hopeless = cell()
@@ -47,7 +55,8 @@ def test_a_failed_cell_leaves_the_others(tmp_path):
     assert "radii" in failed[0][1]
 
 
-def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path, workers):
     good, hopeless = cell(0.3), cell(0.3, 2)
     hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
     walks = [StudyCell(kinds.WALK, walk) for walk in (hopeless, good)]
@@ -55,7 +64,7 @@ def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path):
     done = []
     # Walks come first: each waits for its packing all the same, which is made once.
     cells, told = [*walks, *made], lambda k, cached: done.append((k, cached))
-    (failed,) = scan.run(tmp_path / "s", cells, workers=2, on_done=told)
+    (failed,) = scan.run(tmp_path / "s", cells, workers=workers, on_done=told)
     assert failed[0] == made[0]
     assert done == [(3, False), (1, False)]
 
