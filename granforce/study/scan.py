@@ -332,7 +332,7 @@ def _one_pool(
                 if waits.lost(k):
                     del left[k]
                     continue
-                with _single_threaded():
+                with _single_threaded(), _interrupts_blocked():
                     try:
                         waiting[pool.submit(run_cell, *tasks[k])] = k
                     except BrokenProcessPool:
@@ -376,6 +376,22 @@ def _single_threaded() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Within, started processes do not receive Ctrl-C, which goes to the whole process group.
+
+    Otherwise those that still import modules would print tracebacks.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _counter = None

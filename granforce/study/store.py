@@ -180,7 +180,8 @@ class Store(Mapping[str, xr.Dataset]):
         self._incomplete = False
 
     def __repr__(self) -> str:
-        return f"Store({str(self.path)!r}, readonly={self.readonly})"
+        missing = "" if self.path.exists() else ", not there yet"
+        return f"Store({str(self.path)!r}, readonly={self.readonly}{missing})"
 
     def __iter__(self) -> Iterator[str]:
         return (name for name in self._names() if self._attrs(name) is not None)

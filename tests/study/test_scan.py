@@ -46,6 +46,22 @@ def test_one_worker_needs_no_script_that_is_a_file(tmp_path):
     assert len(open_store(tmp_path / "s")) == 2
 
 
+# Run first by every Python: in a worker it is a Ctrl-C, before the worker's imports.
+INTERRUPTING = """import os, signal, sys
+if any("spawn_main" in word for word in sys.orig_argv):
+    os.kill(os.getpid(), signal.SIGINT)
+"""
+
+
+def test_an_interrupt_does_not_reach_workers_that_still_import(tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text(INTERRUPTING)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    words = ["scan", "--mu", "0.3", "--seeds", "2", "-n", "12", "--states", "3", "--workers", "2"]
+    command = [sys.executable, "-m", "granforce", *words, "--out", str(tmp_path / "s.zarr")]
+    ran = subprocess.run(command, capture_output=True, text=True)
+    assert (ran.returncode, "Traceback" in ran.stderr) == (0, False), ran.stderr
+
+
 def test_a_failed_cell_leaves_the_others(tmp_path):
     # Three disks do not always jam: whatever happens to them, the other cell is there.
     hopeless = cell()
