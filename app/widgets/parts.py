@@ -129,7 +129,10 @@ CLAIMS = """
 .claims td:first-child { min-width: 150px; }
 .claims td + td { vertical-align: top; }
 .claims td small { display: block; opacity: 0.85; }
-.judged { container-type: inline-size; overflow-x: auto; }
+.judged { container-type: inline-size; }
+.judged th { /* stays in view, below the titles of the tabs */
+  position: sticky; top: 36px; z-index: 1; background: var(--paper);
+}
 .judged td:first-child { width: 42%; }
 /* Instead of columns that do not fit: the claim, and below it what each sampler gives. */
 @container (max-width: 620px) {

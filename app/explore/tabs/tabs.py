@@ -38,6 +38,7 @@ LOOK = {
         "color": "var(--quiet)", **PLAIN,
     },
     "& .MuiTab-root.Mui-selected": {"color": "var(--ink)", "fontWeight": 600},
+    "& > .MuiBox-root": {"overflow": "visible"},  # otherwise heads of tables scroll with them
     "& .MuiTabs-list, & .MuiTabs-flexContainer": {"borderBottom": "1px solid var(--line)"},
     # On a wide screen force space needs no tab: see explore_page.py.
     "@media (min-width: 1800px)": {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}},

@@ -26,7 +26,8 @@ const GROUPS = [
   [(look) => `interval of fₙ, ${look.seen}`, interval("walk")],
 ]
 const COLUMNS = GROUPS.flatMap(([, columns]) => columns)
-const FORCE = 2 // the column by which the table is sorted at first
+// The column by which the table is sorted, at first fₙ. Tabs draw their views anew each time, and a page has one table.
+const sorted = { by: 2, down: true }
 
 export function render({ model, view }) {
   const root = document.createElement("details"), page = view.model.document
@@ -40,7 +41,6 @@ export function render({ model, view }) {
     <p class="status" role="status"></p>
     <div class="frame"><table><thead></thead><tbody></tbody></table></div>`
   const part = (name) => root.querySelector(name), body = part("tbody")
-  const sorted = { by: FORCE, down: true }
   const player = () => page.get_model_by_name("player")?.player
   let from = 0, pending = 0, shown = [], headed = ""
 
