@@ -6,8 +6,9 @@ against μ), "walks" (the paper's walk against μ), "others" and "further" (othe
 "headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (the
 verdict on each claim), "details" (the numbers behind them), "findings" (numbers beyond the claims),
 "sweeps" (the residual of the paper's walk, and its excess over S), "preparation" (how results
-depend on the packing), "counts" (number of packings of each kind of result), "certificates"
-(largest gap of the exact bounds, convergence of uniform samples).
+depend on the packing), "figures" (some of the paper's figures, with captions), "counts" (number of
+packings of each kind of result), "certificates" (largest gap of the exact bounds, convergence of
+uniform samples).
 """
 
 import re
@@ -41,6 +42,7 @@ from granforce.paper.claims.outcomes import (
     score,
 )
 from granforce.paper.claims.verdicts import FEW
+from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
@@ -54,8 +56,15 @@ _OUTSIDE = "outside S"
 _FEWER = re.compile(r" \((\d+)\)(?=$|,)")  # number of packings, if it is not the expected one
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
+SHOWN = ("figure2", "figure4", "figure5", "figure6")  # with captions on that page
 TABLE = "#dependence-on-friction"  # of z, h and η on the results page
 HEADLINES = 4  # highlights in the README
+NAMED = (  # claims that the README names if they are contradicted
+    "η ∝ μ at small μ: packings made by contact dynamics",
+    "η3 does not depend on how networks are sampled",
+    "corr(f_n, ΔF_n) vanishes at large μ",
+    "F_crit rises with η",
+)
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
 _HEADS = {
@@ -121,6 +130,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "findings": lambda: finding_table(findings),
+        "figures": lambda: shown(table),
         "counts": lambda: counts(table),
         "certificates": lambda: certificates(table),
     }
@@ -131,6 +141,16 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         return typeset(known[name]())
 
     filled.renew(paths, KIND, text_of)
+
+
+def shown(table: StudyTable) -> str:
+    """The paper's figures that the results page shows, each with its caption."""
+    walk = _HEADS[paper_sampler(table)]
+    words = {name: CAPTIONS[name].format(walk=walk) for name in SHOWN}
+    return "\n".join(
+        f"![Figure {name[-1]}]({FIGURES}/{name}.png)\n\n*Figure {name[-1]}.* {caption}\n"
+        for name, caption in words.items()
+    )
 
 
 def measures(table: StudyTable) -> str:
@@ -451,9 +471,13 @@ def _apart(rows: Rows, others: Rows, name: str) -> _Apart | None:
 
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
-    """The first highlights as a list."""
-    chosen = highlights(table, claims, findings)[:HEADLINES]
-    return "".join(f"- {_led(one.sentence)}\n" for one in chosen)
+    """The first highlights as a list, and those claims of NAMED that are contradicted."""
+    chosen = [one.sentence for one in highlights(table, claims, findings)[:HEADLINES]]
+    verdicts = {claim["statement"]: claim["verdict"] for claim in decided(claims)}
+    named = [name for name in NAMED if verdicts.get(name) in OUTCOMES["contradicted"]]
+    if named:
+        chosen.append(f"Contradicted claims include: {'; '.join(named).replace(': ', ', ')}.")
+    return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
 
 
 def _led(sentence: str) -> str:

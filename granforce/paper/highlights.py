@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.measures import statistics
-from granforce.packing.compaction import SETTLED_FROM
+from granforce.packing.compaction import LONGEST, LONGEST_SETTLED, SETTLED_FROM
 from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
-from granforce.paper.claims.verdicts import DIFFERS, FEW, REPRODUCED, STRONGLY
+from granforce.paper.claims.verdicts import CONTRADICTED, FEW, REPRODUCED, STRONGLY
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
@@ -107,8 +107,9 @@ def _maximum(of: _Numbers) -> Highlight:
     else:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
-        f" Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step; with it "
-        "throughout, this maximum would be at larger μ (see the limits of the study)."
+        f" Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
+        f"than others ({LONGEST_SETTLED:g}); with {LONGEST:g} throughout, this maximum would be at "
+        "larger μ (see the limits of the study)."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
@@ -129,8 +130,8 @@ def _rising_eta2(of: _Numbers) -> Highlight:
         word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
         for word, chosen in (
             ("does", lambda verdict: verdict == REPRODUCED),
-            ("does not", lambda verdict: verdict in (DIFFERS, STRONGLY)),
-            ("undecided", lambda verdict: verdict not in (REPRODUCED, DIFFERS, STRONGLY)),
+            ("does not", lambda verdict: verdict in (CONTRADICTED, STRONGLY)),
+            ("undecided", lambda verdict: verdict not in (REPRODUCED, CONTRADICTED, STRONGLY)),
         )
         if any(map(chosen, verdicts.values()))
     }
@@ -168,8 +169,8 @@ def _later_drag(of: _Numbers, mu: float) -> str:
     if late is None or len(late) < FEWEST:
         return ""
     return (
-        f" (or {with_error(late)} if the last phase of the compaction, in which drag replaces "
-        "inertia, begins a hundred times closer to balance)"
+        f"; the latter is {with_error(late)} if the last phase of the compaction, in which drag "
+        "replaces inertia, begins a hundred times closer to balance"
     )
 
 
@@ -234,7 +235,9 @@ def _sentence(words: str) -> str:
 def _alike(of: _Numbers) -> Highlight:
     constant = {name: of.row(f"{name}/η3 is nearly constant", "nearest") for name in ("η1", "η2")}
     does = [name for name, row in constant.items() if row["verdict"] == REPRODUCED]
-    does_not = [name for name, row in constant.items() if row["verdict"] in (DIFFERS, STRONGLY)]
+    does_not = [
+        name for name, row in constant.items() if row["verdict"] in (CONTRADICTED, STRONGLY)
+    ]
     if len(does) == 2:
         first = "η1 and η2 are nearly proportional to η3"
     elif does and does_not:
@@ -260,9 +263,9 @@ def _critical(of: _Numbers) -> Highlight:
         raise KeyError(claim)
     far = middle["high"] < small["low"] and large["high"] < small["low"]
     first = (
-        "Except at small friction, a packing moves well before a push reaches its limit load"
+        "Except at small friction, a packing moves well before the push reaches its limit load"
         if far
-        else "At intermediate friction, a packing moves before a push reaches its limit load"
+        else "At intermediate friction, a packing moves before the push reaches its limit load"
     )
     return Highlight(
         f"{first}: the mean critical force is {_quoted(small)} of the mean limit load at small, "

@@ -203,7 +203,7 @@ def weak_first(mu, rng):
 )
 def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options):
     found = judged(synthetic(rise_and_fall, **options), [family])
-    assert found[statement] in (verdicts.DIFFERS, verdicts.STRONGLY)
+    assert found[statement] in (verdicts.CONTRADICTED, verdicts.STRONGLY)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options
             claims.relative,
             "ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ",
             {"extent": lambda mu, r: (0.1 + mu) * r.weibull(2.5, CONTACTS)},
-            verdicts.DIFFERS,
+            verdicts.CONTRADICTED,
         ),
         (
             claims.relative,
@@ -253,7 +253,7 @@ def test_what_a_figure_is_said_to_show_can_fail(family, statement, options, verd
 
 def test_a_power_law_and_an_exponential_are_told_apart(rng):
     r = 0.25 + 0.5 * np.arange(3, 17)
-    for law, verdict in ((r**-0.7, verdicts.REPRODUCED), (np.exp(-r / 4), verdicts.DIFFERS)):
+    for law, verdict in ((r**-0.7, verdicts.REPRODUCED), (np.exp(-r / 4), verdicts.CONTRADICTED)):
         table = synthetic(rise_and_fall)
         decays = {}
         for k, row in enumerate(table.rows):
@@ -378,8 +378,8 @@ def test_what_rises_to_the_end_is_monotonic(rng):
         return verdicts.turns("", packings(noise))
 
     assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 1}).verdict == verdicts.REPRODUCED
-    assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 3}).verdict == verdicts.DIFFERS
-    assert turning({0.01: 3, 0.1: 2, 1: 1, 10: 0.5}).verdict == verdicts.DIFFERS
+    assert turning({0.01: 0, 0.1: 1, 1: 2, 10: 3}).verdict == verdicts.CONTRADICTED
+    assert turning({0.01: 3, 0.1: 2, 1: 1, 10: 0.5}).verdict == verdicts.CONTRADICTED
     # It rises for certain, and whether it falls again nobody knows.
     plateau = turning({0.01: 0.1, 0.1: 1, 1: 2, 10: 2})
     assert plateau.verdict == verdicts.UNDECIDED
@@ -393,7 +393,7 @@ def test_what_rises_to_the_end_is_monotonic(rng):
 
 
 def test_coordination_has_to_come_near_its_limit():
-    for height, verdict in ((3.005, verdicts.REPRODUCED), (3.02, verdicts.DIFFERS)):
+    for height, verdict in ((3.005, verdicts.REPRODUCED), (3.02, verdicts.CONTRADICTED)):
         table = synthetic(rise_and_fall, coordination=lambda mu, height=height: height)
         for row in table.part(SWEEPS):
             row["coordination"] = height + 1e-4 * row["seed"]
@@ -412,9 +412,9 @@ def test_a_verdict_at_a_knife_edge_is_undecided(rng):
     """A slope of 0.5 ± 0.02: clear of an end of the range, across it, and turned by one μ."""
     clear = packings({mu: mu**0.5 * np.exp(0.1 * rng.normal(size=10)) for mu in (0.1, 1, 10, 100)})
     assert over_all(clear, (0.3, 0.7)).verdict == verdicts.REPRODUCED
-    assert over_all(clear, (0.7, 0.9)).verdict == verdicts.DIFFERS  # there is no wider range
+    assert over_all(clear, (0.7, 0.9)).verdict == verdicts.CONTRADICTED  # there is no wider range
     assert over_all(clear, (0.7, 0.9), (0.6, 1)).verdict == verdicts.STRONGLY
-    assert over_all(clear, (0.7, 0.9), (0.2, 0.9)).verdict == verdicts.DIFFERS
+    assert over_all(clear, (0.7, 0.9), (0.2, 0.9)).verdict == verdicts.CONTRADICTED
     edge = over_all(clear, (0.3, 0.5))
     assert edge.verdict == verdicts.UNDECIDED
     assert edge.low < 0.5 < edge.high
@@ -424,9 +424,9 @@ def test_a_verdict_at_a_knife_edge_is_undecided(rng):
     assert found.why.startswith("reproduced, but ") and "without μ = 1" in found.why
     # Certainly outside, but not always beyond the wider range.
     found = over_all(turned, (1.2, 2), (0.8, 2))
-    assert over_all(turned, (1.2, 2), (0.2, 2)).verdict == verdicts.DIFFERS
-    assert found.verdict == verdicts.DIFFERS
-    assert "differs without μ = 100" in found.why
+    assert over_all(turned, (1.2, 2), (0.2, 2)).verdict == verdicts.CONTRADICTED
+    assert found.verdict == verdicts.CONTRADICTED
+    assert "contradicted without μ = 100" in found.why
 
 
 def test_another_seed_of_the_bootstrap_never_turns_a_verdict(rng):
@@ -446,8 +446,8 @@ def test_a_change_of_sign_at_one_friction_is_not_averaged_away(rng):
     assert claim.verdict == verdicts.REPRODUCED
     values[1] = 1.2 + 0.02 * rng.normal(size=10)
     claim = verdicts.at_each("", "distance", packings(values), good=(0, 1), fair=(0, 1.1))
-    assert claim.verdict == verdicts.DIFFERS
-    assert claim.why == "differs strongly at 1; reproduced at 0.1, 10"
+    assert claim.verdict == verdicts.CONTRADICTED
+    assert claim.why == "reproduced at 0.1, 10; strongly contradicted at 1"
     assert claim.value == pytest.approx(1.2, abs=0.05)
     assert claim.measured == "distance, at the deciding μ (1)"
     values = {mu: group + 1 for mu, group in values.items()}
@@ -472,7 +472,7 @@ def test_the_number_shown_is_from_a_friction_that_decides(rng):
     values[0.1] += 0.6
     values[10] = 3 * rng.random(3)  # farther away, but uncertain
     claim = verdicts.at_each("", "", packings(values), good=(0, 1))
-    assert claim.verdict == verdicts.DIFFERS
+    assert claim.verdict == verdicts.CONTRADICTED
     assert (claim.mu, claim.packings) == (0.1, 10)
 
 
@@ -496,7 +496,7 @@ def test_what_was_not_relaxed_was_not_measured():
     for row in table.part(SWEEPS):
         row |= {"skipped_part": 0.0, "eta2": 0.024}
     (claim,) = figure1.vanishing(table, "gauss_seidel")
-    assert (claim.verdict, claim.value) == (verdicts.DIFFERS, pytest.approx(0.024))
+    assert (claim.verdict, claim.value) == (verdicts.CONTRADICTED, pytest.approx(0.024))
 
 
 def test_eta3_is_compared_with_the_exact_one_of_the_same_packing():

@@ -503,17 +503,17 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
 
     judged = [
         claim("a", "gauss_seidel", verdicts.REPRODUCED),
-        claim("a", "exact", verdicts.DIFFERS),
+        claim("a", "exact", verdicts.CONTRADICTED),
         claim("b", "gauss_seidel", verdicts.FEW),
         claim("b", "exact", verdicts.REPRODUCED),
         claim("c", "gauss_seidel", verdicts.UNMEASURED),
         claim("c", "nearest", verdicts.REPRODUCED),
         claim("c", "exact", verdicts.STRONGLY),
         claim("c", "uniform", verdicts.MISSING, float("nan")),
-        claim("d", "", verdicts.DIFFERS),
+        claim("d", "", verdicts.CONTRADICTED),
     ]
     text = documents.verdict_table(judged)
-    heads = ["### Differ (2)", "### Open (1)", "### Reproduced (1)"]
+    heads = ["### Contradicted (2)", "### Open (1)", "### Reproduced (1)"]
     assert [line for line in text.splitlines() if line.startswith("#")] == heads
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     heads = ["claim", "source", "verdict", "paper's walk, to 10⁻³", "nearest-network walk", "exact"]
@@ -522,13 +522,13 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     assert rows[2][3:] == ["–", "✓", "✗✗"]
     assert "tests 4 claims" in outcomes.score(judged)
     assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
-    assert "The paper's own walk judges 2 of them;" in outcomes.score(judged)
+    assert "2 are judged by the networks of the paper's own walk;" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]
     counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
     assert counted["✓ reproduced"] == [1, 1, 1, 1, 0] and "? undecided" not in counted
-    assert counted["✗✗ differs strongly"] == [1, 0, 0, 1, 0]
+    assert counted["✗✗ strongly contradicted"] == [1, 0, 0, 1, 0]
     assert counted["all"] == [4, 3, 1, 3, 1]
 
 

@@ -2,9 +2,9 @@
 
 Every claim has a number, its 95 % confidence interval over packings, and two ranges: an
 interpretation of the claim's words, and a wider one. A claim is "reproduced" if the whole interval
-is in the first range, "differs" if it is entirely outside the first, "differs strongly" if it is
-also entirely outside a wider one, and "undecided" if it crosses an end of the first range, or if
-another draw of means or the omission of one μ would change the verdict (`verdicts`). Claims
+is in the first range, "contradicted" if it is entirely outside the first, "strongly contradicted"
+if it is also entirely outside a wider one, and "undecided" if it crosses an end of the first range,
+or if another draw of means or the omission of one μ would change the verdict (`verdicts`). Claims
 about a range of μ are judged at each μ in it, so that no mean hides a change of sign. Claims about
 the shape of P(ΔF_n) use no bins.
 

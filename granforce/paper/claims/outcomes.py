@@ -3,7 +3,7 @@
 from typing import Any
 
 from granforce.paper.claims.verdicts import (
-    DIFFERS,
+    CONTRADICTED,
     FEW,
     MISSING,
     REPRODUCED,
@@ -20,7 +20,7 @@ DECIDING = (PAPERS, "exact", "")
 # Verdict → its symbol in tables.
 SYMBOLS = {
     REPRODUCED: "✓",
-    DIFFERS: "✗",
+    CONTRADICTED: "✗",
     STRONGLY: "✗✗",
     UNDECIDED: "?",
     FEW: "…",
@@ -29,7 +29,7 @@ SYMBOLS = {
 }
 # Outcome → verdicts on a claim, in the order of the tables.
 OUTCOMES = {
-    "differ": (STRONGLY, DIFFERS),
+    "contradicted": (STRONGLY, CONTRADICTED),
     "open": (UNDECIDED, FEW, UNMEASURED, MISSING),
     "reproduced": (REPRODUCED,),
 }
@@ -69,7 +69,7 @@ def score(claims: Rows) -> str:
     return (
         f"The study that ships with granforce tests {sum(count.values())} claims of the paper and "
         "of an earlier letter (PRL 94, 178001), with variants counted separately: "
-        f"{count['reproduced']} are reproduced, {count['differ']} contradicted and {count['open']} "
-        f"open (undecided or too few data). The paper's own walk judges {by_walk} of them; the "
-        "others concern exact intervals, μ = 0 or the packings alone."
+        f"{count['reproduced']} are reproduced, {count['contradicted']} contradicted and "
+        f"{count['open']} open (undecided or too few data). {by_walk} are judged by the networks "
+        "of the paper's own walk; the others concern exact intervals, μ = 0 or the packings alone."
     )

@@ -5,8 +5,8 @@ position of a maximum: its interval contains 95 % of its values for means at eac
 from their Student distributions (`statistics.drawn_means`). The verdict must be the same for the
 whole interval, wherever other draws could put its ends, and the number must stay in the same range
 if any one μ is left out; a number outside the first range, but not always outside the wider one,
-differs. `at_each` judges a number at every μ by Student's interval over its packings; together the
-intervals hold with 95 % confidence (Bonferroni).
+contradicts the claim. `at_each` judges a number at every μ by Student's interval over its packings;
+together the intervals hold with 95 % confidence (Bonferroni).
 
 Intervals end where the possible values of a number end. A number has too few data if its interval
 decides nothing and spans more than a factor WIDE, or nearly all possible values.
@@ -21,8 +21,8 @@ from granforce.measures import statistics
 from granforce.paper.claims.groups import Ends, Groups
 from granforce.types import Floats
 
-REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
-STRONGLY, FEW, MISSING = "differs strongly", "too few data", "no data"
+REPRODUCED, UNDECIDED, CONTRADICTED = "reproduced", "undecided", "contradicted"
+STRONGLY, FEW, MISSING = "strongly contradicted", "too few data", "no data"
 UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
@@ -63,15 +63,15 @@ class Ranges(NamedTuple):
     def verdict(self, low: float, high: float) -> str:
         """The verdict of an interval: UNDECIDED if it crosses an end of the good range.
 
-        An interval entirely outside that range differs, strongly if it is also entirely outside a
-        wider range.
+        An interval entirely outside that range contradicts the claim, strongly if it is also
+        entirely outside a wider range.
         """
         if self.good[0] <= low and high <= self.good[1]:
             return REPRODUCED
         if not (high < self.good[0] or low > self.good[1]):
             return UNDECIDED
         wide = self.fair != self.good
-        return STRONGLY if wide and (high < self.fair[0] or low > self.fair[1]) else DIFFERS
+        return STRONGLY if wide and (high < self.fair[0] or low > self.fair[1]) else CONTRADICTED
 
     def __str__(self) -> str:
         good, fair = _range(self.good), _range(self.fair)
@@ -139,8 +139,8 @@ def over_all(
     why = _turns(turned, verdict)
     if why:
         # A number that is certainly outside the good range does not become undecided.
-        outside = {verdict, *turned.values()} <= {DIFFERS, STRONGLY}
-        before, verdict = verdict, DIFFERS if outside else UNDECIDED
+        outside = {verdict, *turned.values()} <= {CONTRADICTED, STRONGLY}
+        before, verdict = verdict, CONTRADICTED if outside else UNDECIDED
         why = why if verdict == before else f"{before}, but {why}"
     return claim._replace(verdict=verdict, why=why)
 
@@ -292,8 +292,8 @@ def _together(verdicts: Any) -> tuple[str, str]:
     why = "; ".join(f"{kind} at {', '.join(where[kind])}" for kind in sorted(kinds))
     if STRONGLY in kinds and REPRODUCED not in kinds:
         return STRONGLY, why
-    if kinds & {DIFFERS, STRONGLY}:
-        return DIFFERS, why
+    if kinds & {CONTRADICTED, STRONGLY}:
+        return CONTRADICTED, why
     return FEW if FEW in kinds else UNDECIDED, why
 
 

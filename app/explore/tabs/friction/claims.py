@@ -21,12 +21,7 @@ SAMPLERS = {
     "exact": "exact",
     "": "packings alone",
 }
-# Outcomes of claims, with the words after their number.
-OUTCOMES = {
-    "reproduced": "reproduced",
-    "differ": "contradicted",
-    "open": "open",
-}
+OUTCOMES = ("reproduced", "contradicted", "open")
 UNBROKEN = "\u00a0…\u00a0"  # of a range
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th>{}</tr>"
@@ -70,7 +65,7 @@ def summary() -> str:
 
 def _counted(claims: Rows) -> str:
     count = outcomes.counted(claims)
-    return ", ".join(f"{count[name]} {words}" for name, words in OUTCOMES.items() if count[name])
+    return ", ".join(f"{count[name]} {name}" for name in OUTCOMES if count[name])
 
 
 def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
