@@ -163,9 +163,11 @@ def test_seeds_have_defaults_as_on_the_command_line():
 
 def test_a_mistyped_store_leaves_nothing(tmp_path):
     store = gf.open_store(tmp_path / "typo.zarr")
-    assert len(store) == 0
-    with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the path$"):
-        gf.figures.indeterminacy(store)
+    assert "not there yet" in repr(store)
+    readers = (len, list, gf.figures.indeterminacy, lambda s: "walk-1" in s, lambda s: s["walk-1"])
+    for read in (*readers, gf.Store.entries, gf.Store.find, gf.Store.verify):
+        with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the p"):
+            read(store)
     assert list(tmp_path.iterdir()) == []
 
 

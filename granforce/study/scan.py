@@ -207,7 +207,7 @@ def run(
                     some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
                     _over_dask(client, some, scheduler, finished)
     except KeyboardInterrupt:
-        saved = sum(entry_name(store, *cell) in store for cell in cells)
+        saved = sum(entry_name(store, *cell) in store for cell in cells) if store.exists else 0
         # Workers of a cluster may still finish the cells they are computing.
         least = "" if scheduler is None else "at least "
         raise KeyboardInterrupt(f"saved {least}{saved} of {len(cells)} cells") from None
