@@ -1075,6 +1075,9 @@ def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
         "pressure applies to periodic boxes": lambda: gf.from_disks(
             *disks, walls="floor", gravity=1, pressure=3
         ),
+        "pressure applies to periodic boxes without forces": lambda: gf.read_table(
+            *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], pressure=2
+        ),
         "tolerance has no effect": lambda: gf.read_table(
             *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], tolerance=1e-5
         ),
@@ -1091,6 +1094,7 @@ def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
         "states must have shape": lambda: gf.measures.sampling(np.zeros((4, 30, 2, 2))),
         "state must have shape": lambda: gf.measures.Growth().add(np.zeros((3, 2, 2))),
         "give at least one friction": lambda: gf.scan(tmp_path / "s.zarr", []),
+        "mu 0.1 is given twice": lambda: gf.scan(tmp_path / "s.zarr", [0.1, 0.2, 0.1]),
         "known must be Known": lambda: gf.ensemble(packing, known=gf.Known(field, [0], [1])),
     }
     for said, slip in slips.items():

@@ -19,6 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from inspect import signature
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -96,6 +97,8 @@ def scan(
     seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
     if not mus:
         raise InputError("give at least one friction coefficient")
+    for one in (a for a, b in pairwise(sorted(mus)) if a == b):
+        raise InputError(f"mu {one:g} is given twice; give it once")
     worker_count(workers)
     check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
     cells = [
