@@ -169,7 +169,7 @@ CALLS = {
     "evolution": evolved,
     "scan": lambda S, folder: gf.scan(folder / "scan.zarr", [0.3], 1, 8, 2, workers=1),
     "rest": lambda S, _: gf.rest(S, draws=1),
-    "open_store": lambda S, folder: list(gf.open_store(folder / "store.zarr")),
+    "open_store": lambda S, folder: gf.open_store(folder / "store.zarr").make(),
     "measures": lambda S, _: measured(S),
     "to_dataset": lambda S, _: gf.to_dataset(S.original, S),
     "to_dataframe": lambda S, _: gf.to_dataframe(S.original, S),

@@ -163,9 +163,11 @@ def test_seeds_have_defaults_as_on_the_command_line():
 
 def test_a_mistyped_store_leaves_nothing(tmp_path):
     store = gf.open_store(tmp_path / "typo.zarr")
-    assert len(store) == 0
-    with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the path$"):
-        gf.figures.indeterminacy(store)
+    assert "not there yet" in repr(store)
+    readers = (len, list, gf.figures.indeterminacy, lambda s: "walk-1" in s, lambda s: s["walk-1"])
+    for read in (*readers, gf.Store.entries, gf.Store.find, gf.Store.verify):
+        with pytest.raises(gf.InputError, match=r"^there is no store at .*typo\.zarr; check the p"):
+            read(store)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -228,7 +230,9 @@ def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
     assert main("intervals p.npz --out bounds.csv".split()) == 0
     assert gf.read_known("bounds.csv").contacts.tolist() == S.index.tolist()
     assert main("intervals p.npz --out bounds.zarr".split()) == 0
-    assert set(xr.open_zarr("bounds.zarr").coords) == {"contact", "i", "j", "x", "y", "component"}
+    dataset, known = xr.open_zarr("bounds.zarr"), gf.to_dataset(gf.intervals(S), S)
+    assert set(dataset.coords) == set(known.coords) and dataset.attrs == known.attrs
+    assert set(dataset) == set(known) and dataset["gap"].attrs == known["gap"].attrs
 
 
 COMMANDS = {  # with lines that appear in this form only, and are explained all the same
@@ -615,7 +619,8 @@ def test_datasets_have_units_and_the_names_of_the_library(unit, units, cache, ca
         assert not main(words.split())
         dataset = xr.open_zarr(f"{command[:4]}.zarr")
         for values in dataset.data_vars.values():
-            assert values.attrs["units"] == ("1" if values.name == "cluster" else units)
+            fixed = {"cluster": "1", "gap": "mean normal force"}
+            assert values.attrs["units"] == fixed.get(values.name, units)
     low = xr.open_zarr("inte.zarr")["low"]
     assert low.dims == exact["low"].dims and np.allclose(low * scale, exact["low"], atol=1e-9)
     assert xr.open_zarr("limi.zarr")["limit_load"].dims == ("contact",)
@@ -1073,6 +1078,9 @@ def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
         "pressure applies to periodic boxes": lambda: gf.from_disks(
             *disks, walls="floor", gravity=1, pressure=3
         ),
+        "pressure applies to periodic boxes without forces": lambda: gf.read_table(
+            *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], pressure=2
+        ),
         "tolerance has no effect": lambda: gf.read_table(
             *square_lattice(1, 0, 0), mu=0.3, box=[3, 3], tolerance=1e-5
         ),
@@ -1089,12 +1097,22 @@ def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
         "states must have shape": lambda: gf.measures.sampling(np.zeros((4, 30, 2, 2))),
         "state must have shape": lambda: gf.measures.Growth().add(np.zeros((3, 2, 2))),
         "give at least one friction": lambda: gf.scan(tmp_path / "s.zarr", []),
+        "mu 0.1 is given twice": lambda: gf.scan(tmp_path / "s.zarr", [0.1, 0.2, 0.1]),
         "known must be Known": lambda: gf.ensemble(packing, known=gf.Known(field, [0], [1])),
     }
     for said, slip in slips.items():
         with pytest.raises(gf.InputError) as answer:
             slip()
         assert str(answer.value).startswith(said)
+    np.savez(tmp_path / "states.npz", **{"states [packing]": np.zeros((1, 2, 2))})
+    with pytest.raises(gf.InputError, match=r"states\.npz: these are networks; give the file of"):
+        gf.load_packing(tmp_path / "states.npz")
+    with pytest.raises(gf.InputError, match=r"nope\.npz: cannot be read .*; check the path$"):
+        gf.load_packing(tmp_path / "nope.npz")
+    with pytest.raises(
+        AttributeError, match=r"no attribute 'interval'; did you mean 'intervals'\?"
+    ):
+        gf.interval  # noqa: B018
     with pytest.raises(TypeError, match=r"^gauss_seidel has no option 'sweeps'; .*rest"):
         gf.gauss_seidel(S, S.original, sweeps=3)
 

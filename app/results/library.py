@@ -106,8 +106,8 @@ class Library:
 
     @property
     def stores(self) -> list[Store]:
-        """The stores that could be opened; entries in both are read from the first."""
-        return [store for store in (self.shipped, self.cache) if store is not None]
+        """The stores that exist; entries in both are read from the first."""
+        return [store for store in (self.shipped, self.cache) if store is not None and store.exists]
 
     @property
     def writable_cache(self) -> Store:

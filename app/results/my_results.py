@@ -13,7 +13,7 @@ from .library import SOURCES, Library
 def rows(library: Library) -> list[dict[str, Any]]:
     """A dict per computation in the cache, newest first: entry, name, kind, time, MB."""
     store = library.writable_cache
-    known, entries = names(store), store.entries()
+    known, entries = names(store), store.entries() if store.exists else []
     cells = [cell for cell in library.cells() if cell.store is store]
     packings = {entry.name: entry for entry in entries}
     return sorted(

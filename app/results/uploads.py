@@ -150,7 +150,7 @@ def read(
     mu: float | None = None,
     box: tuple[float, float] | None = None,
     tilt: float = 0.0,
-    pressure: float = 1.0,
+    pressure: float | None = None,
     walls: str | None = None,
     gravity: float = 0.0,
     limits: Limits = LIMITS,
@@ -161,7 +161,8 @@ def read(
     and gravity: for a table, as in `read_table`. Raises InputError, naming file and line, for
     invalid files and beyond the limits.
     """
-    limits.check(pressure=pressure)
+    if pressure is not None:
+        limits.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
     if "npz" in files:
         unpacked = UNPACKED * limits.upload * 10**6

@@ -28,10 +28,13 @@ _LABELS: dict[str, dict[str, str]] = {
 }
 
 
-def write_columns(path: str, columns: Mapping[str, Any]) -> None:
-    """Write columns {name: array} in the format given by the suffix."""
+def write_columns(path: str, columns: Mapping[str, Any], more: xr.Dataset | None = None) -> None:
+    """Write columns {name: array} in the format given by the suffix; more: for a dataset only."""
     if path.endswith(".zarr"):
-        save_series(_dataset(columns), path)
+        dataset = _dataset(columns)
+        save_series(
+            dataset if more is None else dataset.merge(more, combine_attrs="override"), path
+        )
     elif path.endswith(".npz"):
         _write_arrays(path, columns)
     else:

@@ -336,21 +336,25 @@ def response(
     *,
     mu: float | None = None,
     critical: CriticalForce | None = None,
-    precision: float = 0.01,
+    precision: float | None = None,
     cancel: Cancel | None = None,
 ) -> Response:
     """The first motion under a force pair on one contact, beyond its critical force.
 
-    force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
-    above the limit load if the bracket ends there). critical: the CriticalForce, computed if not
-    given. The motion is that of one step of contact dynamics from rest, followed until the
-    violation of Coulomb's law is at most 0.001 times the fastest relative velocity. displacement
-    and rotation of rattlers are NaN, as nothing moves them: use `S.grains` for the others, or
-    numpy's nanmax and nanmean. cancel() returning True raises Cancelled.
+    force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩,
+    by default 0.01, above the limit load if the bracket ends there). critical: the CriticalForce,
+    computed to `precision` if not given. The motion is that of one step of contact dynamics from
+    rest, followed until the violation of Coulomb's law is at most 0.001 times the fastest relative
+    velocity. displacement and rotation of rattlers are NaN, as nothing moves them: use `S.grains`
+    for the others, or numpy's nanmax and nanmean. cancel() returning True raises Cancelled.
 
-    Raises InputError if the grains come to rest under this load.
+    Raises InputError if the grains come to rest under this load, and for an unused precision.
     """
     S = ensemble_at(packing, mu=mu)
+    used = critical is None or (force is None and critical.moving is None)
+    if precision is not None and not used:
+        raise InputError("precision has no effect with this critical force: leave it out")
+    precision = 0.01 if precision is None else precision
     precision = positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
     position, scale = S.position(contact), S.force_scale
     if critical is None:

@@ -114,8 +114,8 @@ def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:
 
 
 def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
-    """Entries of a kind with these parameters, of its current version, as Store.find."""
-    matching = store.find(kind.name, **parameters)
+    """Entries of a kind with these parameters, of its current version; none if it is missing."""
+    matching = store.find(kind.name, **parameters) if store.exists else []
     return [entry for entry in matching if is_current(kind, entry)]
 
 
@@ -151,8 +151,6 @@ def scan_rows(store: Store) -> list[dict[str, Any]]:
     Raises InputError for a missing store, for one without walks, and for one whose walks differ in
     more than μ and seed, because means over them would be meaningless.
     """
-    if not store.path.is_dir():
-        raise InputError(f"there is no store at {store.path}; check the path")
     entries = store.find("walk")
     if not entries:
         raise InputError(f"no walks in {store.path}; granforce scan --out STORE makes some")

@@ -18,7 +18,8 @@ from granforce.types import Floats
 def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> xr.Dataset:
     """One perturbed contact as a dataset: its CriticalForce, with its `precision`, and response."""
     contact = critical.contact
-    moved = perturb.response(S, contact, critical=critical, precision=precision)
+    above = precision if critical.moving is None else None
+    moved = perturb.response(S, contact, critical=critical, precision=above)
     edges = decay.shells(S.packing)
     (position,) = S.positions([contact])
     return labelled(

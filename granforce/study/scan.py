@@ -19,6 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from inspect import signature
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -96,6 +97,8 @@ def scan(
     seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
     if not mus:
         raise InputError("give at least one friction coefficient")
+    for one in (a for a, b in pairwise(sorted(mus)) if a == b):
+        raise InputError(f"mu {one:g} is given twice; give it once")
     worker_count(workers)
     check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
     cells = [
@@ -207,7 +210,7 @@ def run(
                     some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
                     _over_dask(client, some, scheduler, finished)
     except KeyboardInterrupt:
-        saved = sum(entry_name(store, *cell) in store for cell in cells)
+        saved = sum(entry_name(store, *cell) in store for cell in cells) if store.exists else 0
         # Workers of a cluster may still finish the cells they are computing.
         least = "" if scheduler is None else "at least "
         raise KeyboardInterrupt(f"saved {least}{saved} of {len(cells)} cells") from None

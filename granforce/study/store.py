@@ -70,15 +70,13 @@ def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Sto
     """The Store in a folder, which is created with the first saved entry if it is missing.
 
     path: by default $GRANFORCE_CACHE, otherwise the user's cache folder. readonly: to read only,
-    which refuses a missing store, such as a mistyped one. A folder without write
-    permission can be opened; saving to it raises InputError.
+    which refuses a missing store. A folder without write permission can be opened; saving to it
+    raises InputError.
 
     Raises InputError for a file, for a folder with other contents, for one that cannot be created,
     for a store of a newer schema unless readonly, and, if readonly, for a missing store.
     """
     path = _located(path)
-    if not path.is_dir() and readonly:
-        raise InputError(f"there is no store at {path}; check the path or open it for writing")
     store = Store(path, readonly=readonly)
     if not readonly:
         refuse_newer(path)
@@ -170,7 +168,8 @@ def _create_root(path: Path) -> None:
 class Store(Mapping[str, xr.Dataset]):
     """A folder of entries as a mapping from entry name to lazily opened xr.Dataset.
 
-    Created by `open_store`. Entries with unreadable metadata are left out.
+    Created by `open_store`. Entries with unreadable metadata are left out. Reading entries of a
+    missing folder, such as a mistyped one, raises InputError.
     """
 
     def __init__(self, path: Path, *, readonly: bool = False) -> None:
@@ -180,8 +179,13 @@ class Store(Mapping[str, xr.Dataset]):
         self._incomplete = False
 
     def __repr__(self) -> str:
-        missing = "" if self.path.exists() else ", not there yet"
+        missing = "" if self.exists else ", not there yet"
         return f"Store({str(self.path)!r}, readonly={self.readonly}{missing})"
+
+    @property
+    def exists(self) -> bool:
+        """Whether the folder exists; saving creates it, and reading entries requires it."""
+        return self.path.is_dir()
 
     def __iter__(self) -> Iterator[str]:
         return (name for name in self._names() if self._attrs(name) is not None)
@@ -190,6 +194,7 @@ class Store(Mapping[str, xr.Dataset]):
         return sum(1 for _ in self)
 
     def __contains__(self, name: object) -> bool:
+        self._refuse_missing()
         return isinstance(name, str) and self._attrs(name) is not None
 
     def __getitem__(self, name: str) -> xr.Dataset:
@@ -364,7 +369,8 @@ class Store(Mapping[str, xr.Dataset]):
 
         Raises InputError if the store cannot be written.
         """
-        names = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]
+        all_names = self._names() if self.exists else []
+        names = [name for name in all_names if kind in (None, name.rpartition("-")[0])]
         self.remove(*names)
         return len(names)
 
@@ -400,9 +406,12 @@ class Store(Mapping[str, xr.Dataset]):
 
     def _names(self) -> list[str]:
         """Names of all entries, readable or not, sorted."""
-        if not self.path.is_dir():
-            return []
+        self._refuse_missing()
         return sorted(name for name in os.listdir(self.path) if keys.ENTRY.fullmatch(name))
+
+    def _refuse_missing(self) -> None:
+        if not self.exists:
+            raise InputError(f"there is no store at {self.path}; check the path")
 
     def _attrs(self, name: str) -> dict[str, Any] | None:
         return entries.read_attributes(self.path / name) if keys.ENTRY.fullmatch(name) else None

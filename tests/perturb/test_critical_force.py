@@ -273,6 +273,9 @@ def test_what_cannot_be_perturbed_is_told():
             critical_force(S, S.index[0], precision=precision)
     with pytest.raises(InputError, match="stay at rest"):
         response(S, S.index[0], 1e-3 * S.force_scale)
+    critical = critical_force(S, S.index[0])
+    with pytest.raises(InputError, match="precision has no effect"):
+        response(S, S.index[0], critical.high, critical=critical, precision=0.1)
     with pytest.raises(Cancelled):
         critical_force(S, S.index[0], cancel=lambda: True)
 

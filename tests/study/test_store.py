@@ -239,7 +239,7 @@ def test_undeclared_variable_is_refused(store):
         store.save("walk", PARAMS, dataset, version=1)
     with pytest.raises(ValueError, match="'speed' is not declared"):
         labelled({"speed": [1.0]})
-    assert len(store) == 0
+    assert not store.exists
 
 
 @pytest.mark.parametrize(
@@ -612,7 +612,7 @@ def test_damaged_root_is_made_anew(store):
 def test_folder_removed_under_an_open_store(store):
     store.save("walk", PARAMS, walk_dataset(), version=1)
     shutil.rmtree(store.path)
-    assert store.load("walk", PARAMS, version=1) is None and store.entries() == []
+    assert store.load("walk", PARAMS, version=1) is None and not store.exists
     store.save("walk", PARAMS, walk_dataset(), version=1)
     assert len(open_store(store.path, readonly=True)) == 1
 
@@ -651,7 +651,7 @@ def test_a_missing_store_is_made_by_the_first_entry(tmp_path):
     with pytest.raises(InputError, match="no store at"):
         open_store(path, readonly=True)
     store = open_store(path)
-    assert len(store) == 0 and not (tmp_path / "a").exists()
+    assert not store.exists and not (tmp_path / "a").exists()
     store.save("walk", PARAMS, walk_dataset(), version=1)
     assert len(open_store(path, readonly=True)) == 1
 

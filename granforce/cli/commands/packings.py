@@ -125,8 +125,6 @@ def import_(arguments: argparse.Namespace) -> int | None:
         return frames.import_frames(arguments, opened)
     files = [getattr(arguments, name) for name in ("grains", "contacts") if name in arguments]
     packing = READERS[arguments.format](*files, **options)
-    if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
-        raise InputError("--pressure applies only to a table without forces or loads: leave it out")
     named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info

@@ -50,7 +50,7 @@ def read_table(
     columns: Mapping[str, str] | None = None,
     forces: bool | None = None,
     reverse: bool = False,
-    pressure: float = 1.0,
+    pressure: float | None = None,
     walls: str | npt.ArrayLike | None = None,
     gravity: float = 0.0,
     tolerance: float | None = None,
@@ -67,12 +67,12 @@ def read_table(
     begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
     forces: whether to read f_n, f_t, by default if present; they then determine the pressure (in an
     open set: the loads). reverse: change the sign of f_t. Without forces, the network nearest to
-    equal normal forces at the given pressure (or loads) is computed; pressure is not used with f_n,
-    f_t. walls ("floor", "box" or segments) and gravity are for tables without forces, as in
-    `from_disks`. most_grains: largest number of grains. InputWarnings, whose
-    texts are also in packing.info["notes"], report forces that do not balance, overlaps, and pairs
-    in doubt, which packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100
-    of the tolerance, and far above those of other contacts.
+    equal normal forces at the pressure (by default 1; in an open set: under the loads) is computed.
+    walls ("floor", "box" or segments) and gravity are for tables without forces, as in
+    `from_disks`. most_grains: largest number of grains. InputWarnings, whose texts are also in
+    packing.info["notes"], report forces that do not balance, overlaps, and pairs in doubt, which
+    packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100 of the tolerance,
+    and far above those of other contacts.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
@@ -81,7 +81,8 @@ def read_table(
         tolerance = LISTED_TOUCHING
     elif contacts is not None and walls is None:
         raise InputError("tolerance has no effect with a table of contacts: leave it out")
-    pressure = positive(pressure, "pressure")
+    prescribed = pressure is not None
+    pressure = positive(1.0 if pressure is None else pressure, "pressure")
     found = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
     table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *found)
     pairs = [_with_full_names(one) for one in pairs]
@@ -98,6 +99,10 @@ def read_table(
     else:
         joined, given = _joined(pairs[0], table, x, r, cell, forces, mu)
     closed = bool(np.all(np.isfinite(cell.box)))
+    if prescribed and not (closed and given is None):
+        raise InputError(
+            "pressure applies to periodic boxes without forces (f_n, f_t): leave it out"
+        )
     zero = np.zeros((len(joined.i), 2))
     packing = make_packing(
         x,
