@@ -30,7 +30,8 @@ LARGE = 4.0  # ⟨f_n⟩, limit of the widths shown: few forces are larger
 LEGEND = """
 <label data-term="{colour_term}">Colour {colour}</label><span>{bar}</span>
 <label data-term="{width_term}">Width {width}</label>
-<span>up to <svg width="40" height="12" aria-hidden="true">
+<span title="no line is wider than half its smaller disk">up to
+  <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩{wide_bounds}</span>
 <span tabindex="0" data-term="rattler">pale disks: no force</span>

@@ -368,6 +368,18 @@ def test_bodies_of_a_file_are_drawn_as_they_are():
     assert np.allclose(ends.mean(axis=0).T, wall.contact_points[replay.backbone])
 
 
+def test_walls_of_disks_are_lines_and_chains_end_at_them():
+    """A floor and two sides at the extent of the disks; what stands behind them is no disk."""
+    heap = gf.from_disks([[1, 1], [3, 1], [2, 1 + 3**0.5]], np.ones(3), 0.3, walls="box", gravity=1)
+    drawn = frames(first_replay(gf.ensemble(heap), 1))
+    assert drawn["bodies"] == 3 and sorted(drawn["grain"]) == [0, 1, 2]
+    sides = np.reshape(drawn["walls"], (3, 4))
+    assert np.allclose(sides[0], [0, 0, 4, 0]) and np.allclose(sides[1:, 0], [0, 4])
+    at_wall = drawn["j"] >= 3
+    ends = np.stack([drawn["x1"], drawn["y1"]])[:, at_wall]
+    assert at_wall.sum() == 4 and np.all(np.isclose(ends[1], 0) | np.isclose(ends[0] % 4, 0))
+
+
 @pytest.mark.parametrize(
     "name, content",
     [
