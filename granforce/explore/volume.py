@@ -103,8 +103,8 @@ def volume(
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
-    number. progress(done, total) counts paths, weighted by their costs; total is None until the
-    first paths show how many are needed, and an estimate from then on.
+    number. progress(done, total) counts paths, weighted by their costs; total is None while the
+    ladder is built, and an estimate from then on.
 
     Raises InputError for an accuracy below 0.01 and unbounded forces, NotJammedError if S
     is empty.
@@ -129,15 +129,23 @@ def volume(
     top, log_top, top_variance = _top(polytope, np.random.default_rng([seed, 0]))
     stores = uniform.stores_for(polytope, workers, workers)
     work = _Work(progress)
-    rungs = _climbed(polytope, stores[0], top, seed, work)
-    first = np.full((2, len(rungs[0])), _FIRST)
-    rungs = _extended(polytope, stores, rungs, first, np.ones(len(rungs[0])), work)
+    allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
+    pilots = _climbed(polytope, stores[0], top, seed, work)
+    cost = _costs(pilots)
+    aim = _needed(pilots, _summed(pilots)[1], cost, allowed)
+    work.expect(2 * float((np.maximum(aim, _FIRST) * cost).sum()))
+    # New paths: those that built the ladder are not used in the result.
+    rungs = [
+        [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
+        for way in pilots
+    ]
+    first = np.full((2, len(cost)), _FIRST)
+    rungs = _extended(polytope, stores, rungs, first, cost, work)
     for _ in range(_MOST_ROUNDS):
         ladders, variance = _summed(rungs)
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
-        allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
         cost = _costs(rungs)
         have, aim = _paths_on(rungs), _needed(rungs, variance, cost, allowed)
         work.expect(float((np.maximum(aim - have, 0.05 * have) * cost).sum()))
@@ -236,12 +244,7 @@ def _climbed(
         up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
         work.add(_PILOT)
         slacks = up[-1].end.slacks
-    rungs = down, up[::-1]
-    # New paths: those that built the ladder are not used in the result.
-    return [
-        [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
-        for way in rungs
-    ]
+    return [down, up[::-1]]
 
 
 def _settled(
@@ -263,7 +266,8 @@ def _settled(
         refused=0,
     )
     begun = _flown(polytope, rows, fresh, _PILOT)
-    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
+    turns = begun.turns * (_PILOT - _FORGOTTEN) // _PILOT
+    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:], turns=turns)
 
 
 def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:

@@ -60,6 +60,9 @@ def test_same_seed_same_volume_for_any_number_of_workers_and_any_memory(monkeypa
     other = gf.volume(S, accuracy=0.2, seed=1, progress=lambda *paths: told.append(paths))
     done = [paths for paths, _ in told]
     assert len(told) > 10 and done == sorted(done) and told[-1][0] == told[-1][1]
+    # The paths that build the ladder show how much work follows.
+    first = next(total for _, total in told if total is not None)
+    assert 0.5 < first / told[-1][0] < 2
     assert one.log_volume == two.log_volume == three.log_volume != other.log_volume
     assert one.counts == two.counts == three.counts
 
