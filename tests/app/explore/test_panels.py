@@ -4,6 +4,7 @@ import gzip
 import io
 import json
 import re
+import threading
 import warnings
 from types import SimpleNamespace
 
@@ -20,7 +21,7 @@ from small_store import KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
-from app.background.jobs import Job
+from app.background.jobs import WAITING, Job
 from app.background.limits import Limits
 from app.browser.messages import TO_BROWSER, listed
 from app.explore import results_line
@@ -960,6 +961,28 @@ def test_walk_and_uniform_states_are_shown_together(state):
     assert view.others.switch.value and len(view.drawing.beside.data["x"]) == KEPT
     view.others.switch.value = False
     assert not len(view.drawing.beside.data["x"])
+
+
+def test_the_switch_says_what_its_networks_wait_for(state):
+    view = plane_view.View(state)
+    wait_for(state)
+    others, label = view.others, view.others.switch.label
+    begun, held = threading.Event(), threading.Event()
+
+    def measure(job):
+        job.begin("volume of S: 48 paths")
+        begun.set()
+        held.wait(60)
+
+    state.work.measuring.start(measure)
+    assert begun.wait(60)
+    others.task.job = SimpleNamespace(stage=WAITING)  # as where no thread is free
+    others._tell()
+    assert others.switch.label == f"{label} – waits for: volume of S"
+    others.task.job = None
+    held.set()
+    wait_for(state)
+    assert others.switch.label == label
 
 
 def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
