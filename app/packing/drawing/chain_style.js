@@ -63,7 +63,8 @@ export class Look {
     }
     for (let c = 0; c < style.lean?.length; c++) style.lean[c] = mixed.normal[c] > CARRYING ? mixed.tangential[c] / mixed.normal[c] : 0
     const coloured = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.reduction) &&
-      (colour !== "deviation" || this.measured)
+      (colour !== "deviation" || this.measured) && (colour !== "load" || this.loads) &&
+      (colour !== "extent" || most > 0 || !this.walk.free)
     style.colours = coloured ? palettes[model.colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
@@ -92,7 +93,7 @@ export class Look {
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
     if (colour === "known") return this.reduction[c] / Math.max(this.reduction[c] + this.extent[c], CARRYING)
-    if (colour === "load") return this.loads ? this.loads[c] / this.settings.load : 0.5
+    if (colour === "load") return this.loads[c] / this.settings.load
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.settings.full)
     if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.settings.full)
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))

@@ -235,6 +235,21 @@ def test_no_chain_is_wider_than_half_its_smaller_disk_and_walls_are_named(run):
     assert [row[0][1] for row in rows] == ["7 (disks 0 – 1)", "8 (disks 1 – wall)"]
 
 
+@pytest.mark.parametrize("colour", ["load", "extent"])
+def test_a_colour_that_is_being_computed_is_none_of_its_scale(run, colour):
+    colours, bins = run(
+        "packing/drawing/chain_style",
+        f"""({{ Look }}, {{ model, walk }}) => {{
+            const look = new Look(model, {TYPED}), mixed = {{ normal: [1, 2], tangential: [0, 0] }}
+            const {{ colours, bin }} = look.of(mixed)
+            return [colours, [...bin]]
+        }}""",
+        model=MODEL | {"colour": colour, "most": 0.0},
+        walk=PRESSED | {"free": 3},
+    )
+    assert (colours, bins) == (["grey"], [0, 0])
+
+
 def test_stress_on_a_disk_is_that_of_its_contacts(run):
     """Pressed by f along x: σ_xx = 2 f/(πr), σ_yy = 0; forces on both sides of a contact cancel."""
     stress, left, middle = run(
