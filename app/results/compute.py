@@ -168,8 +168,7 @@ def volume(library: Library, cell: Cell) -> Work:
 
     def work(job: Job) -> tuple[Cell, xr.Dataset]:
         def tell(done: float, total: float | None) -> None:
-            begun = f": {done:.0f} paths, then the remaining time" if total is None else ""
-            job.stage = f"volume of S{begun}"
+            job.stage = "volume of S"
             job.tell(done, total)
 
         stage = "volume of S: finding its walls"
