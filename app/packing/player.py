@@ -104,6 +104,8 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "radius": radius,
         "unit": replay.unit,
         "outlines": replay.outlines,
+        "walls": replay.walls.ravel(),
+        "bodies": replay.bodies,
         **{
             name: values.astype(np.int32) if name in whole else values
             for name, values in links._asdict().items()

@@ -27,10 +27,12 @@ Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; emp
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 LARGE = 4.0  # ⟨f_n⟩, limit of the widths shown: few forces are larger
+COMING = "(being computed)"  # then lines have no colour of the scale
 LEGEND = """
 <label data-term="{colour_term}">Colour {colour}</label><span>{bar}</span>
 <label data-term="{width_term}">Width {width}</label>
-<span>up to <svg width="40" height="12" aria-hidden="true">
+<span title="no line is wider than half its smaller disk">up to
+  <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩{wide_bounds}</span>
 <span tabindex="0" data-term="rattler">pale disks: no force</span>
@@ -300,13 +302,13 @@ def _full(state: AppState, most: float, bounds: str) -> str:
         this = "" if state.looks.full else ", this packing"
         return f"≥ {most:.2f} ⟨fₙ⟩ ({bounds}{this})"
     if state.shown.summary["dimension"]:
-        return "(being computed)"
+        return COMING
     return "0: every force is determined"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
-        return "(being computed)"
+        return COMING
     return f"≥ {full:.2f} ⟨fₙ⟩" if full else f"{loads.max(initial=0):.2f} ⟨fₙ⟩ (the largest)"
 
 
@@ -326,12 +328,15 @@ def legend(state: AppState, pulled: str = "") -> str:
         return ""
     low, stops, high = colour_bar(state)
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
-    if looks.colour == "mobilised" and replay.summary["mu"] == 0:
+    if COMING in high:
+        bar = COMING
+    if looks.colour in ("mobilised", "load") and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
     if looks.colour == "known" and not state.obeys_held:
         bar = "(a push ignores held forces)"
     elif looks.colour == "known" and state.knowledge.narrowed is None:
-        bar = "(no forces are held: select a contact and press H)"
+        known = state.knowledge.known
+        bar = COMING if known else "(no forces are held: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds

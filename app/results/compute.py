@@ -167,7 +167,12 @@ def volume(library: Library, cell: Cell) -> Work:
     params = _volume_parameters(cell)
 
     def work(job: Job) -> tuple[Cell, xr.Dataset]:
-        return cell, load_or_compute(library, job, "volume of S", kinds.VOLUME, params)
+        def tell(done: float, total: float | None) -> None:
+            job.stage = "volume of S"
+            job.tell(done, total)
+
+        stage = "volume of S: finding its walls"
+        return cell, load_or_compute(library, job, stage, kinds.VOLUME, params, progress=tell)
 
     return Work(work, wants=((kinds.VOLUME.name, params),))
 

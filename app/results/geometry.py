@@ -11,6 +11,7 @@ from granforce.types import Floats, Integers, Mask
 MARGIN = 1.0
 # Largest distance from the centre of the contact suggested for dragging, in half view widths.
 NEAR = 0.45
+SHORT = 0.7  # half the length of a wall of unknown ends, in radii of the disk that touches it
 # Width of a force chain with the mean normal force, in units of `unit`, and the default change in
 # ⟨f_n⟩ for full colour.
 CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
@@ -34,11 +35,28 @@ class Links(NamedTuple):
     # (k,) centre of grain i, length; of bodies, begin of a line through the contact along n
     x0: Floats
     y0: Floats
-    x1: Floats  # (k,) that centre + ℓ n, or end of the line
+    x1: Floats  # (k,) that centre + ℓ n, a place at a wall, or end of the line
     y1: Floats
     contact: Integers  # (k,) position among the backbone's contacts
     i: Integers  # (k,) numbers of the two grains
     j: Integers
+
+
+def bodies(packing: Packing) -> int:
+    """The number of disks or bodies; grains that follow them are behind walls."""
+    walls, grains = packing.info.get("walls", 0), len(packing.r)
+    return packing.info["disks"] if isinstance(walls, list) else grains - walls
+
+
+def walls(packing: Packing, backbone: Integers) -> Floats:
+    """Ends (k, 4) of walls as given, else of short lines along them where they are touched."""
+    given = packing.info.get("walls")
+    if isinstance(given, list):
+        return np.array(given, dtype=float).reshape(-1, 4)
+    touched = backbone[packing.contacts.j[backbone] >= bodies(packing)]
+    at, c = packing.contact_points[touched], packing.contacts.picked(touched)
+    along = SHORT * packing.r[c.i, None] * c.tangent
+    return np.column_stack([at - along, at + along])
 
 
 def unit(packing: Packing) -> float:
@@ -88,7 +106,8 @@ def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
     parts = []
-    cell, r = packing.cell, packing.r[:, None]
+    x, cell = x[: bodies(packing)], packing.cell
+    r = packing.r[: len(x), None]
     at = cell.across(x)
     for moved, grain in cell.images(at - r, at + r, MARGIN * unit(packing)):
         image = np.full(len(grain), bool(np.any(moved)))
@@ -100,7 +119,9 @@ def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
 def links(packing: Packing, x: Floats, backbone: Integers) -> Links:
     """Segments of the backbone's contacts, given as positions in the packing."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    begin, reach = x[i], packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
+    c = packing.contacts.picked(backbone)
+    begin, long = x[i], np.where(j < bodies(packing), c.length, c.arm_i)  # to a wall, not behind it
+    reach = long[:, None] * c.normal
     if packing.shapes is not None:
         begin, reach = packing.through_contacts(backbone, np.tile([1.0, 0.0], (len(backbone), 1)))
     parts = []

@@ -25,6 +25,8 @@ class Replay(NamedTuple):
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
     unit: float  # geometry.unit, the scale of chains and marks, length
     outlines: list[list[float]]  # geometry.outlines
+    walls: Floats  # (k, 4) geometry.walls
+    bodies: int  # geometry.bodies
     inviting: int  # row of links suggested for dragging, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     friction: Floats  # (N_c,) friction coefficients
@@ -135,6 +137,8 @@ def _replay(
         window=window,
         unit=geometry.unit(packing),
         outlines=geometry.outlines(packing),
+        walls=geometry.walls(packing, backbone),
+        bodies=geometry.bodies(packing),
         inviting=geometry.inviting(links, frames[0, :, 0], window),
         backbone=backbone,
         friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),

@@ -47,6 +47,9 @@ _PILOT, _FORGOTTEN = 48, 16
 _FIRST, _BATCHES = 256, 16
 # Number of paths whose speeds are drawn together; after each such batch rounding is corrected.
 _BATCH = 32
+# Number of rungs over √h, and paths of a rung over those that its step STEP needs if independent,
+# as found; they serve only to estimate the work before it is known.
+_RUNGS, _INDEPENDENT = 2.5, 0.7
 # Rounds of more paths, each at most _GROWTH times as many, until the error is as requested.
 _MOST_ROUNDS, _GROWTH = 30, 4.0
 # Cost of a path without reflections, in passes over the walls.
@@ -103,8 +106,7 @@ def volume(
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
-    number. progress(done, total) counts paths, weighted by their costs; total is None until the
-    first paths show how many are needed, and an estimate from then on.
+    number. progress(done, total) counts paths, weighted by their costs; total is an estimate.
 
     Raises InputError for an accuracy below 0.01 and unbounded forces, NotJammedError if S
     is empty.
@@ -128,16 +130,24 @@ def volume(
         )
     top, log_top, top_variance = _top(polytope, np.random.default_rng([seed, 0]))
     stores = uniform.stores_for(polytope, workers, workers)
-    work = _Work(progress)
-    rungs = _climbed(polytope, stores[0], top, seed, work)
-    first = np.full((2, len(rungs[0])), _FIRST)
-    rungs = _extended(polytope, stores, rungs, first, np.ones(len(rungs[0])), work)
+    allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
+    work = _Work(progress, _foreseen(polytope.dimension, allowed))
+    pilots = _climbed(polytope, stores[0], top, seed, work)
+    cost = _costs(pilots)
+    aim = _needed(pilots, _summed(pilots)[1], cost, allowed)
+    work.expect(2 * float((np.maximum(aim, _FIRST) * cost).sum()))
+    # New paths: those that built the ladder are not used in the result.
+    rungs = [
+        [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
+        for way in pilots
+    ]
+    first = np.full((2, len(cost)), _FIRST)
+    rungs = _extended(polytope, stores, rungs, first, cost, work)
     for _ in range(_MOST_ROUNDS):
         ladders, variance = _summed(rungs)
         error = np.sqrt(variance.sum() + top_variance)
         if error <= accuracy:
             break
-        allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
         cost = _costs(rungs)
         have, aim = _paths_on(rungs), _needed(rungs, variance, cost, allowed)
         work.expect(float((np.maximum(aim - have, 0.05 * have) * cost).sum()))
@@ -180,13 +190,27 @@ def _top(polytope: Walls, rng: np.random.Generator) -> tuple[float, float, float
     return beta, log, (1 - part) / (part * _COUNTED)
 
 
+def _foreseen(dimension: int, variance: float) -> float:
+    """About how many paths this variance of ln V takes, all rungs together."""
+    rungs = _RUNGS * math.sqrt(dimension)
+    needed = _INDEPENDENT * (rungs * STEP) ** 2 / variance
+    return 2 * rungs * _PILOT + max(2 * rungs * _FIRST, needed)
+
+
 class _Work:
     """The work on paths for a progress callback; threads share it."""
 
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._total: float | None = None
+    def __init__(self, progress: Progress | None, paths: float) -> None:
+        """paths: about how many there will be; used until `expect` announces their work."""
+        self._progress, self._paths = progress, paths
+        self._total = 0.0
         self._done: list[float] = []  # appending needs no lock
+
+    def add_pilots(self, rung: _Rung) -> None:
+        """Count the pilots of a rung as done."""
+        self._done.append(_PILOT * (rung.turns / len(rung.q) + _PATH_COST))
+        self._total = sum(self._done) * self._paths / (_PILOT * len(self._done))
+        self._report()
 
     def expect(self, more: float) -> None:
         """Announce the work that is still to come."""
@@ -201,7 +225,7 @@ class _Work:
     def _report(self) -> None:
         if self._progress is not None:
             done = sum(self._done)
-            self._progress(done, None if self._total is None else max(done, self._total))
+            self._progress(done, max(done, self._total))
 
 
 class _Rung(NamedTuple):
@@ -224,7 +248,7 @@ def _climbed(
     beta, slacks, reach = top, np.ones(polytope.count), float(np.sqrt(polytope.dimension / top))
     while not down or down[-1].beta > 0:
         down.append(_settled(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
-        work.add(_PILOT)
+        work.add_pilots(down[-1])
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
         spread = max(float(q.std()), 1e-300)
@@ -234,14 +258,9 @@ def _climbed(
     for number in range(len(down) - 1, -1, -1):
         beta, reach = down[number].beta, down[number].reach
         up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
-        work.add(_PILOT)
+        work.add_pilots(up[-1])
         slacks = up[-1].end.slacks
-    rungs = down, up[::-1]
-    # New paths: those that built the ladder are not used in the result.
-    return [
-        [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
-        for way in rungs
-    ]
+    return [down, up[::-1]]
 
 
 def _settled(
@@ -263,7 +282,8 @@ def _settled(
         refused=0,
     )
     begun = _flown(polytope, rows, fresh, _PILOT)
-    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
+    turns = begun.turns * (_PILOT - _FORGOTTEN) // _PILOT
+    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:], turns=turns)
 
 
 def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:

@@ -31,7 +31,7 @@ from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
 from app.explore.tabs.tabs import TABS
 from app.packing.player import frames
-from app.packing.view import PackingView, exact_intervals
+from app.packing.view import COMING, PackingView, exact_intervals
 from app.page import learns
 from app.results import compute, distributions, replays
 from app.results.geometry import MARGIN
@@ -714,6 +714,10 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
         assert f'value="change" selected>change by the {by}</option>' in view.player.legend
     state.looks.colour = "extent"
     assert '<option value="extent" selected' in view.player.legend  # and can still be chosen
+    assert 'class="scale"' in view.player.legend
+    state.looks.colour = "load"
+    assert COMING in view.player.legend and 'class="scale"' not in view.player.legend
+    state.work.cancel()
 
 
 def test_what_is_refused_does_not_stay_in_its_box(state):

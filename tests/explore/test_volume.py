@@ -56,10 +56,11 @@ def test_same_seed_same_volume_for_any_number_of_workers_and_any_memory(monkeypa
     one, two = (gf.volume(S, accuracy=0.2, workers=workers) for workers in (1, 3))
     monkeypatch.setattr(ladder.billiard, "MEMORY", 20 * 8 * 192)
     three = gf.volume(S, accuracy=0.2, workers=2)
-    told: list[tuple[float, float | None]] = []
+    told: list[tuple[float, float]] = []
     other = gf.volume(S, accuracy=0.2, seed=1, progress=lambda *paths: told.append(paths))
     done = [paths for paths, _ in told]
     assert len(told) > 10 and done == sorted(done) and told[-1][0] == told[-1][1]
+    assert all(0.2 < total / told[-1][0] < 5 for _, total in told)  # estimates, from the first
     assert one.log_volume == two.log_volume == three.log_volume != other.log_volume
     assert one.counts == two.counts == three.counts
 

@@ -5,6 +5,9 @@ import { plain } from "../../browser/to_object.js"
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const THIN = 0.15 // factor on the width of a chain excluded by a filter
 
+/** A grain by its number; those behind walls stand for them. */
+export const named = (grain, { bodies }) => (grain < bodies ? grain : "wall")
+
 /** A formatted number without the sign of a rounded zero. */
 export const unsigned = (text) => text.replace(/^-(?=[0.]*$)/, "")
 
@@ -17,6 +20,11 @@ export class Look {
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     if (walk.outlines?.length) this.style.lean = new Float32Array(walk.contacts) // fₜ/fₙ: the direction of a chain
+    this.widest = new Float32Array(walk.contacts) // half the smaller disk, so that chains hide none
+    for (const [k, c] of [...walk.contact].entries()) {
+      const radii = [walk.i[k], walk.j[k]].filter((grain) => grain < walk.bodies).map((grain) => walk.radius[grain])
+      this.widest[c] = Math.min(...radii)
+    }
     this.one = walk.outlines?.length ? "body" : "disk"
     this.measure()
   }
@@ -51,11 +59,12 @@ export class Look {
     const unit = this.walk.unit * this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
-      style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
+      style.width[c] = value > CARRYING ? Math.min(unit * value, this.widest[c]) * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
     for (let c = 0; c < style.lean?.length; c++) style.lean[c] = mixed.normal[c] > CARRYING ? mixed.tangential[c] / mixed.normal[c] : 0
     const coloured = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.reduction) &&
-      (colour !== "deviation" || this.measured)
+      (colour !== "deviation" || this.measured) && (colour !== "load" || this.loads) &&
+      (colour !== "extent" || most > 0 || !this.walk.free)
     style.colours = coloured ? palettes[model.colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
@@ -84,7 +93,7 @@ export class Look {
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
     if (colour === "known") return this.reduction[c] / Math.max(this.reduction[c] + this.extent[c], CARRYING)
-    if (colour === "load") return this.loads ? this.loads[c] / this.settings.load : 0.5
+    if (colour === "load") return this.loads[c] / this.settings.load
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.settings.full)
     if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.settings.full)
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
@@ -103,7 +112,7 @@ export class Look {
     const n = mixed.normal[c], t = mixed.tangential[c]
     const interval = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
-      ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${walk.i[k]} – ${walk.j[k]})`],
+      ["contact", `${walk.backbone[c]} (${this.one === "body" ? "bodies" : "disks"} ${named(walk.i[k], walk)} – ${named(walk.j[k], walk)})`],
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", unsigned(t.toFixed(3))],
       ["fₜ/(μ fₙ)", unsigned(this.mobilised(c, n, t)?.toFixed(2) ?? "–")],

@@ -1,7 +1,7 @@
 // The packing on canvases: disks, chains and marks on separate layers, so that a frame repaints
 // only chains. One unit of length is the same number of pixels in x and y.
 
-import { addPolygon, inside, polygon, unflat } from "../../browser/canvas_paths.js"
+import { addPolygon, inside, line, polygon, unflat } from "../../browser/canvas_paths.js"
 import { createElement } from "../../browser/dom.js"
 import { LEAST, strokeByClass, strokeEach } from "./chain_strokes.js"
 import { highlight, markForces, markSelected } from "./marks.js"
@@ -151,6 +151,14 @@ export class Scene {
       disks.strokeStyle = line
       disks.stroke()
     }
+    this.drawWalls(disks)
+  }
+
+  drawWalls(context) {
+    const { walls } = this.geometry
+    context.lineWidth = 2 / this.scale
+    context.strokeStyle = this.palette.strong
+    for (let k = 0; k < walls.length; k += 4) line(context, walls.slice(k, k + 2), walls.slice(k + 2, k + 4))
   }
 
   drawBox(context) {

@@ -49,7 +49,7 @@ def test_bodies_are_found_by_their_outline_and_lines_turn_with_the_force(run):
     walk = {"x": [0, 5], "y": [0, 0], "r": [2.2, 1], "radius": [2.2, 1], "grain": [0, 1]}
     walk |= {"outlines": [[-2, -1, 2, -1, 2, 1, -2, 1], []], "window": [-10, 10, -10, 10]}
     walk |= {"x0": [0], "y0": [0], "x1": [2], "y1": [0], "i": [0], "j": [1], "contact": [0]}
-    walk |= {"box": [-1, -1], "unit": 1}
+    walk |= {"box": [-1, -1], "walls": [], "unit": 1}
     found, ends = run(
         "packing/drawing/scene",
         """({ Scene }, { walk }) => {
@@ -189,11 +189,12 @@ PRESSED = {
     "grain": [0, 1, 2],
     "x0": [-1.5, 0.0], "y0": [0.0, 0.0], "x1": [0.0, 1.5], "y1": [0.0, 0.0],
     "x": [-1.5, 0.0, 1.5], "y": [0.0, 0.0, 0.0], "r": [1.0, 0.5, 1.0], "radius": [1.0, 0.5, 1.0],
-    "kind": [0, 0, 0], "box": [-1, -1], "tilt": 0, "window": [-3, 3, -3, 3], "unit": 1.0,
+    "kind": [0, 0, 0], "bodies": 3, "walls": [], "box": [-1, -1], "tilt": 0,
+    "window": [-3, 3, -3, 3], "unit": 1.0,
     "normal": [2.0, 2.0], "tangential": [0.0, 0.0], "low": [1.0, 2.0], "high": [4.0, 2.5],
 }  # fmt: skip
 MODEL = {
-    "scales": {"width": 0.2, "change": 0.5, "deviation": 4.0}, "thickness": "normal",
+    "scales": {"width": 0.1, "change": 0.5, "deviation": 4.0}, "thickness": "normal",
     "colour": "change", "reference": 0, "most": 3.0, "full": None, "stretch": 1.5,
     "palettes": {"change": list(range(11)), "mobilised": list(range(11)), "neutral": "grey"},
 }  # fmt: skip
@@ -213,9 +214,40 @@ def test_width_and_colour_of_a_chain_say_its_force_and_its_change(run):
         model=MODEL,
         walk=PRESSED,
     )
-    assert width == pytest.approx([0.2 * 1.5 * 2.25, 0.0])
+    assert width == pytest.approx([0.1 * 1.5 * 2.25, 0.0])
     assert change == [round(10 * 0.75), 0]  # a quarter of ⟨fₙ⟩ more; far less
     assert mobilised == [0, 5]  # fₜ = −μ fₙ; nothing
+
+
+def test_no_chain_is_wider_than_half_its_smaller_disk_and_walls_are_named(run):
+    widths, rows = run(
+        "packing/drawing/chain_style",
+        f"""({{ Look }}, {{ model, walk }}) => {{
+            const look = new Look(model, {TYPED})
+            const mixed = {{ normal: [90, 90], tangential: [0, 0] }}
+            const rows = [0, 1].map((k) => look.contact(k, {{ mixed }}))
+            return [[...look.of(mixed).width], rows]
+        }}""",
+        model=MODEL,
+        walk=PRESSED | {"bodies": 2, "radius": [0.75, 0.5, 0.0], "backbone": [7, 8], "number": [0]},
+    )
+    assert widths == [0.5, 0.5]
+    assert [row[0][1] for row in rows] == ["7 (disks 0 – 1)", "8 (disks 1 – wall)"]
+
+
+@pytest.mark.parametrize("colour", ["load", "extent"])
+def test_a_colour_that_is_being_computed_is_none_of_its_scale(run, colour):
+    colours, bins = run(
+        "packing/drawing/chain_style",
+        f"""({{ Look }}, {{ model, walk }}) => {{
+            const look = new Look(model, {TYPED}), mixed = {{ normal: [1, 2], tangential: [0, 0] }}
+            const {{ colours, bin }} = look.of(mixed)
+            return [colours, [...bin]]
+        }}""",
+        model=MODEL | {"colour": colour, "most": 0.0},
+        walk=PRESSED | {"free": 3},
+    )
+    assert (colours, bins) == (["grey"], [0, 0])
 
 
 def test_stress_on_a_disk_is_that_of_its_contacts(run):

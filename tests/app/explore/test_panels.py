@@ -4,6 +4,7 @@ import gzip
 import io
 import json
 import re
+import threading
 import warnings
 from types import SimpleNamespace
 
@@ -20,7 +21,7 @@ from small_store import KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
-from app.background.jobs import Job
+from app.background.jobs import WAITING, Job
 from app.background.limits import Limits
 from app.browser.messages import TO_BROWSER, listed
 from app.explore import results_line
@@ -366,6 +367,18 @@ def test_bodies_of_a_file_are_drawn_as_they_are():
     assert right - left < 1.2 * np.ptp(corners[:, 0]) and unit < 0.1 * wall.r[-1]
     ends = np.array([[drawn["x0"], drawn["y0"]], [drawn["x1"], drawn["y1"]]])
     assert np.allclose(ends.mean(axis=0).T, wall.contact_points[replay.backbone])
+
+
+def test_walls_of_disks_are_lines_and_chains_end_at_them():
+    """A floor and two sides at the extent of the disks; what stands behind them is no disk."""
+    heap = gf.from_disks([[1, 1], [3, 1], [2, 1 + 3**0.5]], np.ones(3), 0.3, walls="box", gravity=1)
+    drawn = frames(first_replay(gf.ensemble(heap), 1))
+    assert drawn["bodies"] == 3 and sorted(drawn["grain"]) == [0, 1, 2]
+    sides = np.reshape(drawn["walls"], (3, 4))
+    assert np.allclose(sides[0], [0, 0, 4, 0]) and np.allclose(sides[1:, 0], [0, 4])
+    at_wall = drawn["j"] >= 3
+    ends = np.stack([drawn["x1"], drawn["y1"]])[:, at_wall]
+    assert at_wall.sum() == 4 and np.all(np.isclose(ends[1], 0) | np.isclose(ends[0] % 4, 0))
 
 
 @pytest.mark.parametrize(
@@ -948,6 +961,28 @@ def test_walk_and_uniform_states_are_shown_together(state):
     assert view.others.switch.value and len(view.drawing.beside.data["x"]) == KEPT
     view.others.switch.value = False
     assert not len(view.drawing.beside.data["x"])
+
+
+def test_the_switch_says_what_its_networks_wait_for(state):
+    view = plane_view.View(state)
+    wait_for(state)
+    others, label = view.others, view.others.switch.label
+    begun, held = threading.Event(), threading.Event()
+
+    def measure(job):
+        job.begin("volume of S: 48 paths")
+        begun.set()
+        held.wait(60)
+
+    state.work.measuring.start(measure)
+    assert begun.wait(60)
+    others.task.job = SimpleNamespace(stage=WAITING)  # as where no thread is free
+    others._tell()
+    assert others.switch.label == f"{label} – waits for: volume of S"
+    others.task.job = None
+    held.set()
+    wait_for(state)
+    assert others.switch.label == label
 
 
 def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):

@@ -5,14 +5,15 @@ from typing import Any
 
 import panel_material_ui as pmui
 
+from ....background.jobs import WAITING
 from ....browser.panel_patches import together
 from ....results import compute, planes
 from ....results.library import Shown
 from ....results.replays import Replay
 from ....state.app_state import AppState
 
-# The label of the switch for states of a kind.
-ALSO = {"walk": "also uniformly sampled networks", "uniform": "also the walk"}
+# The label of the switch that adds states of a kind.
+ALSO = {"uniform": "also uniformly sampled networks", "walk": "also the walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
 ENOUGH = 300  # states in addition to those shown, if they have to be computed
 
@@ -24,9 +25,11 @@ class OtherStates:
         """changed(): called when there are others, or none any more."""
         self.state, self._changed = state, changed
         self.replay: Replay | None = None
-        self.switch = pmui.Switch(label=ALSO["walk"], size="small", margin=(6, 8))
+        self.switch = pmui.Switch(label=ALSO["uniform"], size="small", margin=(6, 8))
         self.task = state.work.task()
         self.switch.param.watch(lambda event: together(self.fetch), "value")
+        self.task.param.watch(self._tell, "running")
+        state.work.param.watch(self._tell, "progress")
 
     @property
     def kind(self) -> str:
@@ -40,12 +43,20 @@ class OtherStates:
         if self.state.growing or cell is None:
             return self.fetch()
         self.task.cancel()
-        self.switch.label = ALSO[cell.kind]
+        self._tell()
         available = planes.other_states(self.state.catalogue, cell) is not None
         if self.switch.value != available:
             self.switch.value = available
         elif available:
             self.fetch()
+
+    def _tell(self, *events: Any) -> None:
+        """Name the switch, and what its states wait for: the page reports only `foremost`."""
+        label, job, first = ALSO[self.kind], self.task.job, self.state.work.foremost
+        other = None if first is None else first.job
+        if job is not None and job.stage == WAITING and other not in (None, job):
+            label += f" – waits for: {other.stage.partition(':')[0]}"
+        self.switch.label = label
 
     def fetch(self, *events: Any) -> None:
         """Load or compute the other states, or remove them."""

@@ -53,10 +53,10 @@ class SpaceFigure:
             line_width=1.4,
         )  # fmt: skip
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
+        states = fig.scatter("x", "y", source=self.path, size=5, color=STATES, alpha=0.9)
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7
         )
-        states = fig.scatter("x", "y", source=self.path, size=5, color=STATES, alpha=0.9)
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=14, color=ORIGINAL,
             line_color="#333333",

@@ -1,7 +1,7 @@
 // A table of all contacts: present forces, possible forces, known forces. It reads from the player,
 // not the server, and only while it is open; rows hidden by a filter are dim in the packing.
 
-import { unsigned } from "../../../packing/drawing/chain_style.js"
+import { named, unsigned } from "../../../packing/drawing/chain_style.js"
 
 const ROWS = 200 // of a page
 const AGAIN_MS = 250 // between two updates during motion
@@ -48,7 +48,7 @@ export function render({ model, view }) {
   function now() {
     const on = player(), { replay, look } = on, { walk, mixed } = replay
     const pairs = Array(walk.contacts)
-    for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]]
+    for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]].map((grain) => named(grain, walk))
     return { walk, mixed, pairs, known: new Set(on.pins.pins.contacts ?? []), exact: look.exact ?? {} }
   }
 
