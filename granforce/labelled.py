@@ -119,6 +119,15 @@ _VARIABLE_UNITS = {
 }
 
 
+# Numbers of records that are forces in the packing's unit.
+_FORCES = {
+    "CriticalForce": ("low", "high", "limit_load"),
+    "Reach": ("low", "high"),
+    "Response": ("force",),
+    "Informative": ("mean_interval_before",),
+}
+
+
 def column_name(component: str | None, variable: str, unit: str | None = None) -> str:
     """The name of a column: f_n_low [packing], from "f_n", "low" and "packing"."""
     name = "_".join(part for part in (component, variable) if part)
@@ -174,42 +183,51 @@ def to_dataset(
     "inner" or "outer" for an outline's corners; angle, of a StressOutline. unit: of forces,
     "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of the
     command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are always in it.
-    Numbers and texts of the record become attributes.
+    Numbers and texts of the record become attributes, forces among them in this unit, too.
 
     Raises InputError for anything else, for a unit without effect, and if the ensemble is missing
     or does not match.
     """
     choice(unit, UNITS, "unit")
     dataset = _dataset(result, ensemble)
-    return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble)
+    forces = _FORCES.get(type(result).__name__, ())
+    return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble, forces)
 
 
 def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
     """A result as a dataset in the packing's unit."""
     result = _several(result)
+    kind = type(result).__name__
     if isinstance(result, np.ndarray) and result.ndim == 1:
         dimensions, arrays = {"value": "contact"}, {"value": result}
     elif isinstance(result, np.ndarray) and result.ndim in (2, 3, 4):
         words = ["chain", "state", "contact", "component"][-result.ndim :]
         dimensions, arrays = {"states": " ".join(words)}, {"states": result}
     else:
-        dimensions = _DIMENSIONS.get(type(result).__name__, {})
+        dimensions = _DIMENSIONS.get(kind, {})
         if getattr(result, "draws", None) is not None:  # of an Inference
             dimensions = dimensions | dict.fromkeys(("mean", "error"), "contact component")
         arrays = _arrays(result, list(dimensions))
     if not dimensions:
         known = ", ".join(name for name in _DIMENSIONS if not name.startswith("_"))
-        kind = with_article(type(result).__name__)
-        raise InputError(f"{kind} cannot be labelled; labels exist for: {known}, networks")
-    if type(result).__name__ == "Informative" and isinstance(ensemble, Ensemble):
+        raise InputError(
+            f"{with_article(kind)} cannot be labelled; labels exist for: {known}, networks"
+        )
+    numbers = _attributes(result)
+    if kind == "Informative" and isinstance(ensemble, Ensemble):
         arrays["after"] = result.after * ensemble.force_scale
-    if type(result).__name__ == "Intervals" and isinstance(ensemble, Ensemble):
+        before = numbers.pop("before")
+        numbers["mean_interval_before"] = before * ensemble.force_scale
+    if kind == "Intervals" and isinstance(ensemble, Ensemble):
         arrays["cluster"] = clusters_of(ensemble, result)
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
-        variable = _RENAMED.get(type(result).__name__, {}).get(name, name)
-        attributes = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
+        variable = _RENAMED.get(kind, {}).get(name, name)
+        unit = (
+            "force" if variable == "corners" and kind == "Body" else _VARIABLE_UNITS.get(variable)
+        )
+        attributes = {"units": unit} if unit else {}
         stored = "interval_gap" if variable == "gap" else variable  # `gap` is that of contacts
         if stored in VARIABLES:
             attributes["long_name"] = VARIABLES[stored].long_name
@@ -221,7 +239,7 @@ def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
         if used & {"contact", "grain"}:
             labels |= _contact_labels(*_contacts(result, ensemble))
         labels = {name: label for name, label in labels.items() if _dimension(label, name) in used}
-        return xr.Dataset(variables, labels, _attributes(result))
+        return xr.Dataset(variables, labels, numbers)
     except ValueError as error:
         why = str(error).removeprefix(f"{_FOREIGN}: ")
         raise InputError(f"{_FOREIGN}: {why}") from None
@@ -264,12 +282,20 @@ def to_dataframe(
     ]
     order = [name for name in order if any(name in values.dims for values in columns.values())]
     table = xr.Dataset(columns).to_dataframe([*order, "contact"]).reset_index()
-    first = [*order, "contact", "i", "j", "x", "y"]
+    forces = {name: words.get(dataset[name].attrs.get("units", "")) for name in order}
+    named = {name: column_name(None, name, word) for name, word in forces.items()}
+    table = table.rename(columns=named)
+    first = [*named.values(), "contact", "i", "j", "x", "y"]
     return table[[*first, *(name for name in columns if name not in first)]]
 
 
-def _in_mean_forces(dataset: xr.Dataset, ensemble: Ensemble | None) -> xr.Dataset:
-    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces."""
+def _in_mean_forces(
+    dataset: xr.Dataset, ensemble: Ensemble | None, numbers: Sequence[str]
+) -> xr.Dataset:
+    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces.
+
+    numbers: the names of attributes that are forces.
+    """
     if not isinstance(ensemble, Ensemble):
         raise InputError('unit="mean" needs S as the second argument: (result, S, unit="mean")')
     if UNITS["packing"] not in {v.attrs.get("units") for v in dataset.variables.values()}:
@@ -279,13 +305,14 @@ def _in_mean_forces(dataset: xr.Dataset, ensemble: Ensemble | None) -> xr.Datase
         )
     scale = ensemble.force_scale
     units = {"units": UNITS["mean"]}
-    return dataset.assign(
-        {
-            name: (values / scale).assign_attrs(units)
-            for name, values in dataset.data_vars.items()
-            if values.attrs.get("units") == UNITS["packing"]
-        }
-    )
+    divided = {
+        name: (dataset[name] / scale).assign_attrs(units)
+        for name, values in dataset.variables.items()
+        if values.attrs.get("units") == UNITS["packing"]
+    }
+    labels = {name: divided.pop(name) for name in dataset.coords if name in divided}
+    attributes = {name: dataset.attrs[name] / scale for name in numbers}
+    return dataset.assign(divided).assign_coords(labels).assign_attrs(attributes)
 
 
 def _contacts(result: Any, ensemble: Ensemble | None) -> tuple[Packing, Integers]:
@@ -371,7 +398,7 @@ def _labels(result: Any) -> dict[str, Any]:
         labels["angle"] = ("angle", result.angles, {"units": "rad"})
     for dimension, name in (("value", "values"), ("load", "loads")):
         if isinstance(values := getattr(result, name, None), np.ndarray):
-            labels[dimension] = values
+            labels[dimension] = (dimension, values, {"units": UNITS["packing"]})
     return labels
 
 

@@ -1023,6 +1023,41 @@ def test_tables_are_in_either_unit():
             gf.to_dataframe(S.packing, **options)
 
 
+def _results(S):
+    """Results of every kind with forces, by name."""
+    contact = S.index[3]
+    reach = gf.reach(S, contact)
+    return {
+        "intervals": gf.intervals(S),
+        "limit loads": gf.limit_load_bounds(S),
+        "critical force": gf.critical_force(S, contact),
+        "critical forces": gf.critical_forces(S, S.index[:2]),
+        "reach": reach,
+        "pull": gf.pull(S, contact, [0.5 * (reach.low + reach.high)]),
+        "informative": gf.informative(S, 2),
+        "walk": gf.walk(S, 3, seed=0),
+        "uniform": gf.sample_uniform(S, 4, seed=0),
+    }
+
+
+def test_in_mean_forces_nothing_depends_on_the_unit_of_pressure():
+    """Numbers, labels and attributes: under another pressure, all are the same."""
+    ensembles = [gf.ensemble(gf.pack(20, 0.3, 2, pressure=pressure)) for pressure in (1, 4096)]
+    small, large = (_results(S) for S in ensembles)
+    for name, one in small.items():
+        a = gf.to_dataset(one, ensembles[0], unit="mean")
+        b = gf.to_dataset(large[name], ensembles[1], unit="mean")
+        for variable in a.variables:
+            if a[variable].dtype.kind == "f" and variable not in ("gap", "residual", "violation"):
+                np.testing.assert_allclose(a[variable], b[variable], rtol=1e-6, atol=1e-6)
+        for attribute, value in a.attrs.items():
+            if isinstance(value, float) and "seconds" not in attribute:
+                assert b.attrs[attribute] == pytest.approx(value, rel=1e-6, abs=1e-6), (
+                    name,
+                    attribute,
+                )
+
+
 def test_an_outline_of_stresses_is_labelled_as_the_command_writes_it(cache, capsys):
     assert main("stress -n 30 --mu 0.3 --angles 5 --out s.csv".split()) == 0
     assert main("stress -n 30 --mu 0.3 --angles 5 --out s.zarr".split()) == 0
@@ -1048,6 +1083,10 @@ def test_wrong_arguments_are_named_with_what_to_give(tmp_path):
         gf.figures.save(3, tmp_path / "x.png")
     with pytest.raises(gf.InputError, match=r"drawn for bokeh, .* backend=\"matplotlib\""):
         gf.figures.save(gf.plot(S.packing), tmp_path / "x.png")
+    with pytest.raises(gf.InputError, match="needs several networks"):
+        gf.plot(S.packing, colour="spread")
+    with pytest.raises(gf.InputError, match=r"stored in a folder, such as s\.zarr"):
+        gf.scan(tmp_path / "s.csv", 0.3)
     with pytest.raises(gf.InputError, match=r"unit=\"mean\" changes nothing here"):
         gf.to_dataframe(gf.limit_loads(S), S, unit="mean")
     with pytest.raises(TypeError, match=r"^scan has no option 'N'; its options are seeds, n, .*dt"):

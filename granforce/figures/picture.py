@@ -82,6 +82,8 @@ def plot(
             "contacts=S.index with the networks of an ensemble S"
         )
     several = drawn.reshape(-1, len(shown), 2)
+    if isinstance(colour, str) and colour == "spread" and len(several) < 2:
+        raise InputError('colour="spread" needs several networks: give them as states')
     mean = several.mean(axis=0)
     if isinstance(colour, str) and colour in COLOURS[1:]:
         unit, scale = _unit(packing, mean)

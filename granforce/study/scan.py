@@ -54,6 +54,8 @@ LOOK, WORKERLESS, GIVEN_UP = 0.2, 5.0, 600.0
 
 CELL_BYTES = 2000  # of memory, per cell that is not yet computed
 
+NO_STORES = (".csv", ".json", ".npz")  # endings of files that a user expects instead
+
 TRIES = 3  # attempts at a cell whose worker died: the cell may be the cause
 
 # Work for workers: path of the store, cell, dtypes.
@@ -100,6 +102,11 @@ def scan(
     for one in (a for a, b in pairwise(sorted(mus)) if a == b):
         raise InputError(f"mu {one:g} is given twice; give it once")
     worker_count(workers)
+    if Path(path).suffix in NO_STORES:
+        raise InputError(
+            f"{path}: results are stored in a folder, such as {Path(path).stem}.zarr; the rows "
+            "that scan returns can be written as a table"
+        )
     check_memory(CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
     cells = [
         kinds.WALK.parameters(
