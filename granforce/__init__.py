@@ -6,6 +6,7 @@ A session: ``packing = gf.pack(400, mu=0.1, seed=1)``, ``S = gf.ensemble(packing
 ``granforce docs`` opens the reference of all names, with examples.
 """
 
+import difflib
 import importlib
 
 from granforce.system.compiled import find_a_place as _find_a_place
@@ -138,7 +139,9 @@ __all__ = list(_HOME)
 
 def __getattr__(name: str) -> object:
     if name not in _HOME:
-        raise AttributeError(f"module 'granforce' has no attribute {name!r}")
+        close = difflib.get_close_matches(name, _HOME, 1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise AttributeError(f"module 'granforce' has no attribute {name!r}{hint}")
     if not _HOME[name]:
         return importlib.import_module(f"granforce.{name}")
     return getattr(importlib.import_module(f"granforce.{_HOME[name]}"), name)

@@ -210,8 +210,9 @@ def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
     for name, words in dimensions.items():
         variable = _RENAMED.get(type(result).__name__, {}).get(name, name)
         attributes = {"units": _VARIABLE_UNITS[variable]} if variable in _VARIABLE_UNITS else {}
-        if variable in VARIABLES:
-            attributes["long_name"] = VARIABLES[variable].long_name
+        stored = "interval_gap" if variable == "gap" else variable  # `gap` is that of contacts
+        if stored in VARIABLES:
+            attributes["long_name"] = VARIABLES[stored].long_name
         variables[variable] = (words.split(), arrays[name], attributes)
     if used & {"contact", "grain"} and not isinstance(result, Packing):
         _check_ensemble(ensemble, result)

@@ -230,7 +230,9 @@ def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
     assert main("intervals p.npz --out bounds.csv".split()) == 0
     assert gf.read_known("bounds.csv").contacts.tolist() == S.index.tolist()
     assert main("intervals p.npz --out bounds.zarr".split()) == 0
-    assert set(xr.open_zarr("bounds.zarr").coords) == {"contact", "i", "j", "x", "y", "component"}
+    dataset, known = xr.open_zarr("bounds.zarr"), gf.to_dataset(gf.intervals(S), S)
+    assert set(dataset.coords) == set(known.coords) and dataset.attrs == known.attrs
+    assert set(dataset) == set(known) and dataset["gap"].attrs == known["gap"].attrs
 
 
 COMMANDS = {  # with lines that appear in this form only, and are explained all the same
@@ -617,7 +619,8 @@ def test_datasets_have_units_and_the_names_of_the_library(unit, units, cache, ca
         assert not main(words.split())
         dataset = xr.open_zarr(f"{command[:4]}.zarr")
         for values in dataset.data_vars.values():
-            assert values.attrs["units"] == ("1" if values.name == "cluster" else units)
+            fixed = {"cluster": "1", "gap": "mean normal force"}
+            assert values.attrs["units"] == fixed.get(values.name, units)
     low = xr.open_zarr("inte.zarr")["low"]
     assert low.dims == exact["low"].dims and np.allclose(low * scale, exact["low"], atol=1e-9)
     assert xr.open_zarr("limi.zarr")["limit_load"].dims == ("contact",)
@@ -1101,6 +1104,15 @@ def test_slips_in_python_are_answered_with_what_to_give(tmp_path):
         with pytest.raises(gf.InputError) as answer:
             slip()
         assert str(answer.value).startswith(said)
+    np.savez(tmp_path / "states.npz", **{"states [packing]": np.zeros((1, 2, 2))})
+    with pytest.raises(gf.InputError, match=r"states\.npz: these are networks; give the file of"):
+        gf.load_packing(tmp_path / "states.npz")
+    with pytest.raises(gf.InputError, match=r"nope\.npz: cannot be read .*; check the path$"):
+        gf.load_packing(tmp_path / "nope.npz")
+    with pytest.raises(
+        AttributeError, match=r"no attribute 'interval'; did you mean 'intervals'\?"
+    ):
+        gf.interval  # noqa: B018
     with pytest.raises(TypeError, match=r"^gauss_seidel has no option 'sweeps'; .*rest"):
         gf.gauss_seidel(S, S.original, sweeps=3)
 

@@ -28,10 +28,10 @@ _LABELS: dict[str, dict[str, str]] = {
 }
 
 
-def write_columns(path: str, columns: Mapping[str, Any]) -> None:
-    """Write columns {name: array} in the format given by the suffix."""
+def write_columns(path: str, columns: Mapping[str, Any], *more: xr.Dataset) -> None:
+    """Write columns {name: array} in the format given by the suffix; more: added to .zarr only."""
     if path.endswith(".zarr"):
-        save_series(_dataset(columns), path)
+        save_series(xr.merge([_dataset(columns), *more], combine_attrs="no_conflicts"), path)
     elif path.endswith(".npz"):
         _write_arrays(path, columns)
     else:

@@ -140,9 +140,14 @@ def intervals(arguments: argparse.Namespace) -> None:
     }
     columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
     columns |= {"cluster": cluster}
+    certificate = xr.Dataset(
+        {"gap": dataset["interval_gap"].variable},
+        {"side": ["low", "high"]},
+        {"max_gap": dataset["max_gap"].item(), "converged": int(certified.all())},
+    )
     with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
-            write_columns(arguments.out, columns)
+            write_columns(arguments.out, columns, certificate)
     _name_uncertified(left)
 
 

@@ -51,6 +51,8 @@ def load_packing(
     name = str(getattr(source, "name", "the given file")) if opened else path_text(source)
     arrays = _arrays(source, name, unpacked, most_grains)
     missing = [key for key in (*_GRAINS, *_CONTACTS) if key not in arrays]
+    if any(key.partition(" ")[0] == "states" for key in arrays):
+        raise InputError(f"{name}: these are networks; give the file of their packing")
     if missing or not ("L" in arrays or {"Lx", "Ly"} <= set(arrays)):
         missing = ", ".join([*missing, *([] if "L" in arrays else ["L (or Lx, Ly)"])])
         raise InputError(f"{name}: no array {missing}; is it a packing of granforce?")
@@ -153,7 +155,9 @@ def _opened(source: Source, name: str, unpacked: float) -> Iterator[Any]:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror or error})") from None
+        raise InputError(
+            f"{name}: cannot be read ({error.strerror or error}); check the path"
+        ) from None
     except Exception:
         # Reading a damaged archive may fail in zipfile, in zlib, or in numpy's header parser.
         raise InputError(

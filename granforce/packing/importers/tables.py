@@ -70,9 +70,9 @@ def read_table(
     equal normal forces at the pressure (by default 1; in an open set: under the loads) is computed.
     walls ("floor", "box" or segments) and gravity are for tables without forces, as in
     `from_disks`. most_grains: largest number of grains. InputWarnings, whose texts are also in
-    packing.info["notes"], report forces that do not balance, overlaps, and pairs
-    in doubt, which packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100
-    of the tolerance, and far above those of other contacts.
+    packing.info["notes"], report forces that do not balance, overlaps, and pairs in doubt, which
+    packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100 of the tolerance,
+    and far above those of other contacts.
 
     Raises InputError naming file and line, NotJammedError if no network exists.
     """
