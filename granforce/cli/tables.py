@@ -28,13 +28,10 @@ _LABELS: dict[str, dict[str, str]] = {
 }
 
 
-def write_columns(path: str, columns: Mapping[str, Any], more: xr.Dataset | None = None) -> None:
-    """Write columns {name: array} in the format given by the suffix; more: for a dataset only."""
+def write_columns(path: str, columns: Mapping[str, Any], *more: xr.Dataset) -> None:
+    """Write columns {name: array} in the format given by the suffix; more: added to .zarr only."""
     if path.endswith(".zarr"):
-        dataset = _dataset(columns)
-        save_series(
-            dataset if more is None else dataset.merge(more, combine_attrs="override"), path
-        )
+        save_series(xr.merge([_dataset(columns), *more], combine_attrs="no_conflicts"), path)
     elif path.endswith(".npz"):
         _write_arrays(path, columns)
     else:
