@@ -155,7 +155,7 @@ export class Scene {
   }
 
   drawWalls(context) {
-    const { walls } = this.geometry
+    const { walls = [] } = this.geometry // a moving packing has none
     context.lineWidth = 2 / this.scale
     context.strokeStyle = this.palette.strong
     for (let k = 0; k < walls.length; k += 4) line(context, walls.slice(k, k + 2), walls.slice(k + 2, k + 4))
