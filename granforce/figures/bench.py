@@ -37,7 +37,7 @@ def _relaxation(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
 
 def _scaling(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
-    words = {"title": "One relaxation, dependence on N", "x": "N", "y": "time / s"}
+    words = {"title": f"One relaxation, μ = {rows[0]['mu']:g}", "x": "N", "y": "time / s"}
     yield from _frame(series, backend, words, logx=True, logy=True)
 
 

@@ -148,7 +148,7 @@ def extents(
                 "legend": "top_right",
                 "ylim": (None, 20 * top),
             }  # above falling curves
-            room["title"] = f"{word}, tail ~ exp(−(λ ΔF_n)^b)"
+            room["title"] = f"{word}, b beyond upper quartile"
             frames.append(_densities(series, some, True, backend, **room, **axes))
     return style.page(frames, backend, columns=2)
 

@@ -22,13 +22,13 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
     """
     style.ready(backend)
     forces = [("critical_force", "critical force", "solid")]
-    title = "Critical force"
+    title, label = "Critical force", "⟨F_crit⟩ / ⟨f_n⟩"
     if limit:
-        title = "Critical force (solid), limit load (dashed)"
+        title, label = "Critical force (solid), limit load (dashed)", "mean force / ⟨f_n⟩"
         forces.append(("limit_load", "limit load", "dashed"))
     exponents = [("decay_exponent", "in order of μ", "solid")]
     panels = [
-        (forces, title, "⟨F_crit⟩ / ⟨f_n⟩"),
+        (forces, title, label),
         (exponents, "Decay of displacements", "α of |u| ~ r^−α"),
     ]
     looks = style.looks(sorted({row["mu"] for row in rows}))

@@ -76,7 +76,7 @@ def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bok
     inner: with the forces on all contacts outside an inner part fixed; larger: the same in packings
     of more disks, with their number n.
     """
-    sources = [("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed")]
+    sources = [("periodic", periodic, "solid"), ("frozen boundary", inner, "dashed")]
     if larger:
         sources.append((f"the same, N = {larger[0]['n']}", larger, "dotted"))
     names = (("undetermined_part", "undetermined fraction", 1.0), ("clusters", "clusters", 1.0))

@@ -1,7 +1,7 @@
 """The benchmark's tables in documents, between <!-- bench: PART --> and <!-- end -->."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -104,40 +104,13 @@ COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "compaction_growth": (("n", "mu", "seeds", "failed", "seconds", "slowest", "z", "h"),),
 }
 CONSTANT = ("n", "mu", "packings", "states", "unknowns")  # stated above a table if all rows agree
+USUAL = 400  # disks, of which a sentence says how long they take
 # Part → a column without which a row shows nothing.
 NEEDED = {"uniform": "seconds_per_state"}
-# Part → the column whose worst value is stated, and which value that is.
-WORST: dict[str, tuple[str, Callable[..., Any]]] = {
-    "interval_methods": ("error", max),
-    "relaxation": ("worst_residual", max),
-    "starts": ("differ", max),
-    "intervals": ("extent_part", min),
-    "inference": ("off", max),
-    "knowledge": ("off", max),
-    "frames": ("told", min),
-}
-SHARED = ("differ", "off")  # differences between methods, not errors of the row's own
-# Part → what ratios below 1 mean, and the column. In parts whose ratio is the time of a baseline
-# over that of the row, those rows are slower; in others the time of the row is over granforce's.
-SLOWER, FASTER = "Slower than the baseline", "Faster than granforce"
-RATIOS = {
-    "interval_methods": (SLOWER, "ratio"),
-    "relaxation": (SLOWER, "ratio"),
-    "starts": (SLOWER, "ratio_to_piqp"),
-    "pushes": (SLOWER, "ratio"),
-    "knowledge": (SLOWER, "ratio"),
-    "masonry": (SLOWER, "ratio"),
-    "skips": ("Slower with the shortcut", "ratio"),
-    "uniform": (FASTER, "ratio"),
-    "inference": (FASTER, "ratio"),
-}
-# Part → other ratios, and what they mean below 1.
-BELOW = {
-    "uniform": {
-        "two_cores": "Slower on two cores (ratio below 1)",
-        "null_space_ratio": "Null space cheaper than the set-up (ratio below 1)",
-    },
-}
+# Columns of ratios, and the parts in which the ratio is the time of the row over granforce's; in
+# others it is the time of a baseline over that of the row.
+RATIOS = "ratio", "ratio_to_piqp"
+OVER_GRANFORCE = "uniform", "inference"
 SPEED_UP, RELATIVE_TIME = "speed-up", "relative time"  # heads of these columns
 # Part → its section, for parts that are often not measured.
 SECTIONS = {
@@ -151,7 +124,6 @@ SECTIONS = {
     )
 }
 _WORDS = {"hit_and_run": "coordinate hit-and-run"}
-NAMES = ("solver", "method", "way", "skipped")  # columns that name a row
 
 
 def load(path: str) -> dict[str, Any]:
@@ -206,7 +178,6 @@ def _table(part: str, rows: Any) -> str:
             if row["n"] == "fit"
         ]
         rows = [*(row for row in rows if row["n"] != "fit"), *fitted]
-    remark = _below(part, rows) + _worst(part, rows)
     every = tuple(dict.fromkeys(name for row in rows for name in row))
     chosen = COLUMNS.get(part, (every,))
     constant = [
@@ -220,7 +191,19 @@ def _table(part: str, rows: Any) -> str:
         _columns(part, rows, [name for name in names if name not in constant]) for names in chosen
     ]
     above = f"In all rows, {above}.\n\n" if above else ""
-    return SECTIONS.get(part, "") + above + "\n".join(tables) + remark
+    below = _long(rows) if part == "growth" else ""
+    return SECTIONS.get(part, "") + above + "\n".join(tables) + below
+
+
+def _long(rows: Rows) -> str:
+    """How long a thousand relaxations and bounds take in packings of USUAL disks, in a sentence."""
+    for row in rows:
+        if row["n"] == USUAL:
+            seconds = (f"{1000 * row[name]:.1f} s" for name in ("relaxation", "bound"))
+            return "\nWith {} disks, 1000 relaxations take {} and 1000 bounds {}.\n".format(
+                USUAL, *seconds
+            )
+    return ""
 
 
 def _columns(part: str, rows: Rows, names: Sequence[str]) -> str:
@@ -235,8 +218,8 @@ def _columns(part: str, rows: Rows, names: Sequence[str]) -> str:
 
 
 def _head(part: str, name: str) -> str:
-    if part in RATIOS and name == RATIOS[part][1]:
-        return _ratio_head(part)
+    if name in RATIOS:
+        return RELATIVE_TIME if part in OVER_GRANFORCE else SPEED_UP
     return HEADS.get(name, name.replace("_", " "))
 
 
@@ -248,50 +231,6 @@ def _shown(row: Mapping[str, Any], name: str) -> str:
     if name == "reached" and "runs" in row:
         return f"{text} of {row['runs']}"
     return f"≥ {text}" if name == "ratio" and row.get("ratio_is_lower_bound") else text
-
-
-def _ratio_head(part: str) -> str:
-    return RELATIVE_TIME if RATIOS[part][0] == FASTER else SPEED_UP
-
-
-def _below(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """A paragraph for each ratio of the part, on the rows in which it is below 1, if any."""
-    ratios = dict(BELOW.get(part, {}))
-    if part in RATIOS:
-        words, column = RATIOS[part]
-        ratios = {column: f"{words} ({_ratio_head(part)} below 1)"} | ratios
-    text = ""
-    for column, words in ratios.items():
-        below = [row for row in rows if row.get(column) is not None and row[column] < 1]
-        places = [f"{_method(row)}{_place(row)} ({_cell(row[column])})" for row in below]
-        text += f"\n{words}: {'; '.join(places)}.\n" if places else ""
-    return text
-
-
-def _method(row: Mapping[str, Any]) -> str:
-    """The method of a row with a comma, or nothing."""
-    return next((f"{_cell(row[name])}, " for name in NAMES if name in row), "")
-
-
-def _worst(part: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """The row with the worst value of the part's most telling column, in a sentence."""
-    if part not in WORST:
-        return ""
-    column, worst = WORST[part]
-    known = [row for row in rows if row.get(column) is not None]
-    if not known:
-        return ""
-    row = worst(known, key=lambda row: row[column])
-    method = "" if column in SHARED else _method(row)
-    word = "Largest" if worst is max else "Lowest"
-    head = _head(part, column).removeprefix("largest ").removeprefix("worst ")
-    return f"\n{word} {head}: {_cell(row[column])} ({method}{_place(row)}).\n"
-
-
-def _place(row: Mapping[str, Any]) -> str:
-    words = {"n": "n = ", "mu": "μ = ", "packing": "", "task": "", "what": ""}
-    words |= {"sigma": "σ = ", "missed": "missed = ", "mu_over_true": "assumed/true μ = "}
-    return ", ".join(f"{word}{_cell(row[name])}" for name, word in words.items() if name in row)
 
 
 def _cell(value: Any) -> str:

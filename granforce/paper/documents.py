@@ -41,9 +41,17 @@ from granforce.paper.claims.outcomes import (
     decisive,
     score,
 )
-from granforce.paper.claims.verdicts import FEW
+from granforce.paper.claims.verdicts import FEW, UNMEASURED
 from granforce.paper.drawings import CAPTIONS, paper_sampler
-from granforce.paper.formatting import NOTHING, RAISED, listed, markdown_table, typeset, with_error
+from granforce.paper.formatting import (
+    NOTHING,
+    RAISED,
+    between,
+    listed,
+    markdown_table,
+    typeset,
+    with_error,
+)
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
@@ -75,6 +83,12 @@ _HEADS = {
     "uniform": "uniform",
     "exact": "exact",
     "": "packings alone",
+}
+# What variants of a claim differ in → how a list of them is written.
+_TOGETHER = {
+    r"η\d\(μ\)": "each of {}",
+    r"(?<=beyond the )(median|upper \w+)": "{}",
+    r"(?<=\()[Nμ] = [\d.]+(?=\)$)": "{}",
 }
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
@@ -348,7 +362,7 @@ def _excess(excess: float, length: float) -> str:
 
 
 def preparation(table: StudyTable) -> str:
-    """Dependence on the preparation: packings by how they are made, as a table, and a summary.
+    """Dependence on the preparation: a table for each μ of how packings are made, and a summary.
 
     In brackets: the difference from the default for the same seeds, in its own standard errors,
     bold if it is significant. z is left out, as it follows from h.
@@ -357,16 +371,18 @@ def preparation(table: StudyTable) -> str:
         ("h", "exact", "dimension"),
         ("φ", "exact", "packing_fraction"),
         ("exact η3", "exact", "eta3"),
-        ("η2", "walk", "eta2"),
+        (f"{_HEADS['nearest']} η2", "walk", "eta2"),
     )
     variants = [
         part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")
     ]
     variants = list(dict.fromkeys(variants))
-    lines: list[list[str]] = []
+    heads = ["options", "packings", *(head for head, *_ in columns)]
+    text = ""
     differences: list[tuple[str, _Apart]] = []
     for mu in sorted({row["mu"] for row in table.part(*variants)}):
         seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
+        lines: list[list[str]] = []
         for name in ("", *variants):
             parts = {"exact": f"{name}_exact" if name else "exact", "walk": name or "walk"}
             cells, counted = [], set()
@@ -377,20 +393,19 @@ def preparation(table: StudyTable) -> str:
                     if row["mu"] == mu and row["seed"] in seeds and measure in row
                 ]
                 counted.add(len(rows))
-                text = with_error(np.array([row[measure] for row in rows])) if rows else ""
+                cell = with_error(np.array([row[measure] for row in rows])) if rows else ""
                 if name and rows:
                     apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
                     if apart is not None:
                         differences.append((_word(name), apart))
-                        text += f" ({_difference(apart)})"
-                cells.append(text)
+                        cell += f" ({_difference(apart)})"
+                cells.append(cell)
             if counted != {0}:
-                lines.append([f"{mu:g}", _word(name), str(max(counted)), *cells])
-    heads = ["μ", "options", "packings", *(head for head, *_ in columns)]
-    text = markdown_table(heads, lines)
+                lines.append([_word(name), str(max(counted)), *cells])
+        text += f"**μ = {mu:g}**\n\n{markdown_table(heads, lines)}\n"
     if not differences:
         return text
-    return text + "\n" + _tested(differences) + _widest(table, variants)
+    return text + _tested(differences) + _widest(table, variants)
 
 
 def _word(variant: str) -> str:
@@ -430,7 +445,7 @@ def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
         return f"{text}: so few packings show no dependence on the options."
     counts = Counter(word for word, apart in differences if apart.p < level)
     ((most, times),) = counts.most_common(1)
-    return f"{text}, but chance would rarely make so many significant: {times} are for {most}."
+    return f"{text}, but chance would rarely produce {alone}. Of these, {times} belong to *{most}*."
 
 
 def _widest(table: StudyTable, variants: Sequence[str]) -> str:
@@ -525,9 +540,7 @@ def _number(finding: dict[str, Any]) -> str:
     """The value of a finding or claim with its interval, if it has one."""
     if not np.isfinite(finding["value"]):
         return ""
-    known = np.isfinite(finding["low"])
-    ends = f" ({finding['low']:.3g} … {finding['high']:.3g})" if known else ""
-    return f"{finding['value']:.3g}{ends}"
+    return between(finding["value"], finding["low"], finding["high"], "({} … {})", range(3, 7))
 
 
 def counts(table: StudyTable) -> str:
@@ -607,7 +620,10 @@ def verdict_counts(claims: Rows) -> str:
     heads = _used(claims)
     columns = [
         [claim["verdict"] for claim in decided(claims)],
-        *([c["verdict"] for c in claims if c["sampler"] == name] for name in heads),
+        *(
+            [c["verdict"] for c in claims if c["sampler"] == name and c["verdict"] != UNMEASURED]
+            for name in heads
+        ),
     ]
     lines = [
         [f"{symbol} {word}", *(str(verdicts.count(word)) for verdicts in columns)]
@@ -619,7 +635,10 @@ def verdict_counts(claims: Rows) -> str:
 
 
 def verdict_table(claims: Rows) -> str:
-    """The symbols of the verdicts on each claim, and by each sampler: a table for each outcome."""
+    """The symbols of the verdicts on each claim, and by each sampler: a table for each outcome.
+
+    Variants of a claim share a row; see `_TOGETHER`.
+    """
     heads = [name for name in _used(claims) if name]
     columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
     grouped: dict[str, list[list[str]]] = {}
@@ -633,8 +652,37 @@ def verdict_table(claims: Rows) -> str:
         rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]
         if rows:
             head = f"### {outcome[0].upper()}{outcome[1:]} ({len(rows)})"
-            parts.append(f"{head}\n\n{markdown_table(columns, rows)}")
+            parts.append(f"{head}\n\n{markdown_table(columns, _merged(rows))}")
     return "\n".join(parts)
+
+
+def _merged(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """The rows (statement, cells …) with variants of a statement in one, their cells in order.
+
+    Only rows with cells in the same columns share one.
+    """
+    groups: dict[Any, list[tuple[str, Sequence[str]]]] = {}
+    for statement, *cells in rows:
+        frame, variant = _variant(statement)
+        groups.setdefault((*frame, *map(bool, cells)), []).append((variant, cells))
+    merged = []
+    for (begin, form, end, *_), group in groups.items():
+        variants, cells = zip(*group, strict=True)
+        named = form.format(listed(variants)) if len(group) > 1 else variants[0]
+        joined = [
+            column[0] if len(set(column)) == 1 else " / ".join(column)
+            for column in zip(*cells, strict=True)
+        ]
+        merged.append([f"{begin}{named}{end}", *joined])
+    return merged
+
+
+def _variant(statement: str) -> tuple[tuple[str, str, str], str]:
+    """The text before a statement's variant, how several are written, the text after it; and it."""
+    for pattern, form in _TOGETHER.items():
+        if found := re.search(pattern, statement):
+            return (statement[: found.start()], form, statement[found.end() :]), found[0]
+    return (statement, "{}", ""), ""
 
 
 def _used(claims: Rows) -> list[str]:
@@ -665,8 +713,8 @@ def detail_table(claims: Rows) -> str:
     text = markdown_table(heads, rows)
     beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
     notes = [
-        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S, at μ = "
-        f"{listed(beyond[name].split(', '))}."
+        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S by more than "
+        f"the length of the exact intervals, at μ = {listed(beyond[name].split(', '))}."
         for name in _used(claims)
         if beyond.get(name)
     ]

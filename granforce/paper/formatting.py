@@ -19,15 +19,30 @@ def short(value: float) -> str:
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
-def between(value: float, low: float, high: float, ends: str = "({} to {})") -> str:
-    """A number with its interval, to as many digits as tell its ends apart, up to four."""
+def between(
+    value: float,
+    low: float,
+    high: float,
+    ends: str = "({} to {})",
+    digits: Sequence[int] = (2, 3, 4),
+) -> str:
+    """A number with its interval, to the first of some numbers of digits that shows both ends."""
     if not np.isfinite([low, high]).all():
-        return f"{value:.2g}"
-    for digits in (2, 3, 4):
-        texts = [f"{number:#.{digits}g}".rstrip(".") for number in (value, low, high)]
-        if len(set(texts)) == 3 or low == high:
+        return f"{value:.{digits[0]}g}"
+    if low == high:
+        return f"{value:.{digits[0]}g} (no scatter)"
+    numbers = value, low, high
+    known = len({f"{number:.9g}" for number in numbers})
+    for count in digits:
+        texts = [_to_digits(number, count) for number in numbers]
+        if len(set(texts)) == known:
             break
     return f"{texts[0]} {ends.format(*texts[1:])}"
+
+
+def _to_digits(number: float, digits: int) -> str:
+    """A number to this many digits, with zeros at its end; 0 as it is."""
+    return f"{number:#.{digits}g}".rstrip(".") if number else "0"
 
 
 def listed(words: Sequence[str]) -> str:

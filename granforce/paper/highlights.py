@@ -24,8 +24,12 @@ WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 # Friction at which packings are compared with those of the largest friction.
 USUAL = 0.1
 PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
-LATE_DRAG = "prepared_late_drag_exact"
-FEWEST = 5  # packings of a mean in brackets
+LATE_DRAG = "prepared_late_drag"
+LATER = (
+    "the last phase of the compaction, in which drag replaces inertia, begins a hundred times "
+    "closer to balance"
+)
+FEWEST = 5  # packings of such a mean
 LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
 STATES = ("nearest", "gauss_seidel", "uniform")
 
@@ -143,7 +147,8 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     }
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
-        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
+        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}."
+        f"{_later_eta2(of)}",
         "samplers",
         "measures",
     )
@@ -157,7 +162,7 @@ def _free_forces(of: _Numbers) -> Highlight:
     return Highlight(
         f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
         f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
-        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}{_later_drag(of, most)}.",
+        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.{_later_drag(of, most)}",
         "",
         "ensemble",
     )
@@ -165,12 +170,28 @@ def _free_forces(of: _Numbers) -> Highlight:
 
 def _later_drag(of: _Numbers, mu: float) -> str:
     """How many dimensions S has if inertia acts for longer, if the study knows; else nothing."""
-    late = statistics.grouped(of.table.part(LATE_DRAG), "dimension").get(mu)
+    late = statistics.grouped(of.table.part(f"{LATE_DRAG}_exact"), "dimension").get(mu)
     if late is None or len(late) < FEWEST:
         return ""
     return (
-        f"; the latter is {with_error(late)} if the last phase of the compaction, in which drag "
-        "replaces inertia, begins a hundred times closer to balance"
+        " The last number depends on how packings are brought to rest: it is "
+        f"{with_error(late)} if {LATER}."
+    )
+
+
+def _later_eta2(of: _Numbers) -> str:
+    """The largest mean η2 beyond intermediate μ if inertia acts for longer, if the study knows."""
+    late = statistics.grouped(of.table.part(LATE_DRAG), "eta2")
+    known = {mu: eta for mu, eta in late.items() if mu > MIDDLE[1] and len(eta) >= FEWEST}
+    if not known:
+        return ""
+    mu = max(known, key=lambda mu: known[mu].mean())
+    usual = statistics.grouped(of.table.part(SAMPLERS["nearest"]), "eta2")
+    most = max(usual.values(), key=np.mean)
+    return (
+        f" The fall depends on how packings are brought to rest: if {LATER}, η2 of "
+        f"{WORDS['nearest']} at μ = {mu:g} is {with_error(known[mu])} (its maximum with the usual "
+        f"options is {with_error(most)})."
     )
 
 

@@ -44,8 +44,9 @@ def test_the_benchmark_has_a_frame_for_each_part_with_enough_points():
             *(("exact", 4, 1.0), ("walk", 9, 0.5), ("walk", 1, 0.3), ("walk", 4, 0.4)),
         )
     ]
-    sizes = [{"n": n, "solver": "ours", "seconds": n / 100} for n in (100, 200, 400)]
-    results = {"intervals": rows, "scaling": [*sizes, {"n": "fit", "solver": "ours"}]}
+    ours = {"mu": 0.1, "solver": "ours"}
+    sizes = [{"n": n, **ours, "seconds": n / 100} for n in (100, 200, 400)]
+    results = {"intervals": rows, "scaling": [*sizes, {"n": "fit", **ours}]}
     results["uniform"] = [{"h": 60, "method": "billiard", "seconds_per_state": 1e-4}]  # one point
     figure = figures.benchmark(results)
     scaling, first, second = (curves(frame) for frame in frames(figure))
@@ -59,7 +60,8 @@ def test_pages_need_no_network(tmp_path):
     path = tmp_path / "figure.html"
     code = (
         "from granforce import figures\n"
-        "rows = [{'n': n, 'solver': 'ours', 'seconds': n / 100} for n in (100, 200, 400)]\n"
+        "ours = {'mu': 0.1, 'solver': 'ours'}\n"
+        "rows = [{'n': n, **ours, 'seconds': n / 100} for n in (100, 200, 400)]\n"
         f"figures.save(figures.benchmark({{'scaling': rows}}), {str(path)!r})\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -266,8 +268,8 @@ def test_variations_show_what_the_rows_hold():
     np.testing.assert_allclose(curves(eta2)["made at μ"], ([0.1], [10]))
     inner = [{"mu": 0.1, "undetermined_part": 0.0, "clusters": 3}]
     part, clusters = frames(figures.frozen([], inner))
-    np.testing.assert_allclose(curves(part)["frozen surroundings"], ([0.1], [0]))
-    np.testing.assert_allclose(curves(clusters)["frozen surroundings"], ([0.1], [3]))
+    np.testing.assert_allclose(curves(part)["frozen boundary"], ([0.1], [0]))
+    np.testing.assert_allclose(curves(clusters)["frozen boundary"], ([0.1], [3]))
     larger = [{"mu": 1, "n": 80, "undetermined_part": 0.5, "clusters": 2}]
     part, _ = frames(figures.frozen([], inner, larger))
     np.testing.assert_allclose(curves(part)["the same, N = 80"], ([1], [0.5]))

@@ -18,7 +18,7 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
-from granforce.paper import claims, documents, drawings, filled, findings, tables
+from granforce.paper import claims, documents, drawings, filled, findings, formatting, tables
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, outcomes, verdicts
 from granforce.records import InputError
@@ -378,7 +378,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
-    names += ("claims", "findings", "score", "verdicts", "certificates")
+    names += ("claims", "details", "findings", "score", "headlines", "verdicts", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = filled.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
@@ -455,10 +455,11 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
 def test_what_packings_depend_on_is_told_in_standard_errors(table):
     text = documents.preparation(table)
     lines = {
-        line.split("|")[2].strip(): [cell.strip() for cell in line.split("|")[3:-1]]
+        line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]]
         for line in text.splitlines()
-        if line.startswith("| 0.1 |")
+        if line.startswith("| ") and "---" not in line and "options" not in line
     }
+    assert text.startswith("**μ = 0.1**\n\n| options | packings |")
     assert len(lines) == 1 + len(plans.variations(0.1)) and "default" in lines
     some, usual = (
         np.array([row["dimension"] for row in table.part(part, n=20) if row["mu"] == 0.1])
@@ -488,7 +489,7 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     ]
     rows += [row | {"part": row["part"].removesuffix("_exact")} for row in rows[3:]]
     text = documents.preparation(tables.StudyTable({"n": 20}, rows, {}, [], {}, {}))
-    cells = {line.split("|")[2].strip(): line.split("|")[4] for line in text.splitlines()[2:6]}
+    cells = {line.split("|")[1].strip(): line.split("|")[3] for line in text.splitlines()[4:8]}
     assert cells["few"].endswith("(+3.7) ") and cells["same"].endswith("(no scatter) ")
     assert "(**+" in cells["far"]
     summary = text.splitlines()[-1]
@@ -529,7 +530,44 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
     assert counted["✓ reproduced"] == [1, 1, 1, 1, 0] and "? undecided" not in counted
     assert counted["✗✗ strongly contradicted"] == [1, 0, 0, 1, 0]
-    assert counted["all"] == [4, 3, 1, 3, 1]
+    # The paper's walk decides as many claims as it has judged.
+    assert "– not measured" not in counted and counted["all"] == [4, 2, 1, 3, 1]
+
+
+def test_variants_of_a_claim_share_a_row():
+    """Their verdicts are those of each, in order, where they differ."""
+    judged = [
+        {"statement": statement, "source": "PRE", "criterion": "≥ 0", "sampler": sampler}
+        | {"verdict": verdict, "value": 1.0}
+        for sampler in ("gauss_seidel", "nearest")
+        for statement, verdict in (
+            ("tail beyond the median: exponential", verdicts.UNDECIDED),
+            ("η1(μ) is largest near μ = 0.1", verdicts.UNDECIDED),
+            ("η2(μ) is largest near μ = 0.1", verdicts.UNDECIDED),
+            ("tail beyond the upper decile: exponential", verdicts.FEW),
+        )
+    ]
+    head, _, *lines = documents.verdict_table(judged).splitlines()
+    rows = [line.strip("| ").split(" | ") for line in lines[2:]]
+    assert head == "### Open (4)"
+    assert rows == [
+        ["tail beyond the median and upper decile: exponential", "PRE", *3 * ["? / …"]],
+        ["each of η1(μ) and η2(μ) is largest near μ = 0.1", "PRE", *3 * ["?"]],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [
+        ((3.9947, 3.99468, 3.99473), "3.99470 (3.99468 … 3.99473)"),
+        ((2.05, 2.0, 2.114), "2.05 (2.00 … 2.11)"),
+        ((1.0, 1.0, 1.0), "1 (no scatter)"),
+        ((1.0, 0.68, 1.0), "1.00 (0.680 … 1.00)"),
+        ((0.1, 0.0, 0.121), "0.100 (0 … 0.121)"),
+    ],
+)
+def test_an_interval_has_enough_digits_to_show_its_ends(numbers, told):
+    assert formatting.between(*numbers, "({} … {})", range(3, 7)) == told
 
 
 def test_versions_are_not_mixed(done, table, tmp_path, capsys):
