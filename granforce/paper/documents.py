@@ -41,7 +41,7 @@ from granforce.paper.claims.outcomes import (
     decisive,
     score,
 )
-from granforce.paper.claims.verdicts import FEW, UNMEASURED
+from granforce.paper.claims.verdicts import FEW, MISSING, UNMEASURED
 from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import (
     NOTHING,
@@ -686,8 +686,8 @@ def _variant(statement: str) -> tuple[tuple[str, str, str], str]:
 
 
 def _used(claims: Rows) -> list[str]:
-    """The samplers with any number, in the order of columns."""
-    known = {claim["sampler"] for claim in claims if np.isfinite(claim["value"])}
+    """The samplers by which any claim is judged, in the order of columns."""
+    known = {claim["sampler"] for claim in claims if claim["verdict"] not in (FEW, MISSING, UNMEASURED)}
     return [name for name in _HEADS if name in known]
 
 
