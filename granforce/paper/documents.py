@@ -687,7 +687,9 @@ def _variant(statement: str) -> tuple[tuple[str, str, str], str]:
 
 def _used(claims: Rows) -> list[str]:
     """The samplers by which any claim is judged, in the order of columns."""
-    known = {claim["sampler"] for claim in claims if claim["verdict"] not in (FEW, MISSING, UNMEASURED)}
+    known = {
+        claim["sampler"] for claim in claims if claim["verdict"] not in (FEW, MISSING, UNMEASURED)
+    }
     return [name for name in _HEADS if name in known]
 
 

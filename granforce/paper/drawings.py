@@ -17,6 +17,9 @@ SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions shown in Figure 4, if 
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
 BIN = 0.25  # of P(ΔF_n), ⟨f_n⟩
 
+# Least packings of a curve among others, as a fraction of the most: fewer hide what all show.
+ENOUGH = 0.2
+
 FORMATS = ("html", "png", "svg")
 
 _POINTS = "points are means over packings, bars standard errors"
@@ -193,7 +196,9 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, drawings = SAMPLERS[paper_sampler(table)], {}
     sources = {_DRAWN.get(name, name): drawn(table, name) for name in SAMPLERS}
-    sources = {name: rows for name, rows in sources.items() if rows}
+    packings = {name: len({row["seed"] for row in rows}) for name, rows in sources.items()}
+    enough = max(1, ENOUGH * max(packings.values()))
+    sources = {name: rows for name, rows in sources.items() if packings[name] >= enough}
     if len(sources) > 1:
         drawings["samplers"] = _later(figures.samplers, sources)
     efforts = {words: table.part(p) for p, words in _SWEPT.items() if table.part(p)}
