@@ -149,8 +149,8 @@ def _doubts(r_hat: float, size: float, least: float) -> Iterator[str]:
         yield f"not mixed: R̂ = {r_hat:.2f}, more than {MIXED:g}; ask for more networks"
     if size < least:
         yield (
-            f"worth {size:.0f} independent networks, fewer than {least:g}: errors are larger than "
-            "stated"
+            f"worth {size:.0f} independent networks, fewer than the {least:g} that reliable errors "
+            "need"
         )
 
 

@@ -137,7 +137,7 @@ CLAIMS = """
 /* Instead of columns that do not fit: the claim, and below it what each sampler gives. */
 @container (max-width: 620px) {
   .judged :is(table, tbody, tr, tr td:nth-child(n)) { display: block; width: auto; }
-  .judged tr:first-child, .judged tr td:empty:nth-child(n) { display: none; }
+  .judged tr:first-child:nth-child(n), .judged tr td:empty:nth-child(n) { display: none; }
   .judged tr { padding: 4px 0; border-top: 1px solid rgba(128, 128, 128, 0.35); }
   .judged tr td { border: 0; padding: 1px 0; }
   .judged tr td[data-by]:nth-child(n) { display: flex; gap: 8px; }

@@ -105,8 +105,8 @@ class BarsFigure:
         rows = GIVEN if before else FREE
         self.tip.tooltips = [row for row in rows if replay.given or row is not PACKED]
         set_range(self.figure.x_range, 0, len(contacts) + 1)
-        highest = np.fmax.reduce([scaled[name] for name in ("whole_high", "exact_high", "high")])
-        highest = np.where(np.isinf(highest), np.nan, highest)  # without an upper bound
+        ends = [scaled[name] for name in ("whole_high", "exact_high", "high")]
+        highest = np.fmax.reduce([np.where(np.isinf(end), np.nan, end) for end in ends])
         counted = original >= CARRYING if relative else np.ones(len(original), dtype=bool)
         top = 1.04 * float(np.nanmax(highest[counted], initial=1.0))
         set_range(self.figure.y_range, 0, top)

@@ -5,7 +5,7 @@ import { named, unsigned } from "../../../packing/drawing/chain_style.js"
 
 const ROWS = 200 // of a page
 const AGAIN_MS = 250 // between two updates during motion
-const NUMBER = (value) => (Number.isFinite(value) ? unsigned(value.toFixed(3)) : "–")
+const NUMBER = (value) => value === Infinity ? "∞" : Number.isFinite(value) ? unsigned(value.toFixed(3)) : "–"
 const interval = (of) => [
   ["least", (on, c) => on[of].low?.[c], NUMBER],
   ["largest", (on, c) => on[of].high?.[c], NUMBER],

@@ -48,8 +48,8 @@ class View(TabView):
         self.growth = GrowthFigure()
         # Whose growth is drawn, and with which exact 0.15 η3.
         self._grown: tuple[Replay | None, float | None] = (None, None)
-        # Whether bars are exact, and how many extend beyond the axis.
-        self._drawn: tuple[bool, int] | None = None
+        # Whether bars are exact, how many extend beyond the axis, and how many have no upper end.
+        self._drawn: tuple[bool, int, int] | None = None
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 208})
         self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
@@ -111,7 +111,8 @@ class View(TabView):
         )
         for select, labels in ((self.sorts, SORTS), (self.units, SCALES)):
             select.options = by_words({key: worded(replay, name) for key, name in labels.items()})
-        self._drawn = bool(exact), beyond
+        endless = int(np.isinf(exact["high"]).sum()) if exact else 0
+        self._drawn = bool(exact), beyond, endless
         self._explain()
         eta3 = None if state.growing else _exact_eta3(state.exact)
         if replay is not self._grown[0] or eta3 != self._grown[1]:
@@ -132,7 +133,9 @@ class View(TabView):
         self.exact.visible = self.state.replay is not None and self.state.exact_requested
 
 
-def sentence(state: AppState, replay: Replay, exact: bool, beyond: int = 0) -> str:
+def sentence(
+    state: AppState, replay: Replay, exact: bool, beyond: int = 0, endless: int = 0
+) -> str:
     """The present meaning of pale, dark and dots, as HTML."""
     if not replay.summary["dimension"]:
         return worded(replay, HEADING + FIXED)
@@ -153,6 +156,8 @@ def sentence(state: AppState, replay: Replay, exact: bool, beyond: int = 0) -> s
     text = worded(replay, HEADING) + "".join(f"{part}. " for part in parts)
     if beyond:
         text += f"Bars of contacts that carry almost nothing extend beyond the axis: {beyond}. "
+    if endless:
+        text += f"Pale bars up to the upper edge have no upper end: {endless}. "
     return text + "Drag a dot, or a line in the packing."
 
 
