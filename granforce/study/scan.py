@@ -92,8 +92,8 @@ def scan(
 
     Returns a list of rows, as `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed,
     packing_fraction, coordination, dimension h, eta1, eta2, eta3, …), and a list of (walk
-    parameters, error message). Raises InputError for wrong arguments. Workers are new processes:
-    in a script, which must be a file, call it under ``if __name__ == "__main__":``.
+    parameters, error message). Raises InputError for wrong arguments. Two and more workers are new
+    processes: in a script, which must be a file, call it under ``if __name__ == "__main__":``.
     """
     refuse_options(scan, packing, [*signature(kinds.PACKING.parameters).parameters][3:])
     seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()

@@ -183,7 +183,7 @@ def check_contacts(
         state = "overlap" if gap[c] < 0 else "are apart"
         raise InputError(
             f"{place(c)}: {_pair(i, j, c)} {state} by {abs(gap[c]):.3g}, more than "
-            f"{allowed:.0%} of a radius; check positions, radii and box"
+            f"{allowed:.0%} of a radius; check numbers, positions, radii and box"
         )
     if twice := repeated(contacts):
         before, c = twice
