@@ -429,7 +429,7 @@ def test_a_refused_upload_changes_nothing(state):
     drop(view.dropper, [("p.npz", npz(packed(30, 0.3))[:-80])])
     wait_for(state)
     assert view.error.visible and "NPZ archive" in view.error.title
-    assert state.replay is before and not state.library.cache.find("packing")
+    assert state.replay is before and not state.library.cache.exists
 
 
 def test_more_than_allowed_is_not_collected(state):
