@@ -298,34 +298,40 @@ def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
 
 
 def sweeps(table: StudyTable) -> str:
-    """The paper's walk by its final residual: results and excess over S, as a table with an intro.
+    """The paper's walk by its final residual: a table with an intro.
 
-    Excess: how far the intervals of states exceed the exact ones, over the length of those, as
-    means over packings.
+    Sweeps per network; excess: how far the intervals of states exceed the exact ones, over the
+    length of those, as means over packings; η2 over that of the nearest-network walk.
     """
-    known_parts = [part for part in plans.SWEEPS if table.part(part)]
-    heads = ["residual", "μ", "packings", "sweeps per network", "excess", "η2"]
-    heads += ["relative to the nearest-network walk"]
-    # For a single residual, other tables have η2.
-    shown = slice(None) if len(known_parts) > 1 else slice(1, 5)
-    lines = []
-    for part in known_parts:
-        known, beyond = excesses(table, part), outside(table, part)
-        ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
-        for mu, rows in _by_friction(table.part(part)).items():
-            compared = [row for row in ratios if row["mu"] == mu]
-            eta = [
-                _OUTSIDE if mu in beyond else _cell(some, name, 1.0, None, len(rows))
-                for some, name in ((rows, "eta2"), (compared, "ratio"))
-            ]
-            cells = [
-                *(_power(plans.SWEEPS[part]), f"{mu:g}", str(len(rows))),
-                _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
-                _excess(*known[mu]) if mu in known else "",
-                *eta,
-            ]
-            lines.append(cells[shown])
-    return f"{_swept(table)}\n{markdown_table(heads[shown], lines)}"
+    swept = [part for part in plans.SWEEPS if table.part(part)]
+    if not swept:
+        return _swept(table)
+    columns: list[tuple[str, dict[float, str]]] = []
+    for part in swept:
+        columns.append((f"sweeps to {_power(plans.SWEEPS[part])}", _sweeps_of(table, part)))
+    known = excesses(table, swept[0])
+    excess = {mu: _excess(*pair) for mu, pair in known.items()}
+    columns.append((f"excess, {_power(plans.SWEEPS[swept[0]])}", excess))
+    if len(swept) > 1:  # for a single residual, other tables have η2
+        for part in swept:
+            columns.append((f"η2, {_power(plans.SWEEPS[part])}", _eta2_over_nearest(table, part)))
+    frictions = sorted({row["mu"] for row in table.part(*swept)})
+    lines = [[f"{mu:g}", *(cells.get(mu, "") for _, cells in columns)] for mu in frictions]
+    return f"{_swept(table)}\n{markdown_table(['μ', *(head for head, _ in columns)], lines)}"
+
+
+def _sweeps_of(table: StudyTable, part: str) -> dict[float, str]:
+    """{μ: sweeps per network}."""
+    every = _by_friction(table.part(part))
+    return {mu: _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)) for mu, rows in every.items()}
+
+
+def _eta2_over_nearest(table: StudyTable, part: str) -> dict[float, str]:
+    """{μ: η2 over that of the nearest-network walk in the same packings}."""
+    beyond = outside(table, part)
+    ratios = _by_friction(_over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2"))
+    cells = {mu: _cell(rows, "ratio", 1.0, None, len(rows)) for mu, rows in ratios.items()}
+    return cells | dict.fromkeys(beyond, _OUTSIDE)
 
 
 def _swept(table: StudyTable) -> str:
@@ -335,6 +341,13 @@ def _swept(table: StudyTable) -> str:
         return "No walk by sweeps is part of this study.\n"
     text = f"In this study, sweeps end at {listed(words)} ⟨f_n⟩. "
     rows = table.part(*plans.SWEEPS)
+    if len(words) > 1:
+        most = [
+            max(len(some) for some in _by_friction(table.part(part)).values())
+            for part in plans.SWEEPS
+            if table.part(part)
+        ]
+        text += f"At each μ, there are up to {listed([str(count) for count in most])} packings. "
     least = min(row["reached_part"] for row in rows)
     if least >= 1:
         return (
@@ -345,7 +358,7 @@ def _swept(table: StudyTable) -> str:
     return (
         text + "Some walks have fewer networks than requested, at μ = "
         f"{listed([f'{mu:g}' for mu in where])}; "
-        f"a walk is judged if it has at least the fraction {WHOLE_WALK:g} of them.\n"
+        f"a walk is judged only if it has at least {100 * WHOLE_WALK:g} % of them.\n"
     )
 
 
@@ -445,7 +458,9 @@ def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
         return f"{text}: so few packings show no dependence on the options."
     counts = Counter(word for word, apart in differences if apart.p < level)
     ((most, times),) = counts.most_common(1)
-    return f"{text}, but chance would rarely produce {alone}. Of these, {times} belong to *{most}*."
+    return (
+        f"{text}. The differences are not independent. Of the {alone}, {times} belong to *{most}*."
+    )
 
 
 def _widest(table: StudyTable, variants: Sequence[str]) -> str:
@@ -467,8 +482,8 @@ def _widest(table: StudyTable, variants: Sequence[str]) -> str:
     mu = max(spans, key=lambda mu: spans[mu][1] / spans[mu][0])
     tested = listed([f"{mu:g}" for mu in spans])
     return (
-        f" Between options, the mean h varies most at μ = {mu:g}, from {spans[mu][0]:.2g} to "
-        f"{spans[mu][1]:.2g}. Options were varied only at μ = {tested}.\n"
+        f" Relative to its size, the mean h varies most between options at μ = {mu:g}, from "
+        f"{spans[mu][0]:.2g} to {spans[mu][1]:.2g}. Options were varied only at μ = {tested}.\n"
     )
 
 
@@ -491,7 +506,8 @@ def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     verdicts = {claim["statement"]: claim["verdict"] for claim in decided(claims)}
     named = [name for name in NAMED if verdicts.get(name) in OUTCOMES["contradicted"]]
     if named:
-        chosen.append(f"Contradicted claims include: {'; '.join(named).replace(': ', ', ')}.")
+        quoted = "; ".join(f"“{name.replace(': ', ', ')}”" for name in named)
+        chosen.append(f"The study contradicts, among others, these claims: {quoted}.")
     return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
 
 

@@ -43,14 +43,14 @@ CAPTIONS = {
     "networks of the random walk ({walk}) has which ratio, for several friction "
     "coefficients μ; every contact, from weak to strong. The ordinate is cut at 3; "
     "titles count the contacts that reach beyond.",
-    "figure4": "Distribution of the extent ΔF_n of normal forces, in units of ⟨f_n⟩, that the "
-    f"random walk ({{walk}}) has seen, {_TAILS}.",
-    "figure5": "Contacts with f_n > 2⟨f_n⟩ over those with ΔF_n > ⟨ΔF_n⟩ ({walk}); grey, all "
-    "contacts. Lengths are in largest radii.",
-    "figure6": "Correlation over contacts of the original f_n with its extent ΔF_n against the "
-    "friction coefficient μ ({walk}); bars reach from the least to the largest with any other "
-    "network of the walk in place of the original network; dotted, two standard deviations of what "
-    "as many packings with shuffled forces give.",
+    "figure4": "Distribution of ΔF_n/⟨f_n⟩, with ΔF_n the interval of a normal force seen by the "
+    f"random walk ({{walk}}): {_TAILS}.",
+    "figure5": "Contacts with f_n > 2⟨f_n⟩, drawn on top of those with ΔF_n > ⟨ΔF_n⟩ ({walk}); "
+    "grey, all contacts. Lengths are in largest radii.",
+    "figure6": "Correlation, over the contacts of a packing, between f_n in the original network "
+    "and ΔF_n, against the friction coefficient μ ({walk}). Bars: range of this correlation if f_n "
+    "is taken from any other network of the walk. Dotted: ± two standard deviations of its mean "
+    "for shuffled forces and as many packings.",
     "samplers": "Indeterminacy η1, η2 and 0.15 η3 of networks drawn in several ways, against the "
     f"friction coefficient μ; {_POINTS}.",
     "effort": "Acceptance rate of the attempts, and sweeps per accepted network, of walks by "

@@ -439,9 +439,13 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
 
 def test_sweeps_tell_how_far_outside_of_s_they_end(table):
     text = documents.sweeps(table)
-    first, *others = [line for line in text.splitlines() if line.startswith("| 10⁻³ |")]
-    assert "| all | outside S | outside S |" in first  # μ = 0
+    heads, _, first, *others = [line for line in text.splitlines() if line.startswith("| ")]
+    assert heads.startswith("| μ | sweeps to 10⁻³ | sweeps to 10⁻⁴ |")
+    assert heads.endswith("| excess, 10⁻³ | η2, 10⁻³ | η2, 10⁻⁴ | η2, 10⁻⁶ |")
+    assert first.startswith("| 0 | ") and "| all | outside S |" in first
     assert all("outside" not in line for line in others)
+    only = [row for row in table.rows if row["part"] not in ("sweeps_1e-4", "sweeps_1e-6")]
+    assert "| μ | sweeps to 10⁻³ | excess, 10⁻³ |" in documents.sweeps(table._replace(rows=only))
     for row, exact in zip(table.part("sweeps_1e-3"), table.part("exact"), strict=False):
         row, exact = row | {"part": "sweeps_1e-4"}, exact | {"mean_length": 2.0}
         for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "1.1"), (1e-9, "< 0.001")):
