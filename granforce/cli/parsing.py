@@ -111,6 +111,7 @@ _ARGUMENTS = {
     "the number of random contacts": "random",
     "the number of states kept": "keep",
     "effective sample size": "effective",
+    "k": "best",  # of `informative`
 }
 # Options that a useless one may be mistaken for, as attributes.
 _INSTEAD = {"mu": "ensemble_mu"}
