@@ -207,8 +207,11 @@ def run(
         if scheduler is None:
             store.make()
             waits = Waits(needs, failed)
-            over = _one_after_another if worker_count(workers) == 1 else _over_processes
-            over(tasks, waits, workers, finished, tell, enough or (lambda: False))
+            calls = _Calls(finished, tell, enough or (lambda: False))
+            if worker_count(workers) == 1:
+                _one_after_another(tasks, waits, calls)
+            else:
+                _over_processes(tasks, waits, workers, calls)
         else:
             with _client_of(scheduler) as client:
                 store.make()  # only once a scheduler has answered
@@ -266,22 +269,23 @@ def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
     return tell
 
 
-def _one_after_another(
-    tasks: Tasks,
-    waits: Waits,
-    workers: int,
-    finished: Callable[[int, Callable[[], bool]], object],
-    advanced: Callable[[float], object],
-    enough: Callable[[], bool],
-) -> None:
+class _Calls(NamedTuple):
+    """What running cells calls."""
+
+    finished: Callable[[int, Callable[[], bool]], object]  # a cell, and whether it was stored
+    advanced: Callable[[float], object]  # the number of cells that are done, and parts of them
+    enough: Callable[[], bool]  # whether to start no further cell
+
+
+def _one_after_another(tasks: Tasks, waits: Waits, calls: _Calls) -> None:
     """Run tasks in this process, which needs no script that workers could import."""
     left = dict(tasks)
-    while left and not enough():
+    while left and not calls.enough():
         k = waits.ready(list(left), left)
         assert k is not None  # a packing waits for nothing
         if not waits.lost(k):
-            tell = _from(len(tasks) - len(left), advanced)
-            finished(k, partial(run_cell, *tasks[k], advanced=tell))
+            tell = _from(len(tasks) - len(left), calls.advanced)
+            calls.finished(k, partial(run_cell, *tasks[k], advanced=tell))
         del left[k]
 
 
@@ -289,14 +293,7 @@ def _from(before: int, advanced: Callable[[float], object]) -> Callable[[float],
     return lambda part: advanced(before + part)
 
 
-def _over_processes(
-    tasks: Tasks,
-    waits: Waits,
-    workers: int,
-    finished: Callable[[int, Callable[[], bool]], object],
-    advanced: Callable[[float], object],
-    enough: Callable[[], bool],
-) -> None:
+def _over_processes(tasks: Tasks, waits: Waits, workers: int, calls: _Calls) -> None:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # in a worker that imports a script without a guard: its parent says so
     with cancelling.watched():  # the compiler cannot be interrupted
@@ -304,26 +301,18 @@ def _over_processes(
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
-        tasks = _one_pool(tasks, waits, workers, finished, advanced, before, enough)
-        if not tasks or enough():
+        tasks = _one_pool(tasks, waits, workers, calls, before)
+        if not tasks or calls.enough():
             return
     for k in tasks:
-        finished(k, _lost)
+        calls.finished(k, _lost)
 
 
 def _lost() -> NoReturn:
     raise InputError(f"worker processes died {TRIES} times while computing this cell or others")
 
 
-def _one_pool(
-    tasks: Tasks,
-    waits: Waits,
-    workers: int,
-    finished: Callable[[int, Callable[[], bool]], object],
-    advanced: Callable[[float], object],
-    before: int,
-    enough: Callable[[], bool],
-) -> Tasks:
+def _one_pool(tasks: Tasks, waits: Waits, workers: int, calls: _Calls, before: int) -> Tasks:
     """Run tasks in processes, `before` of which have ended; return those left by a dead worker."""
     context = multiprocessing.get_context("spawn")
     counter = context.Value("d", _NONE_BEGAN)
@@ -334,7 +323,7 @@ def _one_pool(
     try:
         while True:
             # One for each worker: the pool would start every task it was given.
-            while len(waiting) < workers and not broken and not enough():
+            while len(waiting) < workers and not broken and not calls.enough():
                 k = waits.ready(todo, left)
                 if k is None:
                     break
@@ -355,9 +344,9 @@ def _one_pool(
                 if isinstance(future.exception(), BrokenProcessPool):
                     broken = True
                 else:
-                    finished(k, future.result)
+                    calls.finished(k, future.result)
                     del left[k]
-            advanced(before + max(0.0, counter.value))
+            calls.advanced(before + max(0.0, counter.value))
         if broken and counter.value == _NONE_BEGAN:
             raise InputError(
                 "worker processes ended before they began: use workers=1, or call this in a script "

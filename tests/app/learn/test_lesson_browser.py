@@ -74,7 +74,7 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
         question.wait_for()
         assert len(page.locator("article > p").first.inner_text().split()) <= WORDS, name
         found = page.get_by_text(re.compile(r"^It is "))
-        expect(found).to_have_count(0)  # nothing is told before
+        expect(found).to_have_count(0)  # no answer is shown before
         expect(page.get_by_role("button", name="That is my prediction")).to_be_disabled()
         predict(page)
         page.locator(".voice p").filter(has_text="Drag the dot").wait_for()
