@@ -31,6 +31,7 @@ GUIDES = [".github/CONTRIBUTING.md", "tests/README.md", "CHANGELOG.md"]  # comma
 RESULTS = [
     "README.md",
     "granforce/docs/pages/results.md",
+    "granforce/docs/pages/claims.md",
     "granforce/docs/pages/results-in-detail.md",
 ]
 LAMMPS = ROOT / "tests" / "lammps" / "lammps_n400_mu0.3"

@@ -3,12 +3,12 @@
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
 against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
 "score" (how many claims are reproduced, in a sentence), "highlights" (findings, one sentence each),
-"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims" (the
-verdict on each claim), "details" (the numbers behind them), "findings" (numbers beyond the claims),
-"sweeps" (the residual of the paper's walk, and its excess over S), "preparation" (how results
-depend on the packing), "figures" (some of the paper's figures, with captions), "counts" (number of
-packings of each kind of result), "certificates" (largest gap of the exact bounds, convergence of
-uniform samples).
+"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims"
+(each claim with its verdict and the number behind it), "disagreements" (claims on which other
+networks give another verdict), "findings" (numbers beyond the claims), "sweeps" (the residual of
+the paper's walk, and its excess over S), "preparation" (how results depend on the packing),
+"figures" (the paper's figures, with captions), "counts" (number of packings of each kind of
+result), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
 import re
@@ -38,7 +38,6 @@ from granforce.paper.claims.outcomes import (
     SYMBOLS,
     by_claim,
     decided,
-    decisive,
     score,
 )
 from granforce.paper.claims.verdicts import FEW, MISSING, UNMEASURED
@@ -64,8 +63,8 @@ _OUTSIDE = "outside S"
 _FEWER = re.compile(r" \((\d+)\)(?=$|,)")  # number of packings, if it is not the expected one
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
-SHOWN = ("figure2", "figure4", "figure5", "figure6")  # with captions on that page
-TABLE = "#dependence-on-friction"  # of z, h and η on the results page
+SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions, among claims
+TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
 HEADLINES = 4  # highlights in the README
 NAMED = (  # claims that the README names if they are contradicted
     "η ∝ μ at small μ: packings made by contact dynamics",
@@ -73,6 +72,7 @@ NAMED = (  # claims that the README names if they are contradicted
     "corr(f_n, ΔF_n) vanishes at large μ",
     "F_crit rises with η",
 )
+_SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
 _HEADS = {
@@ -83,12 +83,6 @@ _HEADS = {
     "uniform": "uniform",
     "exact": "exact",
     "": "packings alone",
-}
-# What variants of a claim differ in → how a list of them is written.
-_TOGETHER = {
-    r"η\d\(μ\)": "each of {}",
-    r"(?<=beyond the )(median|upper \w+)": "{}",
-    r"(?<=\()[Nμ] = [\d.]+(?=\)$)": "{}",
 }
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
@@ -139,8 +133,8 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "verdicts": lambda: verdict_counts(claims),
-        "claims": lambda: verdict_table(claims),
-        "details": lambda: detail_table(claims),
+        "claims": lambda: claim_tables(claims),
+        "disagreements": lambda: disagreements(claims),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "findings": lambda: finding_table(findings),
@@ -518,9 +512,10 @@ def _led(sentence: str) -> str:
 
 
 def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
-    """All highlights as a numbered list, each with its figure and a link to its method."""
+    """All highlights as a numbered list, with caveats, and links to figures and methods."""
     return "".join(
-        f"{k}. {_led(one.sentence)} ({_shown(one.figure)}, [method](method.md#{one.method}))\n"
+        f"{k}. {_led(one.sentence)}{one.caveat and ' '}{one.caveat} "
+        f"({_shown(one.figure)}, [method](method.md#{one.method}))\n"
         for k, one in enumerate(highlights(table, claims, findings), 1)
     )
 
@@ -650,93 +645,75 @@ def verdict_counts(claims: Rows) -> str:
     return markdown_table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
 
 
-def verdict_table(claims: Rows) -> str:
-    """The symbols of the verdicts on each claim, and by each sampler: a table for each outcome.
+def claim_tables(claims: Rows) -> str:
+    """Each claim with its verdict and the number that decides it: a table for each outcome.
 
-    Variants of a claim share a row; see `_TOGETHER`.
+    Below them, where walks leave S. `claims.json` contains the numbers of all samplers.
     """
-    heads = [name for name in _used(claims) if name]
-    columns = ["claim", "source", "verdict", *(_HEADS[name] for name in heads)]
-    grouped: dict[str, list[list[str]]] = {}
-    for (statement, source, _), by_sampler in by_claim(claims).items():
-        verdicts = {name: claim["verdict"] for name, claim in by_sampler.items()}
-        verdict = decisive(by_sampler)["verdict"]
-        cells = [SYMBOLS[verdicts[name]] if name in verdicts else "" for name in heads]
-        grouped.setdefault(verdict, []).append([statement, source, SYMBOLS[verdict], *cells])
+    judged = decided(claims)
     parts = []
     for outcome, verdicts in OUTCOMES.items():
-        rows = [row for verdict in verdicts for row in grouped.get(verdict, [])]
+        rows = [claim for verdict in verdicts for claim in judged if claim["verdict"] == verdict]
         if rows:
-            head = f"### {outcome[0].upper()}{outcome[1:]} ({len(rows)})"
-            parts.append(f"{head}\n\n{markdown_table(columns, _merged(rows))}")
-    return "\n".join(parts)
+            head = f"{outcome[0].upper()}{outcome[1:]} ({len(rows)})"
+            parts.append(f"## {head}\n\n{_claim_table(rows)}")
+    return "\n".join([*parts, *_beyond_notes(claims)])
 
 
-def _merged(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    """The rows (statement, cells …) with variants of a statement in one, their cells in order.
-
-    Only rows with cells in the same columns share one.
-    """
-    groups: dict[Any, list[tuple[str, Sequence[str]]]] = {}
-    for statement, *cells in rows:
-        frame, variant = _variant(statement)
-        groups.setdefault((*frame, *map(bool, cells)), []).append((variant, cells))
-    merged = []
-    for (begin, form, end, *_), group in groups.items():
-        variants, cells = zip(*group, strict=True)
-        named = form.format(listed(variants)) if len(group) > 1 else variants[0]
-        joined = [
-            column[0] if len(set(column)) == 1 else " / ".join(column)
-            for column in zip(*cells, strict=True)
+def _claim_table(rows: Rows) -> str:
+    """The claims of one outcome; their symbols only if these differ."""
+    heads = ["claim", "source", "number", "range", "value", "n"]
+    lines = [
+        [
+            claim["statement"],
+            claim["source"],
+            measured({claim["sampler"]: claim}),
+            claim["criterion"].replace("[", "(").replace("]", ")"),
+            _number(claim) + (f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""),
+            str(claim["packings"] or ""),
         ]
-        merged.append([f"{begin}{named}{end}", *joined])
-    return merged
+        for claim in rows
+    ]
+    if len({claim["verdict"] for claim in rows}) > 1:
+        heads.insert(0, "verdict")
+        lines = [
+            [SYMBOLS[claim["verdict"]], *line] for claim, line in zip(rows, lines, strict=True)
+        ]
+    return markdown_table(heads, lines)
 
 
-def _variant(statement: str) -> tuple[tuple[str, str, str], str]:
-    """The text before a statement's variant, how several are written, the text after it; and it."""
-    for pattern, form in _TOGETHER.items():
-        if found := re.search(pattern, statement):
-            return (statement[: found.start()], form, statement[found.end() :]), found[0]
-    return (statement, "{}", ""), ""
+def _beyond_notes(claims: Rows) -> list[str]:
+    """Where the networks of each sampler leave S, in sentences."""
+    beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
+    return [
+        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S by more than "
+        f"the length of the exact intervals, at μ = {listed(beyond[name].split(', '))}.\n"
+        for name in _used(claims)
+        if beyond.get(name)
+    ]
+
+
+def disagreements(claims: Rows) -> str:
+    """The claims on which networks drawn in another way give another outcome, as a table.
+
+    A verdict for want of data is no outcome.
+    """
+    outcome = {verdict: word for word, verdicts in OUTCOMES.items() for verdict in verdicts}
+    heads = [name for name in _used(claims) if name]
+    lines = []
+    for (statement, *_), by_sampler in by_claim(claims).items():
+        verdicts = {name: by_sampler[name]["verdict"] for name in heads if name in by_sampler}
+        enough = {outcome[verdict] for verdict in verdicts.values() if verdict not in _SCARCE}
+        if len(enough) > 1:
+            cells = [SYMBOLS[verdicts[name]] if name in verdicts else "" for name in heads]
+            lines.append([statement, *cells])
+    return markdown_table(["claim", *(_HEADS[name] for name in heads)], lines)
 
 
 def _used(claims: Rows) -> list[str]:
     """The samplers by which any claim is judged, in the order of columns."""
-    known = {
-        claim["sampler"] for claim in claims if claim["verdict"] not in (FEW, MISSING, UNMEASURED)
-    }
+    known = {claim["sampler"] for claim in claims if claim["verdict"] not in _SCARCE}
     return [name for name in _HEADS if name in known]
-
-
-def detail_table(claims: Rows) -> str:
-    """The number that decides each claim, as a table; below it, where walks leave S.
-
-    `claims.json` contains the numbers of all samplers, and how verdicts change.
-    """
-    rows = []
-    for claim in decided(claims):
-        rows.append(
-            [
-                claim["statement"],
-                measured({claim["sampler"]: claim}),
-                claim["criterion"].replace("[", "(").replace("]", ")"),
-                _number(claim) + (f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""),
-                str(claim["packings"] or ""),
-                SYMBOLS[claim["verdict"]],
-                _HEADS[claim["sampler"]],
-            ]
-        )
-    heads = ("claim", "number", "criterion", "value", "n", "verdict", "decided by")
-    text = markdown_table(heads, rows)
-    beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
-    notes = [
-        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S by more than "
-        f"the length of the exact intervals, at μ = {listed(beyond[name].split(', '))}."
-        for name in _used(claims)
-        if beyond.get(name)
-    ]
-    return text + "".join(f"\n{note}\n" for note in notes)
 
 
 def measured(by_sampler: dict[str, dict[str, Any]]) -> str:

@@ -35,8 +35,8 @@ CAPTIONS = {
     f"walk's networks ({{walk}}), {_POINTS}; and the coordination z of the backbone, against the "
     "friction coefficient μ.",
     "figure2": "Mean critical force of pushed contacts in ⟨f_n⟩, and exponent α of the decay "
-    "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of the "
-    "friction coefficient μ; bars are standard errors over packings.",
+    "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}) in the same packings, joined "
+    "in order of the friction coefficient μ; bars are standard errors over packings.",
     "figure2_limit": "As Figure 2, with the limit load (dashed) beside the critical force.",
     "figure3": "Normal forces that contacts can have over those they have in the original "
     "network: the interval seen (bars), and by its colour which fraction of the "

@@ -16,7 +16,7 @@ from granforce.paper.claims.verdicts import CONTRADICTED, FEW, REPRODUCED, STRON
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
-from granforce.types import Rows
+from granforce.types import Floats, Rows
 
 PEAK = "μ where exact η3 is largest"
 STRONG = "correlation of f_n with the exact ΔF_n, intermediate μ"
@@ -26,8 +26,7 @@ USUAL = 0.1
 PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 LATE_DRAG = "prepared_late_drag"
 LATER = (
-    "the last phase of the compaction, in which drag replaces inertia, begins a hundred times "
-    "closer to balance"
+    "drag replaces inertia, in the last phase of the compaction, a hundred times closer to balance"
 )
 FEWEST = 5  # packings of such a mean
 LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
@@ -40,6 +39,7 @@ class Highlight(NamedTuple):
     sentence: str
     figure: str  # name in data/figures; empty if only the table shows it
     method: str  # anchor in the method
+    caveat: str = ""  # further sentences, for where there is room
 
 
 class _Numbers:
@@ -111,9 +111,9 @@ def _maximum(of: _Numbers) -> Highlight:
     else:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
-        f" Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
+        f"Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
         f"than others ({LONGEST_SETTLED:g}); with {LONGEST:g} throughout, this maximum would be at "
-        "larger μ (see the limits of the study)."
+        "larger μ ([limits](#limits))."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
@@ -121,9 +121,10 @@ def _maximum(of: _Numbers) -> Highlight:
     also = "".join(f" and ⟨ΔF_n⟩/⟨f_n⟩ at {_quoted(row)}" for row in lengths)
     return Highlight(
         f"{first}: exact η3 is largest at μ = {_quoted(place)}{also}; the paper finds its largest "
-        f"η near {PAPERS_PEAK:g}.{step}",
+        f"η near {PAPERS_PEAK:g}.",
         "samplers",
         "exact-intervals",
+        step,
     )
 
 
@@ -147,10 +148,10 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     }
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
-        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}."
-        f"{_later_eta2(of)}",
+        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
         "samplers",
         "measures",
+        _later_eta2(of),
     )
 
 
@@ -162,37 +163,52 @@ def _free_forces(of: _Numbers) -> Highlight:
     return Highlight(
         f"S loses most of its dimensions as friction grows: for {of.table.plan['n']} disks, it has "
         f"{of.mean('exact', 'dimension', USUAL)} at μ = {USUAL:g}, but only "
-        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.{_later_drag(of, most)}",
+        f"{of.mean('exact', 'dimension', most)} at μ = {most:g}.",
         "",
         "ensemble",
+        _later_drag(of, most),
     )
 
 
 def _later_drag(of: _Numbers, mu: float) -> str:
     """How many dimensions S has if inertia acts for longer, if the study knows; else nothing."""
-    late = statistics.grouped(of.table.part(f"{LATE_DRAG}_exact"), "dimension").get(mu)
-    if late is None or len(late) < FEWEST:
+    pairs = _later(of, "exact", f"{LATE_DRAG}_exact", "dimension").get(mu)
+    if pairs is None:
         return ""
+    usual, late = pairs.T
     return (
-        " The last number depends on how packings are brought to rest: it is "
-        f"{with_error(late)} if {LATER}."
+        "The last number depends on how packings are brought to rest: in the same "
+        f"{len(late)} packings, it is {with_error(usual)} by default, and {with_error(late)} if "
+        f"{LATER}."
     )
 
 
 def _later_eta2(of: _Numbers) -> str:
-    """The largest mean η2 beyond intermediate μ if inertia acts for longer, if the study knows."""
-    late = statistics.grouped(of.table.part(LATE_DRAG), "eta2")
-    known = {mu: eta for mu, eta in late.items() if mu > MIDDLE[1] and len(eta) >= FEWEST}
+    """Largest and last mean η2 beyond intermediate μ if inertia acts for longer, if known."""
+    known = {
+        mu: pairs[:, 1]
+        for mu, pairs in _later(of, "nearest", LATE_DRAG, "eta2").items()
+        if mu > MIDDLE[1]
+    }
     if not known:
         return ""
-    mu = max(known, key=lambda mu: known[mu].mean())
     usual = statistics.grouped(of.table.part(SAMPLERS["nearest"]), "eta2")
     most = max(usual.values(), key=np.mean)
+    shown = sorted({max(known, key=lambda mu: known[mu].mean()), max(known)})
+    quoted = listed([f"{with_error(known[mu])} at μ = {mu:g}" for mu in shown])
     return (
-        f" The fall depends on how packings are brought to rest: if {LATER}, η2 of "
-        f"{WORDS['nearest']} at μ = {mu:g} is {with_error(known[mu])} (its maximum with the usual "
-        f"options is {with_error(most)})."
+        f"The fall depends on how packings are brought to rest: if {LATER}, η2 of "
+        f"{WORDS['nearest']} is {quoted}; by default its maximum is {with_error(most)}."
     )
+
+
+def _later(of: _Numbers, sampler: str, part: str, name: str) -> dict[float, Floats]:
+    """{μ: a number by default and with late drag, in the same packings}, for FEWEST or more."""
+    known: dict[float, list[list[float]]] = {}
+    for usual, late in statistics.paired(of.table.part(SAMPLERS[sampler]), of.table.part(part)):
+        if name in usual and name in late:
+            known.setdefault(usual["mu"], []).append([usual[name], late[name]])
+    return {mu: np.array(pairs) for mu, pairs in known.items() if len(pairs) >= FEWEST}
 
 
 def _coverage(of: _Numbers) -> Highlight:
@@ -302,22 +318,26 @@ def _stability(of: _Numbers) -> Highlight:
     words = {"exact": "the exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
     rows = of.claims(claim, list(words))
     rising = {name: row for name, row in rows.items() if row["low"] > 0}
-    others = [words[name] for name in rows if name not in rising]
+    falling = {name: row for name, row in rows.items() if row["high"] < 0}
+    others = [words[name] for name, row in rows.items() if row["low"] <= 0 <= row["high"]]
     if not rising:
         raise KeyError(claim)
     named = listed([f"with {words[name]}" for name in rising])
-    texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in rising.items()])
-    rest = f"; with {listed(others)}, no correlation is significant" if others else ""
+    significant = (rising | falling).items()
+    texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in significant])
+    rest = f"; with {listed(others)}, it is not significant" if others else ""
+    judged = next(iter(rising.values()))["criterion"].partition(" [")[0].replace("…", "to")
     closely = all(row["verdict"] == REPRODUCED for row in rising.values())
     first = (
         f"The critical force rises {named}"
         if closely
-        else f"The critical force tends to rise {named}, but only moderately"
+        else "The critical force rises with η only moderately, if at all"
     )
     return Highlight(
         f"{first}: over all μ, its rank correlation is {texts}{rest}.",
         "figure2",
         "local-perturbation",
+        f"The claim that it rises with η counts as reproduced if this is {judged}.",
     )
 
 

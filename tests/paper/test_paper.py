@@ -378,7 +378,15 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
-    names += ("claims", "details", "findings", "score", "headlines", "verdicts", "certificates")
+    names += (
+        "claims",
+        "disagreements",
+        "findings",
+        "score",
+        "headlines",
+        "verdicts",
+        "certificates",
+    )
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = filled.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
@@ -504,7 +512,10 @@ def test_differences_of_few_packings_are_judged_by_students_t():
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     def claim(statement, sampler, verdict, value=1.0):
         words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
-        return words | {"sampler": sampler, "verdict": verdict, "value": value}
+        numbers = {"value": value, "low": value, "high": value, "mu": None, "packings": 3}
+        return (
+            words | numbers | {"sampler": sampler, "verdict": verdict, "measured": "x", "why": ""}
+        )
 
     judged = [
         claim("a", "gauss_seidel", verdicts.REPRODUCED),
@@ -517,14 +528,15 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         claim("c", "uniform", verdicts.MISSING, float("nan")),
         claim("d", "", verdicts.CONTRADICTED),
     ]
-    text = documents.verdict_table(judged)
-    heads = ["### Contradicted (2)", "### Open (1)", "### Reproduced (1)"]
+    text = documents.claim_tables(judged)
+    heads = ["## Contradicted (2)", "## Open (1)", "## Reproduced (1)"]
     assert [line for line in text.splitlines() if line.startswith("#")] == heads
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    heads = ["claim", "source", "verdict", "paper's walk, to 10⁻³", "nearest-network walk", "exact"]
-    assert rows[0] == rows[4] == rows[7] == heads  # no column without numbers
-    assert [rows[k][0] + rows[k][2] for k in (2, 3, 6, 9)] == ["c✗✗", "d✗", "b…", "a✓"]
-    assert rows[2][3:] == ["–", "✓", "✗✗"]
+    heads = ["claim", "source", "number", "range", "value", "n"]
+    assert rows[0] == ["verdict", *heads]  # the symbols differ only in the first table
+    assert rows[4] == rows[7] == heads
+    assert [rows[2][:2], rows[3][:2]] == [["✗✗", "c"], ["✗", "d"]]
+    assert [rows[6][0], rows[9][0]] == ["b", "a"]
     assert "tests 4 claims" in outcomes.score(judged)
     assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
     assert "2 are judged by the networks of the paper's own walk;" in outcomes.score(judged)
@@ -538,26 +550,23 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     assert "– not measured" not in counted and counted["all"] == [4, 2, 1, 3, 1]
 
 
-def test_variants_of_a_claim_share_a_row():
-    """Their verdicts are those of each, in order, where they differ."""
+def test_other_networks_disagree_only_by_an_outcome():
+    """Neither a verdict for want of data nor a stronger contradiction is another outcome."""
+    outcomes_of = {
+        "a": (verdicts.REPRODUCED, verdicts.CONTRADICTED),
+        "b": (verdicts.REPRODUCED, verdicts.FEW),
+        "c": (verdicts.CONTRADICTED, verdicts.STRONGLY),
+        "d": (verdicts.REPRODUCED, verdicts.UNDECIDED),
+    }
     judged = [
         {"statement": statement, "source": "PRE", "criterion": "≥ 0", "sampler": sampler}
         | {"verdict": verdict, "value": 1.0}
-        for sampler in ("gauss_seidel", "nearest")
-        for statement, verdict in (
-            ("tail beyond the median: exponential", verdicts.UNDECIDED),
-            ("η1(μ) is largest near μ = 0.1", verdicts.UNDECIDED),
-            ("η2(μ) is largest near μ = 0.1", verdicts.UNDECIDED),
-            ("tail beyond the upper decile: exponential", verdicts.FEW),
-        )
+        for statement, pair in outcomes_of.items()
+        for sampler, verdict in zip(("gauss_seidel", "nearest"), pair, strict=True)
     ]
-    head, _, *lines = documents.verdict_table(judged).splitlines()
-    rows = [line.strip("| ").split(" | ") for line in lines[2:]]
-    assert head == "### Open (4)"
-    assert rows == [
-        ["tail beyond the median and upper decile: exponential", "PRE", *3 * ["? / …"]],
-        ["each of η1(μ) and η2(μ) is largest near μ = 0.1", "PRE", *3 * ["?"]],
-    ]
+    head, _, *lines = documents.disagreements(judged).splitlines()
+    assert head == "| claim | paper's walk, to 10⁻³ | nearest-network walk |"
+    assert lines == ["| a | ✓ | ✗ |", "| d | ✓ | ? |"]
 
 
 @pytest.mark.parametrize(
