@@ -231,7 +231,10 @@ LOAD_FACTOR = (
     *("bodies", "contacts", "load_factor", "certified_error", "critical_factor_low"),
     *("critical_factor_high", "precision", "residual", "breach", "converged"),
 )
-REST = ("at_rest", "reason", "distance_to_rest", "noise", "draws_at_rest", "draws")
+REST = (
+    *("at_rest", "reason", "residual", "violation", "distance_to_rest", "noise", "draws_at_rest"),
+    "draws",
+)
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),
     *("twins", "seconds", "cached"),

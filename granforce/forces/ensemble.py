@@ -53,7 +53,7 @@ class Hull(NamedTuple):
 @notebook.brief
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `build`."""
+    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `ensemble`."""
 
     packing: Packing
     mu: float  # the largest friction coefficient of the cones (not necessarily the packing's)
@@ -134,7 +134,7 @@ class Ensemble:
 
     @cached_property
     def hull(self) -> Hull:
-        """The affine hull of S: a point inside, the walls held, and the dimension; see `hull`."""
+        """The affine hull of S: a point inside, the walls held, and the dimension."""
         return self.find_hull(self)
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from granforce import notebook
@@ -45,13 +46,23 @@ class Known(NamedTuple):
 
 def _both(side: Floats, count: int, unknown: float) -> Floats:
     """Bounds (count, 2) of those given, which are (count, 2) or bounds of f_n alone."""
-    given = np.asarray(side, dtype=np.float64)
+    given = _numbers(side)
     if given.shape == (2,) and count == 1:  # of the only contact
         given = given[None]
-    if given.ndim < 2:
-        given = np.broadcast_to(given, count)
-        given = np.column_stack([given, np.full(count, unknown)])
-    return np.broadcast_to(given, (count, 2))
+    if given.ndim == 0:
+        given = np.full(count, given)
+    if given.ndim == 1:
+        given = np.column_stack([given, np.full(len(given), unknown)])
+    if given.shape != (count, 2):
+        raise ValueError
+    return given
+
+
+def _numbers(given: npt.ArrayLike) -> Floats:
+    """The numbers given; TypeError for text, which numpy would read as numbers."""
+    if np.asarray(given).dtype.kind not in "biuf":
+        raise TypeError
+    return np.asarray(given, dtype=np.float64)
 
 
 class Polygons(NamedTuple):
@@ -95,7 +106,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     try:
         if not isinstance(known, Known):
             raise TypeError
-        contacts = np.atleast_1d(np.asarray(known.contacts, dtype=np.float64))
+        contacts = np.atleast_1d(_numbers(known.contacts))
         if contacts.ndim > 1:
             raise TypeError
         low, high = known.sides

@@ -88,7 +88,9 @@ def scan(
     other options of `pack`. states, walk_seed, chains: of each walk, as for `walk`. ensemble_mu:
     friction of the cones, by default the packing's. relax: "nearest", "nearest_piqp",
     "gauss_seidel" or "gauss_seidel_only". keep: number of states to store, by default all.
-    workers, scheduler, dtypes, progress: as for `run`.
+    workers: processes on this machine; 1: this process. scheduler: address of a dask scheduler
+    whose workers see the same folder, to use instead. dtypes: {variable: type} with which to store
+    states, as {"states": "float32"}. progress(done, total) counts quarters of what is not stored.
 
     Returns a list of rows, as `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed,
     packing_fraction, coordination, dimension h, eta1, eta2, eta3, …), and a list of (walk

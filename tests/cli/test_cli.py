@@ -273,6 +273,19 @@ def test_limit_loads_of_chosen_contacts(run, tmp_path):
     assert bounds.read_text().startswith("contact,i,j,x,y,limit_load [packing]\n")
 
 
+def test_rest_tells_whether_the_forces_themselves_balance(run):
+    """Dynamics can come to rest from forces out of balance, at those of a network."""
+    packing = packed(30, 0.3)
+    wrong = packing.forces.copy()
+    wrong[3] *= 1.5
+    for forces, balanced in ((packing.forces, True), (wrong, False)):
+        save_packing(packing._replace(forces=forces), "p.npz")
+        code, out, _ = run("rest", "p.npz", "--json")
+        report = json.loads(out)
+        assert code == 0 and report["at_rest"]
+        assert (report["residual"] < 1e-9) == balanced == (report["distance_to_rest"] < 1e-9)
+
+
 def test_import_keeps_what_was_read(run, tmp_path):
     folder = Path(__file__).parents[1] / "lammps"
     dumps = [folder / f"lammps_n400_mu0.3.{kind}.dump" for kind in ("particles", "contacts")]

@@ -441,3 +441,17 @@ def test_two_disks_between_their_images_know_each_others_force():
     assert intervals(S).high[:, 0] == pytest.approx([24.0, 24.0], abs=1e-5)
     with pytest.raises(gf.NotJammedError, match="on contact 0"):
         gf.ensemble(packing, known=gf.Known([0], [25.0, -ANY], [30.0, ANY]))
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        gf.Known(["3"], [2.0], [2.5]),
+        gf.Known([3], ["2"], [2.5]),
+        gf.Known([3, 4], [2.0], [2.5]),
+        gf.Known([3, 4], [[2.0, 0.0]], 2.5),
+    ],
+)
+def test_known_forces_are_numbers_one_for_each_contact(known):
+    with pytest.raises(gf.InputError, match="contact numbers"):
+        gf.ensemble(packed(20, 0.3), known=known)

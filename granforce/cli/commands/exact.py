@@ -227,9 +227,13 @@ def load_factor(arguments: argparse.Namespace) -> None:
 
 def rest(arguments: argparse.Namespace) -> None:
     """Test whether contact dynamics leaves a packing at rest."""
-    found = motion.rest(importers.load_packing(arguments.packing), mu=arguments.ensemble_mu)
+    S = ensemble(importers.load_packing(arguments.packing), mu=arguments.ensemble_mu)
+    found = motion.rest(S)
     lines: dict[str, Any] = {"at_rest": found.at_rest}
     lines |= {} if found.at_rest else {"reason": found.reason}
+    # Dynamics may come to rest from forces that do not balance.
+    checked = {"residual": S.residual, "violation": S.violation}
+    lines |= {name: float(check(S.original)) for name, check in checked.items()}
     lines |= {"distance_to_rest": found.distance, "noise": list(found.noise)}
     lines |= {"draws_at_rest": found.stayed.sum(axis=1).tolist(), "draws": found.stayed.shape[1]}
     print_report(lines, arguments.json)

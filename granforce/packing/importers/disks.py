@@ -58,7 +58,10 @@ def from_disks(
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     r = float_array(r, (-1,), "radii")
-    x = cell.wrapped(float_array(x, (len(r), 2), "centres"))
+    x = float_array(x, (-1, 2), "centres")
+    if len(x) != len(r):
+        raise InputError(f"disks need a centre and a radius each: {len(x)} centres, {len(r)} radii")
+    x = cell.wrapped(x)
     check_disks(x, r, cell, lambda k: f"disk {k}")
     contacts = touching(x, r, cell, tolerance)
     closed = bool(np.all(np.isfinite(cell.box)))
