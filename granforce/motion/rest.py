@@ -21,7 +21,6 @@ from granforce.motion import flow
 from granforce.motion.flow import Outcome, Push
 from granforce.motion.inertia import make_step
 from granforce.motion.works import follow, relax
-from granforce.numerics.lanes import ONE
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Mask
@@ -30,8 +29,6 @@ from granforce.types import Cancel, Floats, Integers, Mask
 NOISE, DRAWS = (1e-4, 1e-2), 3
 # Implicit steps within which a network must come to rest.
 MOST_STEPS = 500
-# Contacts from which on draws run in lanes: 1.3 to 1.6 times as fast at 1000 disks and more.
-_MANY_CONTACTS = 4000
 
 
 @notebook.brief
@@ -87,9 +84,7 @@ def rest(
         for _ in range(draws)
     ]
     ends: dict[int, Outcome] = {}
-    # Few flows of a small packing gain less from lanes than more kernels take to compile.
-    lanes = ONE if len(forces) < _MANY_CONTACTS else None
-    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__, lanes=lanes)
+    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__)
     outcomes = [ends[k] for k in range(len(starts))]
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)

@@ -52,15 +52,13 @@ def follow(
     works: Sequence[Work],
     finished: Callable[[int, Any], object],
     workers: int = 1,
-    lanes: Any = None,
 ) -> None:
     """Run works in lanes on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
     finished(number, value) is called, by one thread at a time, as a work returns its value; if it
-    raises, it is still called for works that other threads have finished by then. lanes: ONE or
-    MANY, by default chosen from the number of works. Outcomes are bit-identical for any number of
-    threads and lanes.
+    raises, it is still called for works that other threads have finished by then. Outcomes are
+    bit-identical for any number of threads and lanes.
     """
     waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 
@@ -70,7 +68,7 @@ def follow(
 
     def carry() -> None:
         try:
-            _carry(step, waiting, finish, failed, lanes)
+            _carry(step, waiting, finish, failed)
         except BaseException:
             failed.set()  # stop the other threads
             raise
@@ -88,12 +86,11 @@ def _carry(
     waiting: deque[tuple[int, Work]],
     finished: Callable[[int, Any], object],
     failed: threading.Event,
-    lanes: Any,
 ) -> None:
     """One thread: fill lanes with works and run each to its end."""
     if not waiting:
         return
-    lanes = lanes_for(len(waiting)) if lanes is None else lanes
+    lanes = lanes_for(len(waiting))
     flows, stop = make_flows(step, len(lanes)), cancelling.flag()
     seconds = np.zeros(len(lanes))
     carried: list[tuple[int, Work] | None] = [None] * len(lanes)

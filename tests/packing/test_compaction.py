@@ -8,8 +8,9 @@ from granforce.cell import Cell
 from granforce.forces.balance import stress_of
 from granforce.forces.build import ensemble
 from granforce.motion import contact_dynamics as dynamics
-from granforce.motion import rest as rests
+from granforce.motion import works
 from granforce.motion.rest import rest
+from granforce.numerics.lanes import ONE
 from granforce.packing import settling
 from granforce.packing.closing import _stretch, margin, strained
 from granforce.packing.compaction import (
@@ -75,9 +76,9 @@ def test_contacts_of_the_backbone_are_closed_and_press(mu):
 
 def test_the_test_of_rest_is_the_same_in_lanes(monkeypatch):
     packing = pack(60, 0.3, 1)
-    alone = rest(packing)
-    monkeypatch.setattr(rests, "_MANY_CONTACTS", 0)
     in_lanes = rest(packing)
+    monkeypatch.setattr(works, "lanes_for", lambda count: ONE)
+    alone = rest(packing)
     assert alone.at_rest and alone.distance == in_lanes.distance
     np.testing.assert_array_equal(alone.stayed, in_lanes.stayed)
     np.testing.assert_array_equal(alone.forces, in_lanes.forces)
