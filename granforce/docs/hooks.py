@@ -27,6 +27,9 @@ DATA = next(  # inside an installed wheel, next to the package in a clone
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.(?:png|json))\)")  # as in the sources
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
+# The theme reserves five words for every column of a table, however narrow its content.
+STYLE = ".md-typeset table:not([class]) th { min-width: 0 }"
+
 # Sections of the library reference, by the module that a name comes from.
 SECTIONS = {
     "records": "Records and errors",
@@ -47,6 +50,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         ("reference/library.md", library()),
         ("reference/cli.md", command_line()),
         ("reference/symbols.md", symbols()),
+        ("style.css", STYLE),
     ):
         files.append(File.generated(config, name, content=text))
     for path in (

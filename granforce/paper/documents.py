@@ -40,7 +40,7 @@ from granforce.paper.claims.outcomes import (
     decided,
     score,
 )
-from granforce.paper.claims.verdicts import FEW, MISSING, UNMEASURED
+from granforce.paper.claims.verdicts import FEW, MISSING, PRL, UNMEASURED
 from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import (
     NOTHING,
@@ -72,6 +72,7 @@ NAMED = (  # claims that the README names if they are contradicted
     "corr(f_n, ΔF_n) vanishes at large μ",
     "F_crit rises with η",
 )
+_CLAIM_HEADS = ("claim", "number", "range", "value", "n")
 _SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
@@ -646,40 +647,31 @@ def verdict_counts(claims: Rows) -> str:
 
 
 def claim_tables(claims: Rows) -> str:
-    """Each claim with its verdict and the number that decides it: a table for each outcome.
+    """Each claim with the number that decides it: a table for each verdict.
 
-    Below them, where walks leave S. `claims.json` contains the numbers of all samplers.
+    Claims of the letter are marked. Below the tables, where walks leave S. `claims.json` contains
+    the numbers of all samplers.
     """
-    judged = decided(claims)
-    parts = []
-    for outcome, verdicts in OUTCOMES.items():
-        rows = [claim for verdict in verdicts for claim in judged if claim["verdict"] == verdict]
-        if rows:
-            head = f"{outcome[0].upper()}{outcome[1:]} ({len(rows)})"
-            parts.append(f"## {head}\n\n{_claim_table(rows)}")
+    judged, parts = decided(claims), []
+    for verdict in (word for words in OUTCOMES.values() for word in words):
+        lines = [_claim_line(claim) for claim in judged if claim["verdict"] == verdict]
+        if lines:
+            head = f"{SYMBOLS[verdict]} {verdict[0].upper()}{verdict[1:]} ({len(lines)})"
+            parts.append(f"## {head}\n\n{markdown_table(_CLAIM_HEADS, lines)}")
     return "\n".join([*parts, *_beyond_notes(claims)])
 
 
-def _claim_table(rows: Rows) -> str:
-    """The claims of one outcome; their symbols only if these differ."""
-    heads = ["claim", "source", "number", "range", "value", "n"]
-    lines = [
-        [
-            claim["statement"],
-            claim["source"],
-            measured({claim["sampler"]: claim}),
-            claim["criterion"].replace("[", "(").replace("]", ")"),
-            _number(claim) + (f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""),
-            str(claim["packings"] or ""),
-        ]
-        for claim in rows
+def _claim_line(claim: dict[str, Any]) -> list[str]:
+    """A claim in the columns of _CLAIM_HEADS."""
+    letter = f" ({PRL})" if claim["source"] == PRL else ""
+    place = f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""
+    return [
+        claim["statement"] + letter,
+        measured({claim["sampler"]: claim}),
+        claim["criterion"].replace("[", "(").replace("]", ")"),
+        _number(claim) + place,
+        str(claim["packings"] or ""),
     ]
-    if len({claim["verdict"] for claim in rows}) > 1:
-        heads.insert(0, "verdict")
-        lines = [
-            [SYMBOLS[claim["verdict"]], *line] for claim, line in zip(rows, lines, strict=True)
-        ]
-    return markdown_table(heads, lines)
 
 
 def _beyond_notes(claims: Rows) -> list[str]:

@@ -25,7 +25,7 @@ def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
         "distances between pairs of networks are sharply peaked",
-        f"their standard deviation over their mean, μ ≥ {LEAST_DYNAMIC:g}",
+        f"standard deviation of the distances over their mean, μ ≥ {LEAST_DYNAMIC:g}",
         items(dynamic(drawn(table, sampler)), "pair_spread"),
         good=(-np.inf, 0.2),
         fair=(-np.inf, 0.35),
@@ -72,7 +72,7 @@ def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ]
     yield at_each(
         "the original network lies closer to the centre than sampled ones",
-        "its distance over their mean distance",
+        "distance of the original network from the centre over the mean of the others",
         positive_friction(items(rows, name)),
         good=(-np.inf, 1),
         source=PRL,

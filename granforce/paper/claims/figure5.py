@@ -41,7 +41,7 @@ def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
     )
     yield at_each(
         "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about equally many contacts (μ = 0.1)",
-        "number of the first over that of the second",
+        "number of contacts with f_n > 2⟨f_n⟩ over that with ΔF_n > ⟨ΔF_n⟩",
         within(groups, (0.1, 0.1)),
         good=(0.8, 1.25),
         fair=(0.5, 2),

@@ -42,7 +42,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ):
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ",
-            f"mean over packings, {span_text(span)}",
+            f"mean correlation, {span_text(span)}",
             within(everywhere, span),
             good=good,
             fair=fair,
@@ -50,7 +50,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
         )
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ, against chance",
-            "the same in units of 1/√(N_c − 1), the standard deviation for shuffled f_n",
+            "mean correlation in units of 1/√(N_c − 1), the standard deviation for shuffled f_n",
             within(scores, span),
             good=limits,
             fair=wider,
@@ -119,7 +119,7 @@ def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
-            "fraction of packings in which it does",
+            "fraction of packings whose error bar does",
             within(items(rows, lambda r, test=test: float(test(r))), span),
             good=(0.9, np.inf),
             fair=(0.5, np.inf),
