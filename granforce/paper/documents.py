@@ -65,7 +65,7 @@ _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table 
 FIGURES = "../../../data/figures"  # relative to the results page
 SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions, among claims
 TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
-HEADLINES = 4  # highlights in the README
+HEADLINES = 5  # highlights in the README
 NAMED = (  # claims that the README names if they are contradicted
     "η ∝ μ at small μ: packings made by contact dynamics",
     "η3 does not depend on how networks are sampled",
@@ -109,6 +109,13 @@ _CONTENTS = {
     "size_exact": "exact intervals, other numbers of disks",
     "tails": "uniform networks of large packings, for the distribution of f_n",
 }
+# Numbers that may depend on the preparation, the ending of their parts, and their names in rows.
+_PREPARED = (
+    ("h", "_exact", "dimension"),
+    ("φ", "_exact", "packing_fraction"),
+    ("exact η3", "_exact", "eta3"),
+    ("η2 of the nearest-network walk", "", "eta2"),
+)
 # How packings are made, in words; see `plan.variations`.
 _VARIANTS = {
     "": "default",
@@ -317,7 +324,7 @@ def sweeps(table: StudyTable) -> str:
 
 def _sweeps_of(table: StudyTable, part: str) -> dict[float, str]:
     """{μ: sweeps per network}."""
-    every = _by_friction(table.part(part))
+    every = _by_friction([row for row in table.part(part) if row.get("mean_sweeps")])
     return {mu: _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)) for mu, rows in every.items()}
 
 
@@ -370,50 +377,36 @@ def _excess(excess: float, length: float) -> str:
 
 
 def preparation(table: StudyTable) -> str:
-    """Dependence on the preparation: a table for each μ of how packings are made, and a summary.
+    """Dependence on the preparation: a table of paired differences for each number, and a summary.
 
-    In brackets: the difference from the default for the same seeds, in its own standard errors,
-    bold if it is significant. z is left out, as it follows from h.
+    First the mean of the default options over all seeds of the variants; then, for each variant,
+    the mean difference from the default in the same seeds, bold if it is significant. z is left
+    out, as it follows from h.
     """
-    columns = (
-        ("h", "exact", "dimension"),
-        ("φ", "exact", "packing_fraction"),
-        ("exact η3", "exact", "eta3"),
-        (f"{_HEADS['nearest']} η2", "walk", "eta2"),
-    )
-    variants = [
-        part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")
-    ]
-    variants = list(dict.fromkeys(variants))
-    heads = ["options", "packings", *(head for head, *_ in columns)]
-    text = ""
-    differences: list[tuple[str, _Apart]] = []
-    for mu in sorted({row["mu"] for row in table.part(*variants)}):
-        seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
-        lines: list[list[str]] = []
-        for name in ("", *variants):
-            parts = {"exact": f"{name}_exact" if name else "exact", "walk": name or "walk"}
-            cells, counted = [], set()
-            for _, source, measure in columns:
-                rows = [
-                    row
-                    for row in table.part(parts[source], n=table.plan["n"])
-                    if row["mu"] == mu and row["seed"] in seeds and measure in row
-                ]
-                counted.add(len(rows))
-                cell = with_error(np.array([row[measure] for row in rows])) if rows else ""
-                if name and rows:
-                    apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
-                    if apart is not None:
-                        differences.append((_word(name), apart))
-                        cell += f" ({_difference(apart)})"
-                cells.append(cell)
-            if counted != {0}:
-                lines.append([_word(name), str(max(counted)), *cells])
-        text += f"**μ = {mu:g}**\n\n{markdown_table(heads, lines)}\n"
-    if not differences:
-        return text
-    return text + _tested(differences) + _widest(table, variants)
+    names = [part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")]
+    variants = list(dict.fromkeys(names))
+    varied = {(row["mu"], row["seed"]) for row in table.part(*variants)}
+    frictions = sorted({mu for mu, _ in varied})
+    heads = ["options", *(f"μ = {mu:g}" for mu in frictions)]
+    text, differences = "", []
+    for quantity, suffix, measure in _PREPARED:
+        usual = [
+            row
+            for row in table.part("exact" if suffix else "walk", n=table.plan["n"])
+            if measure in row and (row["mu"], row["seed"]) in varied
+        ]
+        means = statistics.grouped(usual, measure)
+        lines = [
+            [_VARIANTS[""], *(with_error(means[mu]) if mu in means else "" for mu in frictions)]
+        ]
+        for variant in variants:
+            rows = [row for row in table.part(variant + suffix) if measure in row]
+            apart = {mu: _apart(rows, usual, measure, mu) for mu in frictions}
+            differences += [(_word(variant), one) for one in apart.values() if one is not None]
+            cells = [one.text if one else "" for one in apart.values()]
+            lines.append([_word(variant), *cells])
+        text += f"**{quantity}**\n\n{markdown_table(heads, lines)}\n"
+    return text + _tested(differences) if differences else text
 
 
 def _word(variant: str) -> str:
@@ -422,77 +415,56 @@ def _word(variant: str) -> str:
 
 
 class _Apart(NamedTuple):
-    """A mean difference of paired packings: in its standard errors, and its p-value."""
+    """A mean difference of paired packings."""
 
-    errors: float  # infinite if all pairs differ by the same
+    text: str  # with its standard error, bold if it is significant
     p: float  # of Student's t; NaN without scatter
-
-
-def _difference(apart: _Apart) -> str:
-    if not np.isfinite(apart.p):
-        return "no scatter"
-    return f"**{apart.errors:+.1f}**" if apart.p < 1 - statistics.LEVEL else f"{apart.errors:+.1f}"
+    packings: int
 
 
 def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
     """How many differences (options in words, difference) are significant, in sentences."""
-    p = np.array([apart.p for _, apart in differences if np.isfinite(apart.p)])
-    same, level = len(differences) - len(p), 1 - statistics.LEVEL
-    alone = int((p < level).sum())
+    p = np.array([apart.p for _, apart in differences])
+    same, level = int(np.isnan(p).sum()), 1 - statistics.LEVEL
+    tests = len(p) - same
+    alone, together = (
+        Counter(word for word, apart in differences if apart.p < most)
+        for most in (level, level / max(1, tests))
+    )
     text = (
-        f"By Student's t, {alone} of {len(p)} differences are significant at the "
-        f"level {level:.2g} (bold; {level * len(p):.1f} expected by chance)"
+        "Each difference is the mean over "
+        f"{_span([apart.packings for _, apart in differences])} pairs of packings. By Student's t, "
+        f"{alone.total()} of {tests} are significant at the level {level:.2g} (bold; "
+        f"{level * tests:.1f} expected by chance)"
     )
     if same:
         text += f"; {same} left out, as all pairs differ by the same amount"
-    together = int((p < level / max(1, len(p))).sum())
     if together:
-        return f"{text}. After Bonferroni's correction, {together} remain significant."
-    text += f". None of the {len(p)} remains significant after Bonferroni's correction"
-    if stats.binom.sf(alone - 1, len(p), level) > level:
-        return f"{text}: so few packings show no dependence on the options."
-    counts = Counter(word for word, apart in differences if apart.p < level)
-    ((most, times),) = counts.most_common(1)
-    return (
-        f"{text}. The differences are not independent. Of the {alone}, {times} belong to *{most}*."
-    )
+        return f"{text}. After Bonferroni's correction, {_most(together)}.\n"
+    text += f". None of the {tests} remains significant after Bonferroni's correction"
+    if stats.binom.sf(alone.total() - 1, tests, level) > level:
+        return f"{text}: so few packings show no dependence on the options.\n"
+    return f"{text}. The differences are not independent: {_most(alone)}.\n"
 
 
-def _widest(table: StudyTable, variants: Sequence[str]) -> str:
-    """The μ at which the mean h varies most between options, in a sentence."""
-    spans = {}
-    for mu in sorted({row["mu"] for row in table.part(*variants)}):
-        seeds = {row["seed"] for row in table.part(*variants) if row["mu"] == mu}
-        means = [
-            np.mean([row["dimension"] for row in rows])
-            for name in (*(f"{name}_exact" for name in variants), "exact")
-            for rows in [table.part(name, n=table.plan["n"])]
-            for rows in [[r for r in rows if r["mu"] == mu and r["seed"] in seeds]]
-            if rows
-        ]
-        if means and min(means) > 0:
-            spans[mu] = min(means), max(means)
-    if not spans:
-        return "\n"
-    mu = max(spans, key=lambda mu: spans[mu][1] / spans[mu][0])
-    tested = listed([f"{mu:g}" for mu in spans])
-    return (
-        f" Relative to its size, the mean h varies most between options at μ = {mu:g}, from "
-        f"{spans[mu][0]:.2g} to {spans[mu][1]:.2g}. Options were varied only at μ = {tested}.\n"
-    )
+def _most(counts: Counter[str]) -> str:
+    """How many significant differences belong to which option, in words."""
+    ((word, times),) = counts.most_common(1)
+    return f"{counts.total()} are significant, {times} of them for *{word}*"
 
 
-def _apart(rows: Rows, others: Rows, name: str) -> _Apart | None:
-    """The paired difference of a number in the same packings; None if it is unknown."""
-    pairs = statistics.paired(rows, [other for other in others if name in other])
+def _apart(rows: Rows, others: Rows, name: str, mu: float) -> _Apart | None:
+    """The paired difference of a number in the same packings at one μ; None if it is unknown."""
+    pairs = statistics.paired([row for row in rows if row["mu"] == mu], others)
     apart = np.array([row[name] - other[name] for row, other in pairs])
     if len(apart) < 2:
         return None
+    text = f"{'+' if apart.mean() > 0 else ''}{with_error(apart)}"
     error = apart.std(ddof=1) / np.sqrt(len(apart))
     if error <= NOTHING * np.abs(apart).max():
-        return _Apart(np.inf, np.nan)
-    errors = float(apart.mean() / error)
-    return _Apart(errors, float(2 * stats.t.sf(abs(errors), len(apart) - 1)))
+        return _Apart(text, np.nan, len(apart))
+    p = float(2 * stats.t.sf(abs(apart.mean() / error), len(apart) - 1))
+    return _Apart(f"**{text}**" if p < 1 - statistics.LEVEL else text, p, len(apart))
 
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
@@ -527,14 +499,21 @@ def _shown(figure: str) -> str:
 
 
 def finding_table(findings: Rows) -> str:
-    """Findings as a table: those at three ranges of μ in one row, all others below."""
+    """Findings, topic by topic: those at three ranges of μ in one row, all others below."""
+    topics: dict[str, list[dict[str, Any]]] = {}
+    for finding in findings:
+        if not finding["statement"].startswith(_LONG):
+            topics.setdefault(finding["source"], []).append(finding)
+    return "\n".join(f"**{topic}**\n\n{_topic(rows)}" for topic, rows in topics.items())
+
+
+def _topic(findings: Rows) -> str:
+    """The findings of one topic in one or two tables."""
     ranged: dict[str, dict[str, str]] = {}
     others = []
     for finding in findings:
         statement, number = finding["statement"], _number(finding)
         number += f": {FEW}" if number and finding["verdict"] == FEW else ""
-        if statement.startswith(_LONG):
-            continue
         for word, _ in RANGES:
             if statement.endswith(f", {word} μ"):
                 ranged.setdefault(statement.removesuffix(f", {word} μ"), {})[word] = number

@@ -31,7 +31,6 @@ from granforce.paper.claims.verdicts import (
     CORRELATION,
     FEW,
     FRACTION,
-    OURS,
     POSITIVE,
     Claim,
     peak,
@@ -56,7 +55,12 @@ SHEARED = "as a fraction of the largest possible"
 
 def measured(table: StudyTable) -> list[Claim]:
     """All findings about a `tables.StudyTable`, without those that lack data."""
-    return [finding for family in FAMILIES for finding in family(table)]
+    return [
+        finding._replace(source=topic)
+        for topic, families in TOPICS.items()
+        for family in families
+        for finding in family(table)
+    ]
 
 
 def sampled_part(table: StudyTable) -> Iterator[Claim]:
@@ -256,10 +260,16 @@ def _part(packings: Any, name: str) -> float:
     return getattr(tails.fitted(packings), name, np.nan)
 
 
-FAMILIES = (
-    *(sampled_part, measure, correlations, exact_shape, distribution, opened, size, strength),
-    *(shear, volume, forces),
-)
+# Topic, which takes the place of a source, → its findings.
+TOPICS = {
+    "Samples of S": (sampled_part, measure),
+    "Lengths of intervals": (correlations, distribution),
+    "Dependence of η on μ and N": (exact_shape, opened, size),
+    "Local perturbation": (strength,),
+    "Shear stress": (shear,),
+    "Volume of S": (volume,),
+    "Forces in uniform networks": (forces,),
+}
 
 
 def _values(rows: Rows, name: str) -> Values:
@@ -323,7 +333,7 @@ def _measured(statement: str, value: float, low: float, high: float, possible: E
     return Claim(
         statement=statement,
         sampler="",
-        source=OURS,
+        source="",
         measured=statement,
         value=value,
         low=low,

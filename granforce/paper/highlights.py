@@ -25,9 +25,7 @@ WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 USUAL = 0.1
 PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 LATE_DRAG = "prepared_late_drag"
-LATER = (
-    "drag replaces inertia, in the last phase of the compaction, a hundred times closer to balance"
-)
+LATER = "drag replaces inertia only when the forces are a hundred times closer to balance"
 FEWEST = 5  # packings of such a mean
 LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
 STATES = ("nearest", "gauss_seidel", "uniform")
@@ -177,8 +175,8 @@ def _later_drag(of: _Numbers, mu: float) -> str:
         return ""
     usual, late = pairs.T
     return (
-        "The last number depends on how packings are brought to rest: in the same "
-        f"{len(late)} packings, it is {with_error(usual)} by default, and {with_error(late)} if "
+        "This number depends on how packings are brought to rest: with the same "
+        f"{len(late)} seeds, it is {with_error(usual)} by default, but {with_error(late)} if "
         f"{LATER}."
     )
 
@@ -196,9 +194,10 @@ def _later_eta2(of: _Numbers) -> str:
     most = max(usual.values(), key=np.mean)
     shown = sorted({max(known, key=lambda mu: known[mu].mean()), max(known)})
     quoted = listed([f"{with_error(known[mu])} at μ = {mu:g}" for mu in shown])
+    _, least, _ = statistics.difference_interval(most, known[max(known)])
     return (
-        f"The fall depends on how packings are brought to rest: if {LATER}, η2 of "
-        f"{WORDS['nearest']} is {quoted}; by default its maximum is {with_error(most)}."
+        f"If {LATER}, the fall is {'smaller' if least > 0 else 'not significant'}: η2 of "
+        f"{WORDS['nearest']} is then {quoted}; by default its maximum is {with_error(most)}."
     )
 
 
@@ -221,7 +220,7 @@ def _coverage(of: _Numbers) -> Highlight:
     quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
     return Highlight(
         f"{of.table.plan['states']} networks show only part of each interval: at intermediate μ, "
-        f"the fraction of the exact η3 that they cover is {quoted}.",
+        f"their η3 over the exact η3 is {quoted}.",
         "samplers",
         "exact-intervals",
     )
@@ -334,10 +333,10 @@ def _stability(of: _Numbers) -> Highlight:
         else "The critical force rises with η only moderately, if at all"
     )
     return Highlight(
-        f"{first}: over all μ, its rank correlation is {texts}{rest}.",
+        f"{first}: over all μ > 0, its rank correlation is {texts}{rest}.",
         "figure2",
         "local-perturbation",
-        f"The claim that it rises with η counts as reproduced if this is {judged}.",
+        f"To reproduce the claim that F_crit rises with η, it would have to be {judged}.",
     )
 
 
@@ -386,7 +385,7 @@ def _size(of: _Numbers) -> Highlight:
 
 
 SENTENCES: tuple[Callable[[_Numbers], Highlight], ...] = (
-    *(_maximum, _free_forces, _coverage, _strong, _rising_eta2, _wider, _alike, _critical),
+    *(_maximum, _free_forces, _coverage, _strong, _critical, _rising_eta2, _wider, _alike),
     *(_stability, _shear, _volume, _size),
 )
 

@@ -12,7 +12,6 @@ import sys
 import numpy as np
 import pytest
 from heeding import heeding, interrupted, until_it_left
-from scipy import stats
 
 from granforce import measures
 from granforce.cli.parser import main
@@ -464,27 +463,24 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
         assert ", excess 0.25 |" in documents.walks(table._replace(rows=rows))
 
 
-def test_what_packings_depend_on_is_told_in_standard_errors(table):
+def test_what_packings_depend_on_is_told_by_paired_differences(table):
+    """A table for each number; the default's own mean first."""
     text = documents.preparation(table)
+    assert text.startswith("**h**\n\n| options | μ = 0.1 |")
+    first = text.partition("**φ**")[0]
     lines = {
-        line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]]
-        for line in text.splitlines()
-        if line.startswith("| ") and "---" not in line and "options" not in line
+        line.split("|")[1].strip(): line.split("|")[2].strip() for line in first.splitlines()[4:-1]
     }
-    assert text.startswith("**μ = 0.1**\n\n| options | packings |")
-    assert len(lines) == 1 + len(plans.variations(0.1)) and "default" in lines
+    assert len(lines) == 1 + len(plans.variations(0.1))
     some, usual = (
         np.array([row["dimension"] for row in table.part(part, n=20) if row["mu"] == 0.1])
         for part in ("prepared_box_mass_30_exact", "exact")
     )
+    assert lines["default"] == formatting.with_error(usual)
     apart = some - usual
-    told = lines["box mass 30"]
-    assert told[0] == "2"
-    assert told[1].startswith(f"{some.mean():.1f}"[:3])
-    if np.ptp(apart):
-        t, p = stats.ttest_1samp(apart, 0)
-        assert told[1].endswith(f"({t:+.1f})" if p >= 0.05 else f"(**{t:+.1f}**)")
-    assert "differences" in text.splitlines()[-1]
+    sign = "+" if apart.mean() > 0 else ""
+    assert lines["box mass 30"].strip("*") == f"{sign}{formatting.with_error(apart)}"
+    assert "2 pairs of packings" in text.splitlines()[-1]
 
 
 def test_differences_of_few_packings_are_judged_by_students_t():
@@ -501,12 +497,14 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     ]
     rows += [row | {"part": row["part"].removesuffix("_exact")} for row in rows[3:]]
     text = documents.preparation(tables.StudyTable({"n": 20}, rows, {}, [], {}, {}))
-    cells = {line.split("|")[1].strip(): line.split("|")[3] for line in text.splitlines()[4:8]}
-    assert cells["few"].endswith("(+3.7) ") and cells["same"].endswith("(no scatter) ")
-    assert "(**+" in cells["far"]
+    cells = {
+        line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()[4:8]
+    }
+    assert cells["default"] == "10.000" and cells["same"] == "+6.000"
+    assert cells["few"] == "+5.3 ± 1.5" and cells["far"] == "**+10.0100 ± 0.0058**"
     summary = text.splitlines()[-1]
-    assert "1 of 2 differences are significant" in summary and "1 left out" in summary
-    assert "from 10 to 20" in summary and "varied only at μ = 1." in summary
+    assert "3 pairs" in summary and "1 of 2 are significant" in summary
+    assert "1 left out" in summary and "1 are significant, 1 of them for *far*" in summary
 
 
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():

@@ -12,8 +12,7 @@ Samplers: "gauss_seidel", the paper's relaxation, whose sweeps end at 10⁻³ of
 reach at every μ; "gauss_seidel_1e-4" and "gauss_seidel_1e-6", the same to 10⁻⁴ and 10⁻⁶; "nearest"
 networks; "uniform" states; and "exact" bounds. If the networks from sweeps exceed the exact
 intervals by more than the length of those, they are not judged, and the claim says at which μ.
-Claims about packings alone have no sampler. Sources: "PRE", the paper; "PRL", the letter before it;
-"ours".
+Claims about packings alone have no sampler. Sources: "PRE", the paper; "PRL", the letter before it.
 
 The modules are named after the paper's figures to which the claims belong.
 """

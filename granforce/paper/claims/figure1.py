@@ -34,7 +34,10 @@ from granforce.paper.claims.verdicts import (
 )
 from granforce.paper.tables import StudyTable
 
-PEAK = f"μ of the maximum (parabola in log μ through the means within a factor {NEAR_PEAK:g} of it)"
+PEAK = (
+    "μ of the maximum (of a parabola in log μ, through the means within a factor "
+    f"{NEAR_PEAK:g} of that μ)"
+)
 # How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))

@@ -39,7 +39,7 @@ class Claim(NamedTuple):
 
     statement: str
     sampler: str  # of SAMPLERS; "" if no states are needed
-    source: str  # origin of the claim: PRE, PRL or OURS
+    source: str  # origin of the claim: PRE or PRL; topic of a finding
     measured: str  # description of the number
     value: float
     low: float
@@ -51,7 +51,7 @@ class Claim(NamedTuple):
     packings: int = 0  # at that μ, or the fewest at any
 
 
-PRE, PRL, OURS = "PRE", "PRL", "ours"
+PRE, PRL = "PRE", "PRL"
 
 
 class Ranges(NamedTuple):
