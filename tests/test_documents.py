@@ -328,6 +328,22 @@ def test_the_shipped_benchmark_is_of_the_present_solvers():
     assert "Not measured" not in text("granforce/docs/pages/accuracy.md")
 
 
+def test_the_summary_of_the_benchmark_has_its_least_and_largest_ratio(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text("<!-- bench: summary -->\n<!-- end -->\n")
+    rows = [
+        {"solver": solver, "ratio": ratio, "worst_residual": residual}
+        for solver, ratio, residual in (
+            ("Gauss–Seidel alone", 1.0, 1.0),
+            ("nearest", 0.5, 1e-12),
+            ("nearest", 30.0, 2e-12),
+        )
+    ]
+    benchmarks.renew([path], {"environment": {"libraries": {}}, "relaxation": rows})
+    (line,) = path.read_text().splitlines()[3:-1]
+    assert line == "| nearest network | Gauss–Seidel sweeps | 0.5 to 30 | 2·10⁻¹² |"
+
+
 def test_tables_of_the_benchmark_show_where_granforce_is_slower(tmp_path):
     path = tmp_path / "page.md"
     path.write_text("<!-- bench: pushes -->\n<!-- end -->\n")

@@ -123,6 +123,23 @@ SECTIONS = {
         "represent the uniform distribution.\n\n"
     )
 }
+# Task, baseline, part, columns of the method and of granforce's error, and the method with the ratio:
+# granforce's, or the baseline where times are relative to granforce's.
+SUMMARY = (
+    (
+        "certified bounds",
+        "a loop with HiGHS",
+        "interval_methods",
+        "method",
+        "error",
+        "granforce, 1 thread",
+    ),
+    ("nearest network", "Gauss–Seidel sweeps", "relaxation", "solver", "worst_residual", "nearest"),
+    ("nearest networks, side by side", "PIQP", "starts", "solver", "", "8 lanes"),
+    ("uniform networks", "coordinate hit-and-run", "uniform", "method", "", "hit_and_run"),
+    ("critical forces, side by side", "one after another", "pushes", "way", "", "8 lanes"),
+    ("inference", "PIQP", "inference", "method", "", "PIQP"),
+)
 _WORDS = {"hit_and_run": "coordinate hit-and-run"}
 
 
@@ -145,9 +162,23 @@ def renew(paths: Sequence[Path], results: Mapping[str, Any]) -> None:
         paths,
         KIND,
         lambda path, part: typeset(
-            _extent(results) if part == "quick" else _table(part, shown.get(part))
+            _TEXTS[part](results) if part in _TEXTS else _table(part, shown.get(part))
         ),
     )
+
+
+def _summary(results: Mapping[str, Any]) -> str:
+    """How much faster granforce is than a baseline at each task, and its error, as a table."""
+    lines = []
+    for task, baseline, part, column, error, method in SUMMARY:
+        rows = [row for row in results.get(part) or [] if row.get(column) == method]
+        factors = [row["ratio_to_piqp" if part == "starts" else "ratio"] for row in rows]
+        factors = [factor for factor in factors if factor is not None]
+        if factors:
+            errors = [row[error] for row in rows if row.get(error) is not None]
+            ends = sorted({f"{end:.3g}" for end in (min(factors), max(factors))}, key=float)
+            lines.append([task, baseline, " to ".join(ends), _cell(max(errors)) if errors else ""])
+    return markdown_table(["task", "baseline", "times faster", "largest error, ⟨f_n⟩"], lines)
 
 
 def _extent(results: Mapping[str, Any]) -> str:
@@ -241,3 +272,6 @@ def _cell(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.3g}"
     return _WORDS.get(str(value), str(value)).replace(" states", " networks")
+
+
+_TEXTS = {"quick": _extent, "summary": _summary}  # marks that are no part
