@@ -123,7 +123,7 @@ SECTIONS = {
         "represent the uniform distribution.\n\n"
     )
 }
-# Task, baseline, part, columns of the method and of granforce's error, and the method with the ratio:
+# Task, baseline, part, columns of the method and of granforce's error, and the method with a ratio:
 # granforce's, or the baseline where times are relative to granforce's.
 SUMMARY = (
     (
