@@ -104,27 +104,21 @@ _RENAMED = {
     "Carrying": {"least": "f_n_least"},
     "Informative": {
         "expected": "expected_reduction",
+        "before": "mean_interval_before",
         "after": "mean_interval_after",
     },
 }
-# Units of variables; forces are in the packing's unit.
-_VARIABLE_UNITS = {
+# Units of variables and numbers, some of one kind of result only; forces are in the packing's unit.
+_VARIABLE_UNITS: dict[str | tuple[str, str], str] = {
     **dict.fromkeys(("states", "forces", "low", "high", "load", "limit_load", "origin"), "force"),
-    **dict.fromkeys(("mean", "error", "mean_interval_after"), "force"),
+    **dict.fromkeys(("mean", "error", "mean_interval_before", "mean_interval_after"), "force"),
     **dict.fromkeys(("f_n_least", "critical_low", "critical_high"), "force"),
+    **{("Body", "corners"): "force", ("Response", "force"): "force", ("Volume", "error"): ""},
+    **dict.fromkeys((("CriticalLoad", "low"), ("CriticalLoad", "high")), ""),
     **dict.fromkeys(("residual", "violation", "gap"), UNITS["mean"]),
     **dict.fromkeys(("centre", "radius"), "length"),
     "deviation": "sigma",
     "largest": "pressure",
-}
-
-
-# Numbers of records that are forces in the packing's unit.
-_FORCES = {
-    "CriticalForce": ("low", "high", "limit_load"),
-    "Reach": ("low", "high"),
-    "Response": ("force",),
-    "Informative": ("mean_interval_before",),
 }
 
 
@@ -151,6 +145,24 @@ class _CriticalForces(NamedTuple):
     residual: Floats
     violation: Floats
     converged: Mask
+
+
+def _named(kind: str, field: str) -> str:
+    """The name of a field of a result as a variable."""
+    return _RENAMED.get(kind, {}).get(field, field)
+
+
+def _unit(kind: str, variable: str) -> str:
+    """The unit of a variable or number of a kind of result, empty if it has none."""
+    return _VARIABLE_UNITS.get((kind, variable), _VARIABLE_UNITS.get(variable, ""))
+
+
+def _in_packing_unit(result: Any, ensemble: Ensemble | None) -> Any:
+    """The result with all its forces in this unit; the ensemble is checked later."""
+    if type(result).__name__ != "Informative" or not isinstance(ensemble, Ensemble):
+        return result
+    scale = ensemble.force_scale
+    return result._replace(before=result.before * scale, after=result.after * scale)
 
 
 def _several(result: Any) -> Any:
@@ -190,13 +202,13 @@ def to_dataset(
     """
     choice(unit, UNITS, "unit")
     dataset = _dataset(result, ensemble)
-    forces = _FORCES.get(type(result).__name__, ())
-    return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble, forces)
+    kind = type(result).__name__
+    return dataset if unit == "packing" else _in_mean_forces(dataset, ensemble, kind)
 
 
 def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
     """A result as a dataset in the packing's unit."""
-    result = _several(result)
+    result = _in_packing_unit(_several(result), ensemble)
     kind = type(result).__name__
     if isinstance(result, np.ndarray) and result.ndim == 1:
         dimensions, arrays = {"value": "contact"}, {"value": result}
@@ -213,21 +225,13 @@ def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
         raise InputError(
             f"{with_article(kind)} cannot be labelled; labels exist for: {known}, networks"
         )
-    numbers = _attributes(result)
-    if kind == "Informative" and isinstance(ensemble, Ensemble):
-        arrays["after"] = result.after * ensemble.force_scale
-        before = numbers.pop("before")
-        numbers["mean_interval_before"] = before * ensemble.force_scale
     if kind == "Intervals" and isinstance(ensemble, Ensemble):
         arrays["cluster"] = clusters_of(ensemble, result)
     used = {word for words in dimensions.values() for word in words.split()}
     variables = {}
     for name, words in dimensions.items():
-        variable = _RENAMED.get(kind, {}).get(name, name)
-        unit = (
-            "force" if variable == "corners" and kind == "Body" else _VARIABLE_UNITS.get(variable)
-        )
-        attributes = {"units": unit} if unit else {}
+        variable = _named(kind, name)
+        attributes = {"units": unit} if (unit := _unit(kind, variable)) else {}
         stored = "interval_gap" if variable == "gap" else variable  # `gap` is that of contacts
         if stored in VARIABLES:
             attributes["long_name"] = VARIABLES[stored].long_name
@@ -239,7 +243,7 @@ def _dataset(result: Any, ensemble: Ensemble | None) -> xr.Dataset:
         if used & {"contact", "grain"}:
             labels |= _contact_labels(*_contacts(result, ensemble))
         labels = {name: label for name, label in labels.items() if _dimension(label, name) in used}
-        return xr.Dataset(variables, labels, numbers)
+        return xr.Dataset(variables, labels, _attributes(result))
     except ValueError as error:
         why = str(error).removeprefix(f"{_FOREIGN}: ")
         raise InputError(f"{_FOREIGN}: {why}") from None
@@ -289,13 +293,8 @@ def to_dataframe(
     return table[[*first, *(name for name in columns if name not in first)]]
 
 
-def _in_mean_forces(
-    dataset: xr.Dataset, ensemble: Ensemble | None, numbers: Sequence[str]
-) -> xr.Dataset:
-    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces.
-
-    numbers: the names of attributes that are forces.
-    """
+def _in_mean_forces(dataset: xr.Dataset, ensemble: Ensemble | None, kind: str) -> xr.Dataset:
+    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces."""
     if not isinstance(ensemble, Ensemble):
         raise InputError('unit="mean" needs S as the second argument: (result, S, unit="mean")')
     if UNITS["packing"] not in {v.attrs.get("units") for v in dataset.variables.values()}:
@@ -311,7 +310,8 @@ def _in_mean_forces(
         if values.attrs.get("units") == UNITS["packing"]
     }
     labels = {name: divided.pop(name) for name in dataset.coords if name in divided}
-    attributes = {name: dataset.attrs[name] / scale for name in numbers}
+    forces = [name for name in dataset.attrs if _unit(kind, name) == UNITS["packing"]]
+    attributes = {name: dataset.attrs[name] / scale for name in forces}
     return dataset.assign(divided).assign_coords(labels).assign_attrs(attributes)
 
 
@@ -408,7 +408,7 @@ def _dimension(label: Any, name: str) -> str:
 
 def _attributes(result: Any) -> dict[str, Any]:
     fields = getattr(result, "_fields", ())
-    every = {name: getattr(result, name) for name in fields}
+    every = {_named(type(result).__name__, name): getattr(result, name) for name in fields}
     return {
         name: int(value) if isinstance(value, bool) else value
         for name, value in every.items()

@@ -421,10 +421,12 @@ def test_loads_volumes_and_shapes_are_labelled():
     volume = gf.volume(S, accuracy=0.5)
     assert gf.to_dataset(volume)["ladders"].sel(ladder="up") == volume.ladders[1]
     assert gf.to_dataframe(volume)["log_volume"].tolist() == [volume.log_volume] * 2
+    assert "units" not in gf.to_dataset(volume)["error"].attrs  # of ln V
     small = gf.ensemble(gf.scene("groove", 0.5))
     body = gf.body(small)
     labelled = gf.to_dataset(body, small)
     assert labelled["axes"].dims == ("direction", "contact", "component")
+    assert labelled["corners"].units == labelled["origin"].units == "force"
     assert len(gf.to_dataframe(body, small)) == len(body.axes) * len(small.index)
     axes = np.zeros((2, len(S.index), 2))
     axes[0, 0, 0] = axes[1, 4, 0] = 1.0
