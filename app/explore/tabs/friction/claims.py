@@ -21,7 +21,6 @@ SAMPLERS = {
     "exact": "exact",
     "": "packings alone",
 }
-OUTCOMES = ("reproduced", "contradicted", "open")
 UNBROKEN = "\u00a0…\u00a0"  # of a range
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th>{}</tr>"
@@ -34,12 +33,10 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
     chosen = study_data.claims(about)
     if not chosen:
         return ""
-    by_statement: dict[str, dict[str, dict[str, Any]]] = {}
-    for claim in chosen:
-        by_statement.setdefault(claim["statement"], {})[claim["sampler"]] = claim
-    used = [name for name in SAMPLERS if any(name in one for one in by_statement.values())]
+    grouped = outcomes.by_claim(chosen)
+    used = [name for name in SAMPLERS if any(name in one for one in grouped.values())]
     rows = [HEAD.format("".join(f"<th>{SAMPLERS[name]}</th>" for name in used))]
-    for statement, one in by_statement.items():
+    for (statement, *_), one in grouped.items():
         cells = "".join(
             CELL.format(SAMPLERS[name], _cell(one[name])) if name in one else "<td></td>"
             for name in used
@@ -64,8 +61,8 @@ def summary() -> str:
 
 
 def _counted(claims: Rows) -> str:
-    count = outcomes.counted(claims)
-    return ", ".join(f"{count[name]} {name}" for name in OUTCOMES if count[name])
+    counts = outcomes.counted(claims).items()
+    return ", ".join(f"{count} {outcome}" for outcome, count in counts if count)
 
 
 def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
