@@ -177,6 +177,12 @@ class Packing(NamedTuple):
         """φ = Σ π r² / V, including rattlers; NaN in an open box."""
         return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan
 
+    @property
+    def walls(self) -> Floats:
+        """Ends (k, 4) of walls, length; k = 0 if unknown: some files only tell what touches."""
+        ends = self.info.get("walls")  # some importers count walls
+        return np.array(ends if isinstance(ends, list) else [], dtype=float).reshape(-1, 4)
+
     def through_contacts(self, numbers: Integers, forces: Floats) -> tuple[Floats, Floats]:
         """Lines through contacts (k,) along their forces (k, 2): begin and branch (k, 2).
 

@@ -44,15 +44,15 @@ class Links(NamedTuple):
 
 def bodies(packing: Packing) -> int:
     """The number of disks or bodies; grains that follow them are behind walls."""
-    walls, grains = packing.info.get("walls", 0), len(packing.r)
-    return packing.info["disks"] if isinstance(walls, list) else grains - walls
+    if "disks" in packing.info:
+        return packing.info["disks"]
+    return len(packing.r) - packing.info.get("walls", 0)
 
 
 def walls(packing: Packing, backbone: Integers) -> Floats:
     """Ends (k, 4) of walls as given, else of short lines along them where they are touched."""
-    given = packing.info.get("walls")
-    if isinstance(given, list):
-        return np.array(given, dtype=float).reshape(-1, 4)
+    if len(packing.walls):
+        return packing.walls
     touched = backbone[packing.contacts.j[backbone] >= bodies(packing)]
     at, c = packing.contact_points[touched], packing.contacts.picked(touched)
     along = SHORT * packing.r[c.i, None] * c.tangent

@@ -268,9 +268,8 @@ def _polygons(shapes: list[Floats], backend: str, fill: str) -> Any:
 
 def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[Any]:
     """Walls as given, else short lines along external supports at the points of contact."""
-    given = packing.info.get("walls")
-    if isinstance(given, list):  # other importers count them
-        return [hv.Segments(given, label="wall").opts(backend=backend, color="#000000")]
+    if len(packing.walls):
+        return [hv.Segments(packing.walls, label="wall").opts(backend=backend, color="#000000")]
     c, held = packing.contacts.picked(numbers), left_open_in(packing)
     touched = np.flatnonzero(held[c.j])
     if packing.shapes is not None or not len(touched):

@@ -43,7 +43,7 @@ def packing_of(name: str, mu: float | None = None, built: str = "") -> Packing:
 def geometry(packing: Packing) -> dict[str, Any]:
     """Disks, walls, contacts and the balance of a packing without its cones."""
     contacts, count, shapes = packing.contacts, _count(packing), packing.shapes
-    walls = np.reshape(packing.info.get("walls", []), (-1, 4))
+    walls = packing.walls
     outlines = [] if shapes is None else shapes.polygons()
     if outlines and not len(walls):
         walls = _touched_sides(outlines[count:], packing.contact_points[contacts.j >= count])

@@ -309,7 +309,7 @@ def _settled(packing: Packing) -> Packing:
         named = ", ".join(str(whole.grains[k]) for k in worst)
         total = ", ".join(f"{value:.3g}" for value in np.nansum(packing.load[:, :2], axis=0))
         walls = ""
-        if len(packing.info.get("walls", [])) == 1:
+        if len(packing.walls) == 1:
             walls = "; only one wall is given: do grains need side walls (--walls box, or walls=)?"
         elif not left_open_in(packing).any():
             walls = "; if walls hold the grains, give them (--walls floor, or walls=)"
