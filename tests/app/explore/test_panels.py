@@ -989,7 +989,7 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     served = Document()
     served.js_on_event("document_ready", CustomJS(code="ofAnotherPage()"))
     view = state.view
-    told = {"link": "", "command": "", "source": ""}
+    told = {"link": "", "command": "", "source": "", "job": Job(lambda job: None)}
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
     assert b"bk-" in page and b"ofAnotherPage" not in page

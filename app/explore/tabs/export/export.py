@@ -12,7 +12,6 @@ import xarray as xr
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, network, origin, shown_stem, stem
 from ....packing.view import measured, pins, reduction
-from ....results import planes
 from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
 from ....results.saved_file import File, csv
@@ -83,17 +82,12 @@ class Snapshot:
 
     def html(self, job: Job) -> File:
         """The view as a page that needs no server."""
-        outlined, shown = None, self._shown
-        if self.replay.summary["dimension"] > 0:
-            thinned_replay = standalone.thinned(self.replay, self.view["frame"])
-            principal = planes.principal(thinned_replay)
-            outlined = planes.outline(self.library, self.cell, thinned_replay, principal)(job)
-            if self.replay.outlines:
-                shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
-        job.begin("making the page")
+        shown = self._shown
+        if self.replay.outlines and self.replay.summary["dimension"] > 0:
+            shown = shown | {"thrust": thrust(self.library, self.cell)(job)}
         content = standalone.html(
             self.library, self.cell, self.replay, self.exact, shown, view=self.view,
-            outlined=outlined, narrowed=self.narrowed, link=self.link, command=self.command,
+            job=job, narrowed=self.narrowed, link=self.link, command=self.command,
             source=" ".join([self.source, *self.known]),
         )  # fmt: skip
         return self.file("html", "text/html", content)

@@ -14,6 +14,7 @@ from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.resources import Resources
 
+from ....background.jobs import Job
 from ....browser.bundle import Scripted, module
 from ....packing.player import Player, frames
 from ....packing.view import THRUST, exact_intervals, full_extent, legend
@@ -68,17 +69,20 @@ def html(
     link: str,
     command: str,
     source: str,
-    outlined: planes.Outlined | None = None,
+    job: Job,
     narrowed: Narrowed | None = None,
 ) -> bytes:
-    """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
+    """The file's bytes. view: parameters of AppState by name; job: computes the outline of S.
 
     exact: without known forces, narrowed: with them; shown: loads, reduction, measured, pins and
     thrust, as for the player.
     """
     intervals = exact_intervals(exact if narrowed is None else narrowed.after, replay)
     thinned_replay = thinned(replay, view["frame"])
-    plane = planes.principal(thinned_replay)
+    plane, outlined = planes.principal(thinned_replay), None
+    if replay.summary["dimension"] > 0:
+        outlined = planes.outline(library, cell, thinned_replay, plane)(job)
+    job.begin("making the page")
     figures = still.figures(library, thinned_replay, exact, plane, outlined, view, narrowed)
     # In a separate document: otherwise Bokeh adds the scripts of a page that is being served.
     bare = Document()

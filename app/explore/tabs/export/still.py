@@ -1,6 +1,5 @@
 """The plots next to the packing as they are, for a file, independent of any page."""
 
-import numpy as np
 import xarray as xr
 from bokeh.plotting import figure as Figure
 from param.parameterized import discard_events
@@ -53,7 +52,7 @@ def figures(
     bars = intervals.View(at_rest(library, replay, exact, view, "intervals", None, narrowed))
     space = force_space.View(at_rest(library, replay, exact, view))
     space._show(replay, chosen)
-    if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):
+    if outlined is not None:
         space._outlined(replay, outlined)
     space.drawing.figure.sizing_mode = "scale_width"
     return bars.drawing.figure, bars.growth.figure, space.drawing.figure
