@@ -42,8 +42,6 @@ WORDS = {
 UNPACKED = 8
 # Bytes and rows examined to recognise photoelastic files.
 LOOKED_AT, ROWS = 4000, 20
-# Options of the command and arguments of the function in a message: " (--walls floor, or walls=)".
-_OPTIONS = re.compile(r" \((?:--|\w+=)[^()]*\)")
 
 
 class Brought(NamedTuple):
@@ -187,11 +185,6 @@ def read(
         )
     limits.check(mu=packing.mu, n=len(packing.r))
     return packing
-
-
-def without_options(line: str) -> str:
-    """A message without the names of options and arguments in brackets: the page has fields."""
-    return _OPTIONS.sub("", line)
 
 
 def opened(name: str, content: bytes) -> io.BytesIO:

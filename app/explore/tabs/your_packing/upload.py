@@ -1,6 +1,7 @@
 """Bring your own packing: drop its files, read the report, and use it like any other."""
 
 import html
+import re
 from typing import Any
 
 import panel as pn
@@ -52,6 +53,8 @@ WALLS = {
 }
 AROUND = {"": "none", "floor": "a floor", "box": "a floor and two sides"}
 SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
+# Options of the command and arguments of the function in a message: " (--walls floor, or walls=)".
+OPTIONS = re.compile(r" \((?:--|\w+=)[^()]*\)")
 
 
 class View:
@@ -227,7 +230,7 @@ class View:
         self.waiting.param.update(title=line, visible=bool(line))
 
     def _refuse(self, line: str) -> None:
-        line = uploads.without_options(line)
+        line = OPTIONS.sub("", line)  # the page has fields instead
         self.error.param.update(title=line, visible=bool(line))
 
 
