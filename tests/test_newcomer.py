@@ -236,7 +236,7 @@ def test_a_table_of_contacts_says_which_grains_touch_and_where(cache, capsys):
 
 
 COMMANDS = {  # with lines that appear in this form only, and are explained all the same
-    "pack -n 12 --mu 0.3": set(),
+    "pack -n 12 --mu 0.3": {"scene"},
     "walk P --states 4": set(),
     "measure P --states 4": set(),
     "uniform P --states 8": {"reached"},

@@ -185,7 +185,7 @@ PACKING = (
     *("mean_normal_force", "residual", "violation", "largest_overlap", "largest_contact_gap"),
     "least_other_gap",
 )
-PACK = (*PACKING, "steps", "sweeps_done", "distance_to_rest", "at_rest", "cached")
+PACK = ("scene", *PACKING, "steps", "sweeps_done", "distance_to_rest", "at_rest", "cached")
 PEGS = (
     *("contacts_listed", "candidates", "unbalanced_on_listed_contacts", "unbalanced"),
     *("left_open", "candidates_that_carry", "unbalance_saved_if_tangential_forces_were_reversed"),
@@ -202,9 +202,9 @@ MEASURE = (
     *("largest_extent_of_f_n", "correlation", "correlation_low", "correlation_high"),
     *("mean_distance_to_centre", "original_distance"),
 )
-_MIXING = ("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped")
+MIXING = ("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped")
 UNIFORM = (
-    *("entry", "states", *_STATES, *_MIXING, "held", "skipped", "rattlers", "unloaded_contacts"),
+    *("entry", "states", *_STATES, *MIXING, "held", "skipped", "rattlers", "unloaded_contacts"),
     *("reached", "mean_distance_to_centre", "original_distance", "setup_seconds"),
     *("sampling_seconds", *_CHECKS),
 )
@@ -218,8 +218,7 @@ INTERVALS = (
     *("contacts", "dimension", "coordination", "exact_eta3", "mean_normal_force"),
     *("mean_extent_of_f_n", "largest_extent_of_f_n", "contacts_with_unbounded_f_n"),
     *("contacts_with_unbounded_f_t", "contacts_not_certified", "correlation"),
-    "determined_contacts",
-    *("undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
+    *("determined_contacts", "undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
 )
 BOUNDS = ("f_n_low", "f_t_low", "f_n_high", "f_t_high", "cluster")
 LIMIT_LOADS = (
@@ -255,7 +254,7 @@ CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
-    *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error", *_MIXING),
+    *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error", *MIXING),
     *("held", "setup_seconds", "sampling_seconds", "seconds", "cached"),
 )
 

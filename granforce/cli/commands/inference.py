@@ -7,6 +7,7 @@ import numpy as np
 
 from granforce.cli import frames
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
+from granforce.cli.report_lines import MIXING
 from granforce.cli.results import (
     conditions,
     contact_labels,
@@ -22,10 +23,7 @@ from granforce.study import kinds
 from granforce.system.terminal import print_notes, report_after
 from granforce.tolerances import CARRYING
 
-INFERENCE_LINES = (
-    *("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held"),
-    *("setup_seconds", "sampling_seconds"),
-)
+INFERENCE_LINES = (*MIXING, "held", "setup_seconds", "sampling_seconds")
 
 
 def informative(arguments: argparse.Namespace) -> None:

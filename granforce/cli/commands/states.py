@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from granforce.cli.report_lines import MIXING
 from granforce.cli.results import (
     check_outputs,
     conditions,
@@ -55,9 +56,8 @@ def walk(arguments: argparse.Namespace) -> None:
 
 
 UNIFORM_LINES = (
-    *("packing_fraction", "coordination", "eta1", "eta2", "eta3", "worst_r_hat"),
-    *("least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held", "skipped"),
-    *("rattlers", "unloaded_contacts"),
+    *("packing_fraction", "coordination", "eta1", "eta2", "eta3", *MIXING),
+    *("held", "skipped", "rattlers", "unloaded_contacts"),
 )
 
 
