@@ -73,12 +73,7 @@ def follow(
             failed.set()  # stop the other threads
             raise
 
-    if workers == 1:
-        carry()
-        return
-    with cancelling.threads(workers) as pool:
-        for task in [pool.submit(carry) for _ in range(workers)]:
-            task.result()
+    cancelling.on_threads(carry, workers)
 
 
 def _carry(

@@ -105,12 +105,7 @@ def run(
     def work() -> None:
         _work(problem, middle, programs, waiting, mode, finished)
 
-    if workers == 1:
-        work()
-        return
-    with cancelling.threads(workers) as pool:
-        for task in [pool.submit(work) for _ in range(workers)]:
-            task.result()
+    cancelling.on_threads(work, workers)
 
 
 def _work(

@@ -152,6 +152,16 @@ def threads(workers: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, initializer=_scope.set, initargs=(_scope.get(),))
 
 
+def on_threads(work: Callable[[], object], workers: int) -> None:
+    """Call work() once in each of so many threads, in the calling one if it is enough."""
+    if workers == 1:
+        work()
+        return
+    with threads(workers) as pool:
+        for task in [pool.submit(work) for _ in range(workers)]:
+            task.result()
+
+
 def apart(
     call: Callable[..., T], *arguments: Any, interrupt: Callable[[], object] | None = None
 ) -> T:
