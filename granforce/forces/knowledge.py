@@ -178,9 +178,7 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     short = least[:, 0] - most[:, 0]
     if np.any(short > ADMISSIBLE):
         c = int(np.argmax(short))
-        raise NotJammedError(
-            _beyond_coulomb(index[c], bounds[c], mu[c], needed[c], short[c] * scale)
-        )
+        raise NotJammedError(_beyond_coulomb(index[c], bounds[c], mu[c], short[c] * scale))
     pinned, value = np.zeros(low.shape, dtype=bool), np.zeros(low.shape)
     pinned[:, 0] = most[:, 0] - least[:, 0] <= FLAT
     value[pinned[:, 0], 0] = np.maximum(most[pinned[:, 0], 0], 0.0)
@@ -204,7 +202,7 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     return Polygons(low, high, pinned, value, contact, component, sign, limit)
 
 
-def _beyond_coulomb(contact: int, bounds: Floats, mu: float, needed: float, short: Floats) -> str:
+def _beyond_coulomb(contact: int, bounds: Floats, mu: float, short: Floats) -> str:
     (_, high), (t_low, t_high) = bounds
     if high < 0:
         return (

@@ -373,7 +373,7 @@ def response(
             f"the grains stay at rest under a force of {load * scale:.6g} on contact {contact}: "
             "the critical force lies above"
         )
-    return _response(S, step, int(contact), position, load * scale, moving)
+    return _response(S, step, int(contact), load * scale, moving)
 
 
 def _check_its_own(S: Ensemble, critical: CriticalForce, contact: int, position: int) -> None:
@@ -405,9 +405,7 @@ def motion_of(S: Ensemble, moving: Outcome) -> tuple[Floats, Floats, float]:
     return displacement, rotation, float(unit)
 
 
-def _response(
-    S: Ensemble, step: Step, contact: int, position: int, load: float, moving: Outcome
-) -> Response:
+def _response(S: Ensemble, step: Step, contact: int, load: float, moving: Outcome) -> Response:
     displacement, rotation, unit = motion_of(S, moving)
     relative = relative_velocities(step, moving.velocity) / unit
     box = moving.velocity[S.pressure_row] if S.has_pressure_row else 0.0
