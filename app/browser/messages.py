@@ -25,7 +25,7 @@ FROM_BROWSER = {
         {"want": str, "name": str},
         {"want": str, "name": str, "network": [float, ...]},
     ),
-    "LoadSlider": ({"push": True}, {"gave": True}),  # moved; reached the load at which disks move
+    "LoadSlider": ({"push": True}, {"reached": True}),  # moved; to where disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
     "NumberField": ({"typed": str},),  # not a number
     "Player": (

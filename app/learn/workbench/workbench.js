@@ -1,6 +1,6 @@
 // The workbench of small scenes: the disks and their S side by side, friction, and the tools.
 
-import { goneBanner } from "../../browser/connection_lost.js"
+import { connectionBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
 import { sceneOptions } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
@@ -27,8 +27,8 @@ class Workbench {
     const root = this.root = document.createElement("div")
     root.className = "bench"
     root.innerHTML = layout(MOST_MU)
-    this.gone = goneBanner(view, "What is in the page still moves.")
-    root.prepend(this.gone)
+    this.banner = connectionBanner(view, "What is in the page still moves.")
+    root.prepend(this.banner)
     this.builder = new Builder(this.part("own"), (built) => this.build(built))
     this.arrows = new Arrows(this.part("packing"), (what, given) => this.respond(what, given))
     this.space = new Space(this.part("space"), (what, given) => this.respond(what, given))
@@ -374,7 +374,7 @@ class Workbench {
       clearTimeout(this.resting)
       return this.address.leave(scene, chosenMu ? mu : null, model.dark)
     }
-    if (!this.gone.hidden) { // the page reloads its address once the server is back
+    if (!this.banner.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)
       return this.say("This scene opens once the connection is back.")
     }

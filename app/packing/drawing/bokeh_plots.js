@@ -9,7 +9,7 @@ export class Plots {
     this.document = document
     this.handles = [
       new Handles(this, "bars", "bars", ["rank", "now"], dots),
-      new Handles(this, "path", "here", ["x", "y"], point),
+      new Handles(this, "path", "current", ["x", "y"], point),
     ]
     this.plane = {}
     this.onData = onData

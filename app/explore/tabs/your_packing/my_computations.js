@@ -17,12 +17,12 @@ export function render({ model, view }) {
     it.textContent = "Delete permanently?"
   }
 
-  function line({ entry, name, what, when, megabytes, here }) {
+  function line({ entry, name, what, when, megabytes, shown }) {
     const row = document.createElement("tr"), look = { className: "soft" }
     const field = createElement("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
     field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
     const words = createElement("span", { textContent: what })
-    const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
+    const last = shown ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
     last.push(" ", button("Delete", (it) => remove(entry, it), look))
     const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
       [size(megabytes)], last]
