@@ -41,8 +41,8 @@ FROM_BROWSER = {
         {"hand": {"free": True}},
         {"known": {"hold": [int, float, float]}},  # a contact, its f_n, and ± its error bar
         {"known": {"release": int}},
-        {"live": {"anew": True, "seen": bool}},
-        {"live": {"seen": bool}},  # whether the page is visible
+        {"live": {"anew": True, "visible": bool}},
+        {"live": {"visible": bool}},  # whether the page is visible
         {"live": {"painted": int}},  # number of the last message that was painted
     ),
     "Results": ({"measure": True},),  # measure the volume of S
