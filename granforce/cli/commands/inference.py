@@ -10,8 +10,8 @@ from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.cli.results import (
     conditions,
     contact_labels,
-    found,
     sample_notes,
+    stored_result,
     unit,
     without_work,
 )
@@ -30,7 +30,7 @@ INFERENCE_LINES = (
 
 def informative(arguments: argparse.Namespace) -> None:
     """Rank contacts worth measuring, or load the ranking, and report them."""
-    entry, parameters, dataset, ends = found(
+    entry, parameters, dataset, ends = stored_result(
         *(arguments, kinds.INFORMATIVE, arguments.out),
         k=arguments.best,
         check=arguments.check,
@@ -70,7 +70,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
     arguments.packing = arguments.files[0] if arguments.files else None
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
-    entry, parameters, dataset, ends = found(
+    entry, parameters, dataset, ends = stored_result(
         *(arguments, kinds.INFERENCE, arguments.out),
         options={"measured": measured},
         measured=measured,
