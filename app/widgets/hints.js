@@ -132,10 +132,10 @@ export function render({ model }) {
   }
 
   // Scrolling inside a shadow root is not heard here, but what causes it is.
-  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll, wheel: scroll, touchmove: hide }
-  for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, true)
+  const listeners = { pointermove: move, pointerdown: press, keyup: typed, scroll, wheel: scroll, touchmove: hide }
+  for (const [name, act] of Object.entries(listeners)) window.addEventListener(name, act, true)
   model.on("remove", () => {
-    for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)
+    for (const [name, act] of Object.entries(listeners)) window.removeEventListener(name, act, true)
   })
   return tip
 }

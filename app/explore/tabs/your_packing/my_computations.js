@@ -11,10 +11,10 @@ export function render({ model, view }) {
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
   /** Delete only at a second click. */
-  function remove(entry, it) {
-    if (it.dataset.sure) return ask(model, view, { delete: entry })
-    it.dataset.sure = "yes"
-    it.textContent = "Delete permanently?"
+  function remove(entry, element) {
+    if (element.dataset.sure) return ask(model, view, { delete: entry })
+    element.dataset.sure = "yes"
+    element.textContent = "Delete permanently?"
   }
 
   function line({ entry, name, what, when, megabytes, shown }) {
@@ -23,7 +23,7 @@ export function render({ model, view }) {
     field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
     const words = createElement("span", { textContent: what })
     const last = shown ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
-    last.push(" ", button("Delete", (it) => remove(entry, it), look))
+    last.push(" ", button("Delete", (element) => remove(entry, element), look))
     const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
       [size(megabytes)], last]
     for (const part of parts) row.insertCell().append(...part)
