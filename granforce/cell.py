@@ -82,8 +82,8 @@ class Cell(NamedTuple):
         first, last = (np.where(periodic, steps, 0.0).astype(int) for steps in (first, last))
         for step in itertools.product(*(range(a, b + 1) for a, b in zip(first, last, strict=True))):
             moved = step * side
-            seen = (high + moved > -margin) & (low + moved < side + margin)
-            yield step @ self.vectors, np.flatnonzero(np.all(seen | ~periodic, axis=1))
+            visible = (high + moved > -margin) & (low + moved < side + margin)
+            yield step @ self.vectors, np.flatnonzero(np.all(visible | ~periodic, axis=1))
 
     def wrapped(self, x: npt.ArrayLike) -> Floats:
         """Points (…, 2) at their image in the parallelogram, unchanged in open directions."""

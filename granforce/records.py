@@ -275,8 +275,8 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
 
 def refuse_options(function: Callable[..., Any], given: Iterable[str], more: Iterable[str]) -> None:
     """TypeError for an option that is neither the function's own nor among `more`."""
-    own = inspect.signature(function).parameters.values()
-    names = [one.name for one in own if one.default is not one.empty]
+    parameters = inspect.signature(function).parameters.values()
+    names = [one.name for one in parameters if one.default is not one.empty]
     for name in sorted(set(given) - set(more))[:1]:
         raise TypeError(
             f"{function.__name__} has no option {name!r}; its options are "

@@ -6,11 +6,11 @@ import { createElement } from "./dom.js"
 const RETRY_MS = 1000 // time between two requests to a missing server
 
 /** The banner that reports it; still: what continues to work meanwhile. */
-export function goneBanner(view, still) {
+export function connectionBanner(view, still) {
   const banner = createElement("div", { className: "gone", role: "alert", hidden: true })
   let lost = false
 
-  function gone() {
+  function lose() {
     if (lost) return
     lost = true
     for (const data of wishes()) data.wish = undefined // until now the server received them
@@ -27,22 +27,22 @@ export function goneBanner(view, still) {
 
   /** The same view, with the μ chosen meanwhile. */
   function reopen() {
-    const address = new URL(window.location.href), [asked] = wishes()
-    if (asked) address.searchParams.set("mu", asked.wish)
+    const address = new URL(window.location.href), [slider] = wishes()
+    if (slider) address.searchParams.set("mu", slider.wish)
     window.history.replaceState(null, "", address)
     window.location.reload()
   }
 
   async function retry() {
-    const asked = new URL("static/js/bokeh.min.js", window.location.href)
+    const address = new URL("static/js/bokeh.min.js", window.location.href)
     try {
-      const answer = await fetch(asked, { method: "HEAD", cache: "no-store" })
+      const answer = await fetch(address, { method: "HEAD", cache: "no-store" })
       if (answer.ok) return reopen()
     } catch { /* still missing */ }
     setTimeout(retry, RETRY_MS)
   }
 
-  window.addEventListener("offline", gone)
-  view.model.document.on_event("connection_lost", gone)
+  window.addEventListener("offline", lose)
+  view.model.document.on_event("connection_lost", lose)
   return banner
 }

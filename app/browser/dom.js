@@ -5,7 +5,7 @@ export function createElement(tag, look) { return Object.assign(document.createE
 
 /** A button with this text and action. */
 export function button(textContent, act, look = {}) {
-  const it = createElement("button", { type: "button", textContent, ...look })
-  it.addEventListener("click", () => act(it))
-  return it
+  const element = createElement("button", { type: "button", textContent, ...look })
+  element.addEventListener("click", () => act(element))
+  return element
 }

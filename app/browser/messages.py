@@ -25,7 +25,7 @@ FROM_BROWSER = {
         {"want": str, "name": str},
         {"want": str, "name": str, "network": [float, ...]},
     ),
-    "LoadSlider": ({"push": True}, {"gave": True}),  # moved; reached the load at which disks move
+    "LoadSlider": ({"push": True}, {"reached": True}),  # moved; to where disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
     "NumberField": ({"typed": str},),  # not a number
     "Player": (
@@ -41,8 +41,8 @@ FROM_BROWSER = {
         {"hand": {"free": True}},
         {"known": {"hold": [int, float, float]}},  # a contact, its f_n, and ± its error bar
         {"known": {"release": int}},
-        {"live": {"anew": True, "seen": bool}},
-        {"live": {"seen": bool}},  # whether the page is visible
+        {"live": {"anew": True, "visible": bool}},
+        {"live": {"visible": bool}},  # whether the page is visible
         {"live": {"painted": int}},  # number of the last message that was painted
     ),
     "Results": ({"measure": True},),  # measure the volume of S

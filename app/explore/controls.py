@@ -53,14 +53,14 @@ def differs(state: AppState) -> str:
     return differing(state.selection, state.cell and state.cell.selection)
 
 
-def _made(state: AppState) -> str:
+def _opener(state: AppState) -> str:
     """The line that opens the options, with the number of disks on screen."""
     n = None if state.cell is None else state.cell.selection.packing.get("n")
     return MADE if n is None else f"{n} disks\n{MADE}"
 
 
 class Controls:
-    """Widgets for the state's selection: the `line`, and `made`, which it opens."""
+    """Widgets for the state's selection: the `line`, and `options`, which it opens."""
 
     def __init__(self, state: AppState) -> None:
         self.state, self.work = state, state.work
@@ -101,7 +101,7 @@ class Controls:
             css_classes=["controls-line"],
             sizing_mode="stretch_width",
         )
-        self.made = pn.FlexBox(
+        self.options = pn.FlexBox(
             self.n,
             self.seed,
             self.packed,
@@ -116,7 +116,7 @@ class Controls:
             css_classes=["made"],
             sizing_mode="stretch_width",
         )
-        self.opens.link(self.made, open="visible")
+        self.opens.link(self.options, open="visible")
         state.looks.keep_open(self.opens, "made")
 
     def _number(self, label: str, start: int, end: float, step: int = 1) -> NumberField:
@@ -195,7 +195,7 @@ class Controls:
         known = state.cell is not None and state.cell.selection.packing == packing
         if selection.imported and known:
             self.n.value = state.replay.summary["n"]
-        self.opens.line = _made(state)
+        self.opens.line = _opener(state)
         self.n.param.update(disabled=selection.imported, visible=known or not selection.imported)
         self.seed.visible = self.packed.visible = not selection.imported
         self.packed.value = SAME if selection.same_mu else f"{packing['mu']:g}"

@@ -162,7 +162,7 @@ class _Around:
     def parts(self, player: Player) -> Iterator[None]:
         """Create everything that follows the packing, in steps."""
         state, controls = self.state, Controls(self.state)
-        self.controls[:] = [controls.line, controls.made]
+        self.controls[:] = [controls.line, controls.options]
         yield
         tabs = Tabs(state, self.space)
         player.hears["tab"] = tabs.choose

@@ -92,8 +92,8 @@ export function render({ model, view }) {
     event.stopPropagation()
   })
   typed.addEventListener("change", () => {
-    const asked = Number(typed.value.replace(",", "."))
-    if (Number.isFinite(asked)) view.model.data.wish = asked
+    const mu = Number(typed.value.replace(",", "."))
+    if (Number.isFinite(mu)) view.model.data.wish = mu
     model.send_msg({ typed: typed.value })
   })
 

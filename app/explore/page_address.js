@@ -2,13 +2,13 @@
 // connection_lost.js.
 
 import { ask } from "../browser/send.js"
-import { goneBanner } from "../browser/connection_lost.js"
+import { connectionBanner } from "../browser/connection_lost.js"
 import { keepView } from "../browser/local_storage.js"
 
 export function render({ model, view }) {
-  const banner = goneBanner(view, "Everything already loaded still plays.")
-  let asked = model.settled // number of Back and Forward requests
-  const waits = () => asked > model.settled // until then the address is ahead of the view
+  const banner = connectionBanner(view, "Everything already loaded still plays.")
+  let requests = model.settled // number of Back and Forward requests
+  const waits = () => requests > model.settled // until then the address is ahead of the view
 
   /** A query without the parameters that Back ignores. */
   function lasting(query) {
@@ -31,7 +31,7 @@ export function render({ model, view }) {
   function returned() {
     const query = window.location.search
     if (!waits() && lasting(query) === lasting(model.query)) return
-    asked++
+    requests++
     ask(model, view, { query })
   }
 

@@ -27,7 +27,7 @@ class Address(Scripted):
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
-        self._state, self._asked = state, 0
+        self._state, self._requests = state, 0
         state.work.reader.param.watch(self._settle, "running")
         state.param.watch(self._tell, "selection")
         for part in state.parts:
@@ -41,10 +41,10 @@ class Address(Scripted):
 
     def _settle(self, *events: Any) -> None:
         if not self._state.work.reader.running:
-            self.settled = self._asked
+            self.settled = self._requests
 
     def _heard(self, message: Message) -> None:
         """The visitor went back or forward to another view."""
-        self._asked += 1
+        self._requests += 1
         self._state.open(message["query"])
         self._settle()

@@ -27,12 +27,12 @@ export function render({ model, view }) {
   }
 
   function show() {
-    const { fraction = null, words: said, keeps } = plain(model.progress), known = fraction !== null
+    const { fraction = null, words: sentence, keeps } = plain(model.progress), known = fraction !== null
     late = 0
     failed.hidden = !model.failed
     failed.replaceChildren(model.failed, button("×", () => ask(model, view, { read: true }), { ariaLabel: "Close" }))
     facts.replaceChildren(...model.facts.map((fact) => createElement("span", { innerHTML: fact })))
-    task.hidden = !said
+    task.hidden = !sentence
     facts.style.visibility = task.hidden && !model.failed ? "" : "hidden"
     view.el.classList.toggle("urgent", !task.hidden || Boolean(model.failed)) // visible at any scroll position
     if (task.hidden) return
@@ -41,7 +41,7 @@ export function render({ model, view }) {
     bar.ariaValueNow = known ? Math.round(100 * fraction) : null
     stop.hidden = !keeps
     cancel.textContent = keeps ? "Discard" : "Cancel"
-    words.textContent = words.title = said
+    words.textContent = words.title = sentence
   }
 
   function follow() {
@@ -57,9 +57,9 @@ export function render({ model, view }) {
 }
 
 function invitation() {
-  const told = createElement("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
+  const paragraph = createElement("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
   const link = createElement("a", { href: `${location.pathname}?learn${dark ? "&dark=1" : ""}`, textContent: "Learn" })
-  const close = button("×", () => { remember(NEW); told.remove() }, { ariaLabel: "Close permanently" })
-  told.append("New to this? ", link, " starts with one disk", close)
-  return told
+  const close = button("×", () => { remember(NEW); paragraph.remove() }, { ariaLabel: "Close permanently" })
+  paragraph.append("New to this? ", link, " starts with one disk", close)
+  return paragraph
 }

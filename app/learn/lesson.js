@@ -103,7 +103,7 @@ class Lesson {
     voice.textContent = "Loading … The first time on a server, this can take a minute."
     const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(createElement("figure", { className })))
     const row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
-    const move = (words, by) => button(words, () => this.go(number + by), { disabled: !CHAPTERS[number + by] })
+    const move = (words, step) => button(words, () => this.go(number + step), { disabled: !CHAPTERS[number + step] })
     turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
     row.append(turn)
     const { pathname } = window.location, { scene } = chapter.options

@@ -82,7 +82,7 @@ class Lesson(Scripted):
             task = self._tasks[what + name] = self._task(pool)
             task.param.watch(partial(self._failed, what, name), "message")
         if not task.running:
-            task.start(lambda job: compute(), lambda found: self._tell(what, name, given=found))
+            task.start(lambda job: compute(), lambda answer: self._tell(what, name, given=answer))
 
     def _tell(self, what: str, name: str, **answer: Any) -> None:
         self._tasks.pop(what + name, None)

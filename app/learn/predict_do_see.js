@@ -32,7 +32,7 @@ export class PredictDoSee {
 
   stop() { this.sized.disconnect() }
 
-  get stage() { return !this.predicted ? 0 : this.experiment.found ? 2 : 1 }
+  get stage() { return !this.predicted ? 0 : this.experiment.answered ? 2 : 1 }
 
   /** The least and the largest prediction. */
   get possible() { return this.experiment.possible ?? [this.chapter.x.low, this.chapter.x.high] }
@@ -118,16 +118,16 @@ export class PredictDoSee {
       const words = stage === 0 ? PREDICT : this.ready ? chapter.doing : WAIT
       this.say([words], () => [createElement("p", { textContent: words })])
     } else {
-      const said = chapter.see(experiment.facts)
-      this.say(said, () => this.answer(said, chapter.count?.(experiment.facts)))
+      const sentences = chapter.see(experiment.facts)
+      this.say(sentences, () => this.answer(sentences, chapter.count?.(experiment.facts)))
     }
   }
 
   /** Replace the text by parts(), if its words change. */
   say(words, parts) {
-    const { voice } = this, said = words.join(" ")
-    if (voice.dataset.said === said) return
-    voice.dataset.said = said
+    const { voice } = this, text = words.join(" ")
+    if (voice.dataset.text === text) return
+    voice.dataset.text = text
     voice.replaceChildren(...parts())
   }
 

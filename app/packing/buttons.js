@@ -22,9 +22,9 @@ function icon(name) {
 }
 
 function button(name, title, word = "") {
-  const said = word && ` <span>${word}</span>`
+  const label = word && ` <span>${word}</span>`
   return `<button type="button" class="${name}" title="${title}" aria-label="${word ? `${word}: ` : ""}${title}">` +
-    `${icon(name)}${said}</button>`
+    `${icon(name)}${label}</button>`
 }
 
 // Tools appear depending on the selection.
@@ -182,10 +182,10 @@ export class Buttons {
   tellHeld(held) { this.root.classList.toggle("held", held) }
 
   /** Whether two networks are requested, and whether they are shown. */
-  showSplit(requested, there) {
+  showSplit(requested, shown) {
     if (requested) this.part("extras").open = true
     this.part("split").classList.toggle("on", requested)
-    this.root.classList.toggle("two", there)
+    this.root.classList.toggle("two", shown)
   }
 
   /** keepable: whether the networks that were not stored can be computed. */
@@ -199,19 +199,19 @@ export class Buttons {
 
   /** The numbers of the position. */
   read(replay) {
-    const { walk, seen, residual } = replay
+    const { walk, passed, residual } = replay
     const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
     const texts = {
       origin: walk.origin,
       apart: `${Math.round(100 * replay.apart)} %`,
-      eta1: form(walk.eta1[seen], 3),
-      eta2: form(walk.eta2[seen], 3),
-      eta3: form(0.15 * walk.eta3[seen], 3),
-      played: `${seen} of ${walk.number.length - 1}`,
+      eta1: form(walk.eta1[passed], 3),
+      eta2: form(walk.eta2[passed], 3),
+      eta3: form(0.15 * walk.eta3[passed], 3),
+      played: `${passed} of ${walk.number.length - 1}`,
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
-    this.root.classList.toggle("ran", seen > 1 && !replay.held)
+    this.root.classList.toggle("ran", passed > 1 && !replay.held)
     this.root.classList.toggle("other", replay.apart > 0)
     this.bar.show(replay)
     this.count()

@@ -30,10 +30,10 @@ export class Keyboard {
     if (event.key === "Tab") this.tabbed = true
     const at = event.composedPath()[0]
     if (typing(at) || event.ctrlKey || event.metaKey || event.altKey) return
-    const own = { space: usesSpace(at, this.tabbed), arrows: usesArrows(at, this.tabbed) }
+    const used = { space: usesSpace(at, this.tabbed), arrows: usesArrows(at, this.tabbed) }
     const name = KEYS[event.key]
-    if (event.key === " " && !own.space) this.actions.play()
-    else if (name && !own.arrows) this.actions[name]()
+    if (event.key === " " && !used.space) this.actions.play()
+    else if (name && !used.arrows) this.actions[name]()
     else if (HELD[event.key]) return this.actions[HELD[event.key]]()
     else if (/^[1-9]$/.test(event.key)) this.actions.tab(Number(event.key))
     else return

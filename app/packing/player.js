@@ -264,9 +264,9 @@ class Player {
   }
 
   /** Report what led to the network on screen, for the legend: "pull", "push" or "". */
-  tellHeld(by) {
-    this.buttons.tellHeld(by === "pull")
-    if (this.pulled !== by) this.model.pulled = this.pulled = by // reading a model is slow
+  tellHeld(cause) {
+    this.buttons.tellHeld(cause === "pull")
+    if (this.pulled !== cause) this.model.pulled = this.pulled = cause // reading a model is slow
   }
 
   again() {
@@ -353,9 +353,9 @@ class Player {
 
   /** Begin or end the motion to and fro between the pinned state and this one. */
   between({ swinging, frame, last }) {
-    const { model } = this, here = frame || last
+    const { model } = this, other = frame || last
     if (swinging) { model.between = null; return }
-    model.between = [model.reference === here ? 0 : model.reference, here]
+    model.between = [model.reference === other ? 0 : model.reference, other]
     this.play(true)
   }
 

@@ -9,10 +9,10 @@ const NEAREST = (requested, shown) => `${requested} is not stored: showing ${sho
 const icon = (name) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 
 function iconButton(name, title, act) {
-  const it = button("", act, { className: name, title })
-  it.innerHTML = icon(name)
-  it.setAttribute("aria-label", title)
-  return it
+  const element = button("", act, { className: name, title })
+  element.innerHTML = icon(name)
+  element.setAttribute("aria-label", title)
+  return element
 }
 
 export class PlayerBar {

@@ -161,7 +161,7 @@ class PackingView:
         self.player.thrust = {}
         if replay is not None and replay.outlines and replay.summary["dimension"]:
             work = compute.thrust(state.library, state.cell)
-            self.thrust.start(work, lambda found: self._show_thrust(found, replay))
+            self.thrust.start(work, lambda bands: self._show_thrust(bands, replay))
 
     def _show_thrust(self, bands: dict[str, Any], replay: Replay) -> None:
         if replay is self.state.replay:

@@ -233,9 +233,9 @@ class Library:
                 known.append((abs(np.log(larger)), away, entry.name, store, larger))
         if not known:
             return None
-        *_, name, store, larger = min(known, key=lambda found: found[:3])
-        with suppress(InputError), readable(store, name) as found:
-            steps = json.loads(found.attrs["info"]).get("steps")
+        *_, name, store, larger = min(known, key=lambda one: one[:3])
+        with suppress(InputError), readable(store, name) as packing:
+            steps = json.loads(packing.attrs["info"]).get("steps")
             return steps and steps * larger**STEPS_GROW
         return None
 

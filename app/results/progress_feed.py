@@ -121,7 +121,7 @@ class Walking:
         self.parts = []
         self._every = every(replay.summary)
         self._growth = measures.Growth()
-        self._found = 0
+        self._count = 0
         self.replay = replay
         self.run += 1
 
@@ -130,10 +130,10 @@ class Walking:
         assert self.replay is not None  # set by `restart`
         state = accepted.forces / self.replay.force_scale
         grown = self._growth.add(state)
-        self._found += 1
-        if (self._found - 1) % self._every:
+        self._count += 1
+        if (self._count - 1) % self._every:
             return
-        numbers = self._found, accepted.residual, *grown
+        numbers = self._count, accepted.residual, *grown
         self.parts.append((state.astype(np.float32), numbers))
 
 

@@ -196,8 +196,8 @@ class AppState(param.Parameterized):
 
     def cells(self) -> list[Cell]:
         """The cells of the series on screen, by μ."""
-        here = self.cell
-        return [c for c in self.catalogue if here is not None and c.series == here.series]
+        current = self.cell
+        return [c for c in self.catalogue if current is not None and c.series == current.series]
 
     def show(self, cell: Cell) -> None:
         """Show a cell: at once if it is in memory, otherwise after reading it."""
@@ -211,10 +211,10 @@ class AppState(param.Parameterized):
         """Read the cells with the nearest μ in advance: they are the likeliest next."""
         cells = self.cells()
         if self.cell in cells:
-            here = cells.index(self.cell)
+            position = cells.index(self.cell)
             self.work.read_ahead(
                 partial(lambda near, job: self.library.shown(near), near)
-                for near in cells[max(here - 1, 0) : here + 2]
+                for near in cells[max(position - 1, 0) : position + 2]
                 if self.library.shown_in_memory(near) is None
             )
 
@@ -222,14 +222,14 @@ class AppState(param.Parameterized):
         """counted: whether exactly this many states are required, not any stored number."""
         library = self.library
 
-        def meant(cells: list[Cell]) -> Selection | None:
+        def resolved(cells: list[Cell]) -> Selection | None:
             return requested if requested is None or counted else with_states(cells, requested)
 
         def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
             damage = ""
             while True:
                 cells = library.cells()
-                cell = best_cell(cells, meant(cells))
+                cell = best_cell(cells, resolved(cells))
                 try:
                     return cells, cell and library.shown(cell), damage
                 except InputError as error:
@@ -239,7 +239,7 @@ class AppState(param.Parameterized):
 
         def done(result: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = result
-            message, selection = damage or self.work.message, meant(cells)
+            message, selection = damage or self.work.message, resolved(cells)
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
             available = shown is not None and (
@@ -258,7 +258,7 @@ class AppState(param.Parameterized):
                     )
             self.work.message = self.work.message or message
 
-        wished = meant(library.catalogue)
+        wished = resolved(library.catalogue)
         at_hand = best_cell(library.catalogue, wished)
         shown = at_hand and library.shown_in_memory(at_hand)
         if shown and (wished is None or shown.cell.selection.names(wished)):
@@ -359,8 +359,10 @@ class AppState(param.Parameterized):
         """The view on screen by numbers, to be applied to other states of the same walk."""
         assert self.numbers is not None  # a Replay is on screen
         view = {name: value for name, value in self.view.items() if value is not None}
-        here = self.numbers.of(view)
-        return self.view | {name: Numbered(here[name]) for name in OF_A_REPLAY if name in here}
+        numbers = self.numbers.of(view)
+        return self.view | {
+            name: Numbered(numbers[name]) for name in OF_A_REPLAY if name in numbers
+        }
 
     def _bring_back(self, event: Any) -> None:
         """Return to the view before a request that was cancelled."""

@@ -40,8 +40,10 @@ class Comparison(param.Parameterized):
     def _follow(self, *events: Any) -> None:
         """Load the other packing, or compute it if no store has it."""
         state, looks = self.state, self.looks
-        came = any(event.name in ("cell", "missing") for event in events) and not state.missing
-        if not looks.split or (came and state.cell is not None and looks.beside == state.cell.mu):
+        arrived = any(event.name in ("cell", "missing") for event in events) and not state.missing
+        if not looks.split or (
+            arrived and state.cell is not None and looks.beside == state.cell.mu
+        ):
             looks.beside = None  # the same μ twice
         if looks.beside is None or state.cell is None:
             self.task.cancel()
@@ -66,12 +68,12 @@ class Comparison(param.Parameterized):
                 "first"
             )
         elif cell is None:
-            self.task.start(compute.states(library, selection), self._found)
+            self.task.start(compute.states(library, selection), self._show)
         elif (shown := library.shown_in_memory(cell)) is None:
-            self.task.start(lambda job: library.shown(cell), self._found)
+            self.task.start(lambda job: library.shown(cell), self._show)
         else:
             self.task.cancel()
             self.twin = shown
 
-    def _found(self, shown: Shown) -> None:
+    def _show(self, shown: Shown) -> None:
         self.twin = shown

@@ -374,9 +374,11 @@ def ranking(
         def watch(found: Any) -> None:
             job.so_far = ranked(*found[:4])
 
-        found = compute.load_or_compute(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
+        informative = compute.load_or_compute(
+            library, job, stage, kinds.INFORMATIVE, params, watch=watch
+        )
         names = "backbone", "part_expected", "mean_before", "mean_after"
-        return ranked(*(found[name].values for name in names))
+        return ranked(*(informative[name].values for name in names))
 
     return work
 

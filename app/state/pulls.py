@@ -68,7 +68,7 @@ class Hand(param.Parameterized):
         super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.work, self._task = state, state.work, state.work.task(reading)
         self.tell: Callable[[Message], object] = lambda message: None
-        self._made: list[tuple[Pull, Held]] = []  # one for each pull
+        self._steps: list[tuple[Pull, Held]] = []  # one for each pull
         self._base: tuple[Any, ...] | None = None  # and their origin
         self._followed: tuple[Any, ...] = self._all
         self._task.param.watch(self._failed, "message")
@@ -125,8 +125,8 @@ class Hand(param.Parameterized):
                 self.undo()
             case {"free": True}:
                 self.pulls = []
-            case {"anew": True} if self._made:
-                self._show(self._made)
+            case {"anew": True} if self._steps:
+                self._show(self._steps)
 
     @property
     def _all(self) -> tuple[Any, ...]:
@@ -153,7 +153,7 @@ class Hand(param.Parameterized):
             return
         statements = tuple(state.knowledge.known)
         base = cell.name, frame, statements
-        networks = self._made if self._base == base else []
+        networks = self._steps if self._base == base else []
         first = Held(_forces(replay, frame), float(replay.residual[frame]))
         library = state.library
 
@@ -171,12 +171,12 @@ class Hand(param.Parameterized):
             self._task.start(work, self._done)
         else:
             self._task.cancel()
-            self._made, self._base, self.held = [], base, None
+            self._steps, self._base, self.held = [], base, None
             self.tell({"held": None})
 
     def _done(self, result: tuple[Any, ...]) -> None:
         base, networks, ready, more, refusal = result
-        self._made, self._base = networks, base
+        self._steps, self._base = networks, base
         self.held = networks[-1][1] if networks else None
         if refusal:
             self.pulls = [pull for pull, _ in networks]

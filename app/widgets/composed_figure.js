@@ -9,19 +9,19 @@ const SPACE = 24 // units between them
 
 /** The visible plots, from the top, as SVG. */
 export async function plotsSeen(page) {
-  const seen = []
+  const visible = []
   for (const fig of page._all_models.values()) {
     const view = fig.type === "Figure" && page.views_manager?.find_one(fig), box = view?.el?.getBoundingClientRect()
-    if (box?.height) seen.push([box.top, view])
+    if (box?.height) visible.push([box.top, view])
   }
-  seen.sort(([a], [b]) => a - b)
-  return Promise.all(seen.map(async ([, view]) => (await view.export("svg").to_blob()).text()))
+  visible.sort(([a], [b]) => a - b)
+  return Promise.all(visible.map(async ([, view]) => (await view.export("svg").to_blob()).text()))
 }
 
 /** A picture to embed in another: its root and its size; ids in it begin with `k`. */
 function inset(text, k) {
-  const own = text.replace(/\bid="/g, `$&${k}-`).replace(/url\(#|href="#/g, `$&${k}-`)
-  const root = new DOMParser().parseFromString(own, "image/svg+xml").documentElement
+  const unique = text.replace(/\bid="/g, `$&${k}-`).replace(/url\(#|href="#/g, `$&${k}-`)
+  const root = new DOMParser().parseFromString(unique, "image/svg+xml").documentElement
   const [width, height] = ["width", "height"].map((name) => parseFloat(root.getAttribute(name)))
   if (!root.getAttribute("viewBox")) root.setAttribute("viewBox", `0 0 ${width} ${height}`)
   return { root, height: (COLUMN * height) / width }

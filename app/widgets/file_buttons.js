@@ -44,8 +44,8 @@ export function render({ model, view }) {
 
   /** A movie of the animation, from the first state to the last, or once to and fro. */
   async function recorded(caption, button) {
-    const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
-    const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
+    const stage = player(), { scene } = stage, layers = [scene.disks, scene.chains, scene.marks]
+    const { position } = stage.replay, picture = await imageOf(drawn(caption)), height = picture.naturalHeight - SIDE
     const canvas = createElement("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
     const context = canvas.getContext("2d"), pieces = []
     const stream = canvas.captureStream(30)
@@ -55,8 +55,8 @@ export function render({ model, view }) {
     const { view } = scene
     scene.reset(false) // whole, like the scale in its caption
     scene.finer(SIDE)
-    it.show(0, false)
-    it.play(true)
+    stage.show(0, false)
+    stage.play(true)
     recorder.start(250)
     const begun = performance.now(), words = button.textContent
     let over // time at which the last network was shown
@@ -64,27 +64,27 @@ export function render({ model, view }) {
       context.fillStyle = caption.background
       context.fillRect(0, 0, canvas.width, canvas.height)
       for (const layer of layers) context.drawImage(layer.canvas, 0, 0)
-      context.drawImage(told, 0, SIDE, SIDE, height, 0, SIDE, SIDE, height)
+      context.drawImage(picture, 0, SIDE, SIDE, height, 0, SIDE, SIDE, height)
       context.fillStyle = caption.ink
       context.font = "15px Helvetica, Arial, sans-serif"
       context.textAlign = "right"
-      context.fillText(it.replay.title, WHERE[0], SIDE + WHERE[1])
+      context.fillText(stage.replay.title, WHERE[0], SIDE + WHERE[1])
       button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
-      const swung = it.replay.swinging && it.playback.turns > 1
-      if (!it.playing || swung) over ??= now
+      const swung = stage.replay.swinging && stage.playback.turns > 1
+      if (!stage.playing || swung) over ??= now
       if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
       else requestAnimationFrame(frame)
     }
     requestAnimationFrame(frame)
     await ended
-    const took = performance.now() - begun
-    it.play(false)
+    const duration = performance.now() - begun
+    stage.play(false)
     scene.view = view // as it was on screen
     scene.size = 0
     scene.resize()
-    it.show(position)
+    stage.show(position)
     button.textContent = words
-    return timed(new Blob(pieces, { type: "video/webm" }), took)
+    return timed(new Blob(pieces, { type: "video/webm" }), duration)
   }
 
   async function imageOf(svg) {
@@ -138,11 +138,11 @@ async function timed(movie, duration) {
   const at = bytes.subarray(0, 1000).findIndex((_, k) => INFO.every((byte, n) => bytes[k + n] === byte))
   const size = bytes[at + 4] & 0x7f // one byte long, marked by its highest bit
   if (at < 0 || !(bytes[at + 4] & 0x80) || size === 0x7f) return movie
-  const told = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
-  told.setFloat64(0, duration)
+  const written = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
+  written.setFloat64(0, duration)
   longer.setBigUint64(0, (1n << 56n) | BigInt(size + DURATION.length + 8)) // a size of eight bytes
   const parts = [
-    bytes.subarray(0, at + 4), longer, bytes.subarray(at + 5, end), new Uint8Array(DURATION), told, bytes.subarray(end),
+    bytes.subarray(0, at + 4), longer, bytes.subarray(at + 5, end), new Uint8Array(DURATION), written, bytes.subarray(end),
   ]
   return new Blob(parts, { type: movie.type })
 }

@@ -16,8 +16,8 @@ export function render({ model }) {
 
   /** The address of an entry page, in the theme of this page. */
   const address = (query) => {
-    const asked = [query.replace(/^\?|&?\bdark=[01]/g, ""), model.dark ? "dark=1" : ""].filter(Boolean).join("&")
-    return window.location.pathname + (asked && `?${asked}`)
+    const parameters = [query.replace(/^\?|&?\bdark=[01]/g, ""), model.dark ? "dark=1" : ""].filter(Boolean).join("&")
+    return window.location.pathname + (parameters && `?${parameters}`)
   }
 
   function show() {
@@ -32,8 +32,8 @@ export function render({ model }) {
   const link = copyButton("Copy link", () => window.location.href)
   const theme = button("", () => { model.dark = !model.dark }, { innerHTML: HALF })
   const help = helpOf(model, root)
-  const asked = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })
-  tools.append(link, asked, theme)
+  const helpButton = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })
+  tools.append(link, helpButton, theme)
 
   /** The key "?" opens the list of keys, unless it is typed into a field. */
   function key(event) {

@@ -19,8 +19,8 @@ export function render({ model }) {
   /** Glossary keys for a widget's words: first its value's, then its label's. */
   function keysOf(node) {
     const value = words(node, "option:checked"), label = words(node, "label, legend, .name")
-    const found = [value, label, node.textContent.trim()].map((text) => labels[text])
-    return [...new Set(found.filter(Boolean))].slice(0, 2)
+    const keys = [value, label, node.textContent.trim()].map((text) => labels[text])
+    return [...new Set(keys.filter(Boolean))].slice(0, 2)
   }
 
   /** The element with the focus, inside any shadow root. */
@@ -40,7 +40,7 @@ export function render({ model }) {
     return path
   }
 
-  function found(path) {
+  function termsAt(path) {
     for (const node of path) {
       if (!(node instanceof Element)) continue
       if (node.dataset.term) return [node, node.dataset.term.split(" ")]
@@ -90,7 +90,7 @@ export function render({ model }) {
   // What was under the pointer can be replaced or scrolled away while it rests.
   function rest() {
     waiting = setTimeout(() => {
-      const [node, keys] = found(outwards(pointed()))
+      const [node, keys] = termsAt(outwards(pointed()))
       waiting = 0
       if (node) show(node, keys)
     }, WAIT_MS)
@@ -103,7 +103,7 @@ export function render({ model }) {
     pointer = event
     if (event.pointerType === "touch" || path[0] === under) return
     under = path[0]
-    const [node] = found(path.slice(0, DEEP))
+    const [node] = termsAt(path.slice(0, DEEP))
     if (node === at && node) return
     hide()
     if (node) rest()
@@ -117,7 +117,7 @@ export function render({ model }) {
   }
 
   function press(event) {
-    const [node, keys] = found(event.composedPath().slice(0, DEEP)), touched = event.pointerType === "touch"
+    const [node, keys] = termsAt(event.composedPath().slice(0, DEEP)), touched = event.pointerType === "touch"
     if (!node || (touched ? node === at : !node.matches(".term"))) return hide()
     clearTimeout(waiting)
     show(node, keys)
@@ -126,16 +126,16 @@ export function render({ model }) {
   function typed(event) {
     const node = focused()
     if (!/^(Tab|Arrow.*)$/.test(event.key) || !node?.matches(":focus-visible")) return hide()
-    const [word, keys] = found(outwards(node))
+    const [word, keys] = termsAt(outwards(node))
     if (!word) hide()
     else if (word !== at) show(word, keys)
   }
 
   // Scrolling inside a shadow root is not heard here, but what causes it is.
-  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll, wheel: scroll, touchmove: hide }
-  for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, true)
+  const listeners = { pointermove: move, pointerdown: press, keyup: typed, scroll, wheel: scroll, touchmove: hide }
+  for (const [name, act] of Object.entries(listeners)) window.addEventListener(name, act, true)
   model.on("remove", () => {
-    for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)
+    for (const [name, act] of Object.entries(listeners)) window.removeEventListener(name, act, true)
   })
   return tip
 }

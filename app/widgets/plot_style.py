@@ -166,6 +166,6 @@ def legend_above(fig: Figure, columns: int = 4) -> None:
     fig.js_on_change(
         "inner_width", CustomJS(args={"legend": legend, "most": columns}, code=FITTING)
     )
-    again = CustomJS(args={"legend": legend}, code="setTimeout(() => legend.change.emit(), 50)")
+    refresh = CustomJS(args={"legend": legend}, code="setTimeout(() => legend.change.emit(), 50)")
     for source in {renderer.data_source for item in legend.items for renderer in item.renderers}:
-        source.js_on_change("data", again)
+        source.js_on_change("data", refresh)

@@ -8,9 +8,9 @@ export function render({ model }) {
   root.append(legend, list)
 
   function show() {
-    const given = model.options instanceof Map ? [...model.options] : Object.entries(model.options)
+    const options = model.options instanceof Map ? [...model.options] : Object.entries(model.options)
     legend.textContent = list.ariaLabel = model.label
-    list.replaceChildren(...given.map(([words, value]) => new Option(words, value)))
+    list.replaceChildren(...options.map(([words, value]) => new Option(words, value)))
     list.value = model.value
   }
 

@@ -18,11 +18,11 @@ export function render({ model }) {
     ending = setTimeout(end, GROWS_MS)
   }
 
-  const heard = { click: unfold, wheel: end, touchmove: end }
-  for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, { capture: true, passive: true })
+  const listeners = { click: unfold, wheel: end, touchmove: end }
+  for (const [name, act] of Object.entries(listeners)) window.addEventListener(name, act, { capture: true, passive: true })
   model.on("remove", () => {
     end()
-    for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)
+    for (const [name, act] of Object.entries(listeners)) window.removeEventListener(name, act, true)
   })
   return document.createElement("div")
 }

@@ -77,12 +77,12 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
     drawn = remeasured(S, m, s, states=STATES, seed=seed, unmeasured=2.0)
     true = frame.truth(photo)[S.index]
     inner, listed = np.isfinite(true[:, 0]), np.isfinite(m[:, 0])
-    here = inner & listed
+    compared = inner & listed
     mean = drawn.drawn.flat.mean(axis=0)
     row = {}
     for k, part in enumerate(("f_n", "f_t")):
         for name, forces in (("raw", m), ("likeliest", drawn.forces), ("mean", mean)):
-            row[f"{name}_{part}"] = np.abs(forces - true)[here, k].mean() / unit
+            row[f"{name}_{part}"] = np.abs(forces - true)[compared, k].mean() / unit
     row["likeliest_all"] = np.abs(drawn.forces - true)[inner].mean() / unit
     row["raw_stress"], row["stress"] = (
         _stress_error(S, np.where(inner[:, None], np.nan_to_num(forces), 0), true)
@@ -94,7 +94,7 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
     row["said_to_carry"] = int(reported.sum())
     row["carry"] = np.mean(true[reported, 0] > 0) if reported.any() else np.nan
     row["chi"] = drawn.chi_square / max(drawn.freedom, 1)
-    return row | _spoilt(S, m, s, here, unit, seed)
+    return row | _spoilt(S, m, s, compared, unit, seed)
 
 
 def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
@@ -111,11 +111,11 @@ def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
 
 
 def _spoilt(
-    S: Ensemble, m: Floats, s: Floats, here: Mask, unit: float, seed: int
+    S: Ensemble, m: Floats, s: Floats, measured: Mask, unit: float, seed: int
 ) -> dict[str, Any]:
     """How well changed contacts are detected."""
     rng = np.random.default_rng(seed)
-    chosen = rng.choice(np.flatnonzero(here), _SPOILT, replace=False)
+    chosen = rng.choice(np.flatnonzero(measured), _SPOILT, replace=False)
     m = m.copy()
     m[chosen, 0] += _BY * unit
     reported = remeasured(S, m, s, states=2, chains=1, unmeasured=2.0).suspects

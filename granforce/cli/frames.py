@@ -103,14 +103,16 @@ def _check_out(path: str | None) -> None:
     check_outputs(path)
 
 
-def _chosen(there: Sequence[Number], text: str) -> list[Number]:
+def _chosen(available: Sequence[Number], text: str) -> list[Number]:
     """The numbers of the requested frames."""
     if text == "all":
-        return list(there)
+        return list(available)
     numbers = set(different("--frames", text, float, "all, or ") or [])
-    for number in sorted(numbers - set(there)):
-        raise InputError(f"no frame {number:g}; the frames are {min(there):g} … {max(there):g}")
-    return [number for number in there if number in numbers]
+    for number in sorted(numbers - set(available)):
+        raise InputError(
+            f"no frame {number:g}; the frames are {min(available):g} … {max(available):g}"
+        )
+    return [number for number in available if number in numbers]
 
 
 def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:

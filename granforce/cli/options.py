@@ -42,8 +42,8 @@ def subcommand(
         formatter_class=EXAMPLE,
         allow_abbrev=False,
     )
-    own = name.replace("-", "_")
-    command.set_defaults(run=f"{own}_" if name in _TAKEN else own)
+    function = name.replace("-", "_")
+    command.set_defaults(run=f"{function}_" if name in _TAKEN else function)
     if reports:
         command.add_argument("--json", action="store_true", help="print the report as JSON")
     return command
@@ -232,8 +232,8 @@ def add_made_packing(command: Parser, given: Callable[[argparse.Namespace], bool
     """Add the options of a packing to be made, refused where a file has been given."""
     others = set(command.options)
     add_packing(command)
-    made = command.options.keys() - others
-    command.leaves_out("with the file of a packing", given, made)
+    names = command.options.keys() - others
+    command.leaves_out("with the file of a packing", given, names)
 
 
 def add_conditions(command: Parser, known: bool = True, also: str = "") -> None:

@@ -165,10 +165,10 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
         self.seen.clear()
-        found, unknown = super().parse_known_args(args, namespace)
+        arguments, unknown = super().parse_known_args(args, namespace)
         if unknown:  # reported here: argparse would pass those of a subcommand to its parent
             self.error(self._unknown(unknown, sys.argv[1:] if args is None else args))
-        ways = [way for way in self.unused if way.holds(found)]
+        ways = [way for way in self.unused if way.holds(arguments)]
         if ways:
             given = self._given(args)
             for way in ways:
@@ -179,7 +179,7 @@ class Parser(argparse.ArgumentParser):
                         f"{' and '.join(useless)} {have} no effect {way.words}; leave {them} out"
                         + (f", or use {other} for other Coulomb cones" if other else "")
                     )
-        return found, unknown
+        return arguments, unknown
 
     def _instead(self, useless: Iterable[str]) -> str | None:
         """The option that was meant by a useless one, as typed, or None."""
@@ -191,8 +191,8 @@ class Parser(argparse.ArgumentParser):
         first, words = unknown[0], list(args)
         if first.startswith("-"):
             name = first.partition("=")[0]
-            meant = _closest(name, self._option_string_actions)
-            return f"there is no option {name}{meant}" if meant else _unrecognized(unknown)
+            hint = _closest(name, self._option_string_actions)
+            return f"there is no option {name}{hint}" if hint else _unrecognized(unknown)
         at = words.index(first) if first in words else 0
         action = self._option_string_actions.get(words[at - 2]) if at >= 2 else None
         if action is None or action.nargs is not None:
@@ -207,9 +207,11 @@ class Parser(argparse.ArgumentParser):
         if action.choices is None or value in action.choices:
             return
         name = "/".join(action.option_strings) or str(action.metavar or action.dest).lower()
-        meant = _closest(str(value), action.choices)
-        there = meant or f"; choose from {', '.join(map(str, action.choices))}"
-        raise argparse.ArgumentError(None, f"{name} {str(value)[:40]!r} is unknown{there}")
+        hint = (
+            _closest(str(value), action.choices)
+            or f"; choose from {', '.join(map(str, action.choices))}"
+        )
+        raise argparse.ArgumentError(None, f"{name} {str(value)[:40]!r} is unknown{hint}")
 
     def _given(self, args: Sequence[str] | None) -> dict[str, str]:
         """The options given in a command line, whatever their values."""

@@ -166,7 +166,7 @@ class StoredResult(NamedTuple):
     ends: dict[str, Any]  # last lines of the report: cost, and whether it was stored already
 
 
-def found(
+def stored_result(
     arguments: argparse.Namespace,
     kind: Kind,
     *outputs: str | None,
@@ -198,9 +198,9 @@ def telling_eta(bar: Any) -> Callable[[Any], None]:
     """watch(WalkState) of a walk, which shows η1 of all states so far next to the bar."""
     growth, lock = measures.Growth(), threading.Lock()
 
-    def watch(found: Any) -> None:
+    def watch(state: Any) -> None:
         with lock:
-            bar.note(f"η1 = {growth.add(found.forces)[0]:.4f}")
+            bar.note(f"η1 = {growth.add(state.forces)[0]:.4f}")
 
     return watch
 
@@ -285,7 +285,7 @@ def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredRe
     with warnings.catch_warnings():
         # The commands say so themselves, also of stored walks.
         warnings.filterwarnings("ignore", UNBOUNDED_WALK)
-        return found(
+        return stored_result(
             *(arguments, kinds.WALK, output),
             watching=telling_eta,
             states=arguments.states,

@@ -124,12 +124,12 @@ def read_states(path: str, packing: Packing) -> tuple[Integers, Floats]:
     if reader is None:
         raise InputError(f"{path}: the name must end with .csv, .npz or .zarr")
     contact, i, j, states = reader(path)
-    own = packing.contacts
-    count = len(own.i)
+    contacts = packing.contacts
+    count = len(contacts.i)
     if contact.ndim != 1 or not contact.size or not are_whole(contact, count - 1).all():
         raise InputError(f"{path}: contacts must be numbered 0 … {count - 1} as in the packing")
     contact = contact.astype(np.int64)
-    if not (np.array_equal(own.i[contact], i) and np.array_equal(own.j[contact], j)):
+    if not (np.array_equal(contacts.i[contact], i) and np.array_equal(contacts.j[contact], j)):
         raise InputError(
             f"{path}: its contacts join other grains; does it belong to another packing?"
         )
@@ -167,11 +167,11 @@ def _states_of_dataset(path: str) -> _States:
     return _picked(path, given, "states", {"states"} if units == UNITS["packing"] else set())
 
 
-def _picked(path: str, arrays: Mapping[Any, Any], states: str, there: Any) -> _States:
+def _picked(path: str, arrays: Mapping[Any, Any], states: str, in_unit: Any) -> _States:
     names = ("contact", "i", "j", states)
     if not any(str(name).startswith("states") for name in arrays):
         raise InputError(f"{path}: contains no states; granforce walk or uniform --out writes them")
-    if states not in there or any(name not in arrays for name in names):
+    if states not in in_unit or any(name not in arrays for name in names):
         raise InputError(
             f"{path}: no states in the packing's unit; write them with granforce walk or uniform "
             "--out with --unit packing"

@@ -78,9 +78,9 @@ def add_pack(commands: Commands) -> None:
     command.add_argument(
         "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
     )
-    made = command.options.keys() - {"scene", "scene_options", "mu", "out", "json"}
+    names = command.options.keys() - {"scene", "scene_options", "mu", "out", "json"}
     command.leaves_out("without --scene", lambda given: given.scene is None, {"scene_options"})
-    command.leaves_out("with --scene", lambda arguments: arguments.scene is not None, made)
+    command.leaves_out("with --scene", lambda arguments: arguments.scene is not None, names)
 
 
 def add_walk(commands: Commands) -> None:

@@ -111,12 +111,12 @@ def informative(
 
 def _without_twins(order: Integers, expected: Floats, alike: Mask) -> Integers:
     """The contacts of this order from which something is expected, the first of all twins only."""
-    told = np.zeros(len(alike), dtype=bool)
+    determined = np.zeros(len(alike), dtype=bool)
     kept = []
     for c in order[expected[order] > 0].tolist():
-        if not told[c]:
+        if not determined[c]:
             kept.append(c)
-            told |= alike[c]
+            determined |= alike[c]
     return np.array(kept)
 
 

@@ -107,9 +107,9 @@ class Columns(NamedTuple):
         """The rows of one frame, or all rows if there is no column for the frame."""
         if "frame" not in self.values:
             return self
-        here = self.values["frame"] == frame
-        values = {name: column[here] for name, column in self.values.items()}
-        return self._replace(values=values, lines=self.lines[here])
+        rows = self.values["frame"] == frame
+        values = {name: column[rows] for name, column in self.values.items()}
+        return self._replace(values=values, lines=self.lines[rows])
 
     def with_frames(self, frame: Floats | Integers) -> Columns:
         """The same with a column for the frame (rows,), derived from ids."""

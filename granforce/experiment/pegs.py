@@ -415,8 +415,8 @@ def _inferred(
 
     def with_spread(error: float) -> Floats:
         # Smaller differences are the noise itself: adding them would count it twice.
-        own = error * relative
-        return np.hypot(own, np.where(differing > OUTLIER * own, differing, 0.0))
+        noise = error * relative
+        return np.hypot(noise, np.where(differing > OUTLIER * noise, differing, 0.0))
 
     if error is None:
         error = unit

@@ -84,7 +84,7 @@ def remeasured(
     m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
-    repeated = _again(ensemble, best.forces, width, *numbers, seed, progress)
+    repeated = _repeated(ensemble, best.forces, width, *numbers, seed, progress)
     # The draws are independent, so mixing is not diagnosed.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
@@ -92,7 +92,7 @@ def remeasured(
     return inference_of(Remeasured, ensemble, best, draws, begin)
 
 
-def _again(
+def _repeated(
     ensemble: Ensemble,
     forces: Floats,
     s: Floats,
@@ -106,13 +106,13 @@ def _again(
     each = -(-states // chains)
     streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(chains))
     errors = np.stack([rng.standard_normal((each, *s.shape)) for rng in streams])
-    again = (forces + s * errors).reshape(-1, *s.shape)
-    batches = [again[k : k + LANES] for k in range(0, len(again), LANES)]
+    measurements = (forces + s * errors).reshape(-1, *s.shape)
+    batches = [measurements[k : k + LANES] for k in range(0, len(measurements), LANES)]
     done, draws = 0, []
     with cancelling.threads(workers) as pool:
         for networks in pool.map(lambda batch: fitted_many(ensemble, batch, s), batches):
             draws.append(networks)
             done += len(networks)
             if progress is not None:
-                progress(done, len(again))
+                progress(done, len(measurements))
     return np.concatenate(draws).reshape(chains, each, *s.shape)

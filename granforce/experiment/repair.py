@@ -235,13 +235,13 @@ def _without_unreadable_grains(listing: Listing, account: Account) -> Listing:
 def _without_doubled_names(listing: Listing, account: Account) -> Listing:
     """Keep the first of several lines with the same id."""
     _, first, which = np.unique(listing.ids, return_index=True, return_inverse=True)
-    again = np.flatnonzero(first[which] != np.arange(len(which)))
+    repeats = np.flatnonzero(first[which] != np.arange(len(which)))
     texts = [
         f"{listing.place(0, k)}: id {plain(listing.ids[k])} already appears in line "
         f"{int(listing.lines[0][first[which[k]]])} already"
-        for k in again
+        for k in repeats
     ]
-    account.note("doubled_grains", texts, listing.x[again])
+    account.note("doubled_grains", texts, listing.x[repeats])
     return listing.with_grains(np.sort(first))
 
 
@@ -285,11 +285,11 @@ def _fits(listing: Listing) -> Floats:
     """
     rows = rows_of(listing)
     gap = gaps_of(listing, rows)
-    here = np.isfinite(gap)
-    off = np.abs(gap[here] - np.median(gap[here]) if here.any() else gap[here])
+    finite = np.isfinite(gap)
+    off = np.abs(gap[finite] - np.median(gap[finite]) if finite.any() else gap[finite])
     value = np.clip(1 - off / (_FIT * listing.r.mean()), -1, 1)
     fit = np.zeros(len(listing.r))
-    for side in rows[here].T:
+    for side in rows[finite].T:
         np.add.at(fit, side, value)
     order = np.sort(listing.r)
     alike = np.searchsorted(order, listing.r * (1 + _SIZE)) - np.searchsorted(

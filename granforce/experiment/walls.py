@@ -216,11 +216,11 @@ def wall_contacts(
     g, w = np.nonzero(touching)
     m, f = np.full((len(g), 2), np.nan), np.ones(len(g))
     for k, of in enumerate(grain):
-        mine = np.flatnonzero(g == of)
+        candidates = np.flatnonzero(g == of)
         if np.isfinite(beta[k]):  # the side to which the angle points
-            best = mine[np.argmax(ways[g[mine], w[mine]] @ normal[k])]
+            best = candidates[np.argmax(ways[g[candidates], w[candidates]] @ normal[k])]
         else:
-            best = mine[np.argmin(gap[g[mine], w[mine]])]
+            best = candidates[np.argmin(gap[g[candidates], w[candidates]])]
         m[best], f[best] = forces[k], factor[k]
     return WallContacts(
         grain=g, wall=w, normal=ways[g, w], forces=m, factor=f, names=outline.names, outline=outline

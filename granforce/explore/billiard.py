@@ -91,13 +91,13 @@ def make_rows(rows_of: RowsOf, rows: RowCache, walls: Sequence[int]) -> None:
         while rows.used[rows.hand[0]]:
             rows.used[rows.hand[0]] = False
             rows.hand[0] = (rows.hand[0] + 1) % len(rows.owner)
-        here = rows.hand[0]
-        if rows.owner[here] >= 0:
-            rows.place[rows.owner[here]] = -1
-        rows.values[here], rows.owner[here] = row, wall
-        rows.place[wall] = here  # last, because other threads look here
-        rows.used[here] = True
-        rows.hand[0] = (here + 1) % len(rows.owner)
+        slot = rows.hand[0]
+        if rows.owner[slot] >= 0:
+            rows.place[rows.owner[slot]] = -1
+        rows.values[slot], rows.owner[slot] = row, wall
+        rows.place[wall] = slot  # last, because other threads look here
+        rows.used[slot] = True
+        rows.hand[0] = (slot + 1) % len(rows.owner)
 
 
 def make_flight(slacks: Floats) -> Flight:
@@ -258,17 +258,17 @@ def _some_nearer(s, w, middle, harmonic, soonest, first):
     nearer = lanes.same(MANY, 0.0)
     for k in range(first // lanes.LANES, (first + BLOCK) // lanes.LANES):
         slack, speed = lanes.larger(lanes.load(s, k, MANY), _LEAST), lanes.load(w, k, MANY)
-        by = soonest * slack + speed
+        excess = soonest * slack + speed
         if harmonic:
             # The larger root of s q² + 2 w q + r (`_rate`) exceeds q if that is negative, or
             # decreasing while there are roots.
             rest = 2.0 * lanes.load(middle, k, MANY) - slack
             roots = lanes.pick(speed * speed, rest * slack, 1.0, 0.0)
             nearer = nearer + lanes.pick(
-                0.0, soonest * (by + speed) + rest, 1.0, lanes.pick(0.0, by, roots, 0.0)
+                0.0, soonest * (excess + speed) + rest, 1.0, lanes.pick(0.0, excess, roots, 0.0)
             )
         else:
-            nearer = nearer + lanes.pick(0.0, by, 1.0, 0.0)
+            nearer = nearer + lanes.pick(0.0, excess, 1.0, 0.0)
     return not lanes.vanishes(nearer)
 
 

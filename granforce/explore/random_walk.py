@@ -311,8 +311,8 @@ class _Chain:
             self.rng.uniform(size=self.forces.shape)
         if count > 1:
             self.forces = begun.states[-2]
-        again = relaxed(self.kicked()).forces
-        if not np.abs(again - begun.states[-1]).max() <= AT_REST * self.ensemble.force_scale:
+        repeated = relaxed(self.kicked()).forces
+        if not np.abs(repeated - begun.states[-1]).max() <= AT_REST * self.ensemble.force_scale:
             raise InputError(
                 "the walk to continue was made with another seed, relaxation or ensemble, as its "
                 "last state shows; give the same arguments"

@@ -36,14 +36,14 @@ class ThinMatrix(NamedTuple):
         The rounding of products depends on the shapes of matrices: each row is computed with the
         same others.
         """
-        found = np.zeros((len(walls), self.count))
+        rows = np.zeros((len(walls), self.count))
         for at, wall in enumerate(walls.tolist()):
             if wall >= len(self.root):  # padding
                 continue
             first = wall - wall % LANES
             some = np.eye(min(LANES, len(self.root) - first), self.count, first)
-            found[at] = self.moved(some)[wall - first]
-        return found
+            rows[at] = self.moved(some)[wall - first]
+        return rows
 
     def on_hull(self, away: Floats) -> Floats:
         """The nearest point to `away` (k, count) that satisfies the balance."""
@@ -84,9 +84,9 @@ def _orthonormal(columns: Floats) -> Floats:
     in Numerical Analysis 1997, 57).
     """
     order = np.argsort(-np.abs(columns).max(axis=1, initial=0.0))
-    found = np.empty_like(columns)
-    found[order] = linalg.qr(columns[order], mode="economic", pivoting=True)[0]
-    return found
+    basis = np.empty_like(columns)
+    basis[order] = linalg.qr(columns[order], mode="economic", pivoting=True)[0]
+    return basis
 
 
 def null_space(dense: Floats, dimension: int) -> Floats:

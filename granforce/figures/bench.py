@@ -30,20 +30,20 @@ def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layo
 
 
 def _relaxation(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _by(rows, "solver", "mu", "seconds")
+    series = _series_by(rows, "solver", "mu", "seconds")
     words = {"title": "One relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
     yield from _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
 def _scaling(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
+    series = _series_by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
     words = {"title": f"One relaxation, μ = {rows[0]['mu']:g}", "x": "N", "y": "time / s"}
     yield from _frame(series, backend, words, logx=True, logy=True)
 
 
 def _compaction(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
-    series = _by(named, "name", "seconds", "overlap")
+    series = _series_by(named, "name", "seconds", "overlap")
     words = {"title": "Compaction", "x": "time / s", "y": "mean overlap / r_max"}
     yield from _frame(series, backend, words, legend="top_right", logx=True, logy=True)
 
@@ -51,20 +51,22 @@ def _compaction(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
 def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
-        series = _by(chosen, "method", "seconds", "extent_part")
+        series = _series_by(chosen, "method", "seconds", "extent_part")
         words = {"title": f"Intervals covered by walks, μ = {mu:g}", "x": "time / s"}
         words["y"] = "fraction of the exact ⟨ΔF_n⟩"
         yield from _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(0, 1.1))
 
 
 def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _by(rows, "method", "h", "seconds_per_state")
+    series = _series_by(rows, "method", "h", "seconds_per_state")
     words = {"title": "Uniform sampling", "x": "h", "y": "CPU time per effective network / s"}
     yield from _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
 def _uniform_growth(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _by([row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state")
+    series = _series_by(
+        [row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state"
+    )
     words = {"title": "Uniform sampling, dependence on N", "x": "N"}
     words["y"] = "CPU time per effective network / s"
     yield from _frame(series, backend, words, room=50.0, logx=True, logy=True)
@@ -80,7 +82,7 @@ _DRAWN = {
 }
 
 
-def _by(rows: Rows, name: str, x: str, y: str) -> dict[Any, list[tuple[float, float]]]:
+def _series_by(rows: Rows, name: str, x: str, y: str) -> dict[Any, list[tuple[float, float]]]:
     """{value of the column `name`: points (x, y)} of the rows that have both."""
     series: dict[Any, list[tuple[float, float]]] = {}
     for row in rows:

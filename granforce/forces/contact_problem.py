@@ -64,10 +64,10 @@ def balance_of(
         whole = columns.row >= last
         border[columns.col[whole], columns.row[whole] - last, part] = value[whole]
         grain, row = np.divmod(columns.row, size)
-        for side, own in enumerate((i, j)):
-            here = ~whole
-            here[here] = balanced[grain[here]] == own[columns.col[here]]
-            dense[side, columns.col[here], row[here], part] = value[here]
+        for side, ends in enumerate((i, j)):
+            entries = ~whole
+            entries[entries] = balanced[grain[entries]] == ends[columns.col[entries]]
+            dense[side, columns.col[entries], row[entries], part] = value[entries]
     network = contact_matrix.make_network(
         ensemble.packing.x[grains], i, j, dense[0], dense[1], border
     )

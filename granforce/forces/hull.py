@@ -89,8 +89,8 @@ def _centre(ensemble: Ensemble) -> Floats | None:
         return None
     if ensemble.known is not None:
         normal, tangential = (ensemble.known.value / ensemble.units).T
-        own = np.stack([normal + tangential, normal - tangential], axis=1)
-        y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
+        known = np.stack([normal + tangential, normal - tangential], axis=1)
+        y = np.where(ensemble.known.wholly[:, None], np.maximum(known, 0.0), y)
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
     inner = np.append(inner, middle.y[y.size :])
     A, b, _ = ensemble.scaled_form

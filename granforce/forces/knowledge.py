@@ -88,9 +88,9 @@ def refuse_others(known: Known, contacts: Contacts) -> None:
     if known.grains is None:
         return
     number = np.asarray(known.contacts)
-    there = number < len(contacts.i)
-    joined = np.column_stack([contacts.i, contacts.j])[number[there]]
-    if not np.array_equal(known.grains[there], joined):
+    exists = number < len(contacts.i)
+    joined = np.column_stack([contacts.i, contacts.j])[number[exists]]
+    if not np.array_equal(known.grains[exists], joined):
         raise InputError(
             "a table of known forces names other grains of its contacts; does it belong to another "
             "packing?"
@@ -190,13 +190,13 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     fixed = pinned[:, 1]
     value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])
     slid = np.abs(value[:, 1]) / np.where(rough, mu, np.inf)
-    there = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
-    there[:, 0, 0] = low[:, 0] > np.where(pinned[:, 1], slid, 0.0)
-    there[:, 0, 1] = np.isfinite(high[:, 0])
-    there[:, 1, 0], there[:, 1, 1] = low[:, 1] > -cone, high[:, 1] < cone
-    there[:, 1] &= rough[:, None]
-    there &= ~pinned[..., None]
-    contact, component, above = np.nonzero(there)
+    bounded = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
+    bounded[:, 0, 0] = low[:, 0] > np.where(pinned[:, 1], slid, 0.0)
+    bounded[:, 0, 1] = np.isfinite(high[:, 0])
+    bounded[:, 1, 0], bounded[:, 1, 1] = low[:, 1] > -cone, high[:, 1] < cone
+    bounded[:, 1] &= rough[:, None]
+    bounded &= ~pinned[..., None]
+    contact, component, above = np.nonzero(bounded)
     sign = np.where(above, 1.0, -1.0)
     limit = sign * np.stack([low, high], axis=-1)[contact, component, above]
     return Polygons(low, high, pinned, value, contact, component, sign, limit)

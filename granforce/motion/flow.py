@@ -95,7 +95,7 @@ class Flows(NamedTuple):
     steps: Integers  # implicit steps
     most: Integers  # most implicit steps
     iterations: Integers  # linear systems
-    found: Integers  # SOLVED, FELL, FAILED
+    outcome: Integers  # SOLVED, FELL, FAILED
     going: Mask  # bool
     ended: Mask  # bool: at rest, or in steady motion
 
@@ -162,7 +162,7 @@ def make_flows(step: Step, width: int) -> Flows:
         steps=count(),
         most=count(),
         iterations=count(),
-        found=count(),
+        outcome=count(),
         going=np.zeros(width, dtype=bool),
         ended=np.zeros(width, dtype=bool),
     )
@@ -233,11 +233,11 @@ def _judge(flows, lane, rest):
     """Choose what follows a lane's Newton step: the next, the next implicit step, or the end."""
     flows.iterations[lane] += 1
     flows.newton[lane] += 1
-    found = flows.found[lane]
-    if found == FELL and flows.newton[lane] < NEWTON:
+    outcome = flows.outcome[lane]
+    if outcome == FELL and flows.newton[lane] < NEWTON:
         return
     flows.newton[lane] = 0
-    if found != SOLVED:
+    if outcome != SOLVED:
         _copy_lane(flows.velocity.rows, flows.kept.rows, lane)
         _copy_lane(flows.velocity.border, flows.kept.border, lane)
         flows.pace[0, lane] *= CUT
@@ -282,7 +282,7 @@ def _search(step, flows, lanes):
     undecided = 0
     for lane in range(len(lanes)):
         flows.length[0, lane] = 1.0
-        flows.found[lane] = FAILED
+        flows.outcome[lane] = FAILED
         undecided += flows.going[lane]
     settled = ~flows.going
     for _ in range(HALVINGS):
@@ -292,9 +292,9 @@ def _search(step, flows, lanes):
                 continue
             whole = flows.length[0, lane] == 1.0
             if whole and flows.changed[0, lane] == 0.0 and _is_solved(step, flows, lane):
-                flows.found[lane] = SOLVED
+                flows.outcome[lane] = SOLVED
             elif flows.least[0, lane] < _wanted(flows, lane):
-                flows.found[lane] = FELL
+                flows.outcome[lane] = FELL
             else:
                 flows.length[0, lane] *= 0.5
                 continue
@@ -327,7 +327,7 @@ def _keep_solved(step, flows, settled, lanes):
     _go_along(step, flows, lanes)
     for lane in range(len(lanes)):
         if not settled[lane] and _is_solved(step, flows, lane):
-            flows.found[lane] = SOLVED
+            flows.outcome[lane] = SOLVED
 
 
 @within

@@ -42,9 +42,9 @@ def divide(L, x, d, side, lanes):
 @inline
 def subtract_column(Z, z, X, x, count, Y, y, lanes):
     """z ← z − x yᵀ for `count` consecutive blocks z and x; y stays in registers."""
-    by = _block(Y, y, lanes)
+    y_block = _block(Y, y, lanes)
     for k in range(0, 9 * count, 9):
-        block = _less_product_of_blocks(_block(Z, z + k, lanes), X, x + k, by, lanes)
+        block = _less_product_of_blocks(_block(Z, z + k, lanes), X, x + k, y_block, lanes)
         _set_block(Z, z + k, block, lanes)
 
 
@@ -61,10 +61,10 @@ def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
     for q in range(below):
         if end == begin + 1:
             x = 9 * (start[end] - below)
-            by = _block(Y, x + 9 * q, lanes)
+            y_block = _block(Y, x + 9 * q, lanes)
             for a in range(q + beyond, below):
                 z = 9 * target[number + a - q]
-                block = _less_product_of_blocks(_block(Z, z, lanes), X, x + 9 * a, by, lanes)
+                block = _less_product_of_blocks(_block(Z, z, lanes), X, x + 9 * a, y_block, lanes)
                 _set_block(Z, z, block, lanes)
         else:
             for a in range(q + beyond, below):
@@ -72,28 +72,28 @@ def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
                 block = _block(Z, z, lanes)
                 for k in range(begin + 1, end + 1):
                     x = 9 * (start[k] - below)
-                    by = _block(Y, x + 9 * q, lanes)
-                    block = _less_product_of_blocks(block, X, x + 9 * a, by, lanes)
+                    y_block = _block(Y, x + 9 * q, lanes)
+                    block = _less_product_of_blocks(block, X, x + 9 * a, y_block, lanes)
                 _set_block(Z, z, block, lanes)
         number += below - q
     return number
 
 
 @inline
-def _less_product_of_blocks(block, X, x, by, lanes):
+def _less_product_of_blocks(block, X, x, y_block, lanes):
     """A block minus x yᵀ, with y given by its entries."""
-    z0, z1, z2 = _less_row_product(block[0], block[1], block[2], X, x, by, lanes)
-    z3, z4, z5 = _less_row_product(block[3], block[4], block[5], X, x + 3, by, lanes)
-    z6, z7, z8 = _less_row_product(block[6], block[7], block[8], X, x + 6, by, lanes)
+    z0, z1, z2 = _less_row_product(block[0], block[1], block[2], X, x, y_block, lanes)
+    z3, z4, z5 = _less_row_product(block[3], block[4], block[5], X, x + 3, y_block, lanes)
+    z6, z7, z8 = _less_row_product(block[6], block[7], block[8], X, x + 6, y_block, lanes)
     return z0, z1, z2, z3, z4, z5, z6, z7, z8
 
 
 @inline
-def _less_row_product(z0, z1, z2, X, x, by, lanes):
+def _less_row_product(z0, z1, z2, X, x, y_block, lanes):
     x0, x1, x2 = -load(X, x, lanes), -load(X, x + 1, lanes), -load(X, x + 2, lanes)
-    z0 = fma(x2, by[2], fma(x1, by[1], fma(x0, by[0], z0)))
-    z1 = fma(x2, by[5], fma(x1, by[4], fma(x0, by[3], z1)))
-    z2 = fma(x2, by[8], fma(x1, by[7], fma(x0, by[6], z2)))
+    z0 = fma(x2, y_block[2], fma(x1, y_block[1], fma(x0, y_block[0], z0)))
+    z1 = fma(x2, y_block[5], fma(x1, y_block[4], fma(x0, y_block[3], z1)))
+    z2 = fma(x2, y_block[8], fma(x1, y_block[7], fma(x0, y_block[6], z2)))
     return z0, z1, z2
 
 

@@ -224,19 +224,19 @@ def _times(nn, nt, tn, tt, e):
 
 
 @within
-def _add_block(blocks, place, e, by, lanes):
-    """Add e byᵀ to a block."""
-    _add_three(blocks, place, e[0], e[3], by, lanes)
-    _add_three(blocks, place + 3, e[1], e[4], by, lanes)
-    _add_three(blocks, place + 6, e[2], e[5], by, lanes)
+def _add_block(blocks, place, e, other, lanes):
+    """Add e otherᵀ to a block."""
+    _add_three(blocks, place, e[0], e[3], other, lanes)
+    _add_three(blocks, place + 3, e[1], e[4], other, lanes)
+    _add_three(blocks, place + 6, e[2], e[5], other, lanes)
 
 
 @within
-def _add_three(values, place, e_n, e_t, by, lanes):
-    """Add e byᵀ to a row of a block, or to a global row's three entries."""
-    first = fma(e_t, by[3], fma(e_n, by[0], load(values, place, lanes)))
-    second = fma(e_t, by[4], fma(e_n, by[1], load(values, place + 1, lanes)))
-    third = fma(e_t, by[5], fma(e_n, by[2], load(values, place + 2, lanes)))
+def _add_three(values, place, e_n, e_t, other, lanes):
+    """Add e otherᵀ to a row of a block, or to a global row's three entries."""
+    first = fma(e_t, other[3], fma(e_n, other[0], load(values, place, lanes)))
+    second = fma(e_t, other[4], fma(e_n, other[1], load(values, place + 1, lanes)))
+    third = fma(e_t, other[5], fma(e_n, other[2], load(values, place + 2, lanes)))
     store(values, place, lanes, first)
     store(values, place + 1, lanes, second)
     store(values, place + 2, lanes, third)

@@ -93,13 +93,13 @@ def _least_degree(start, other, stop):
     set.
     """
     count = len(start) - 1
-    own, owns = other.copy(), start[1:] - start[:-1]
+    neighbours, counts = other.copy(), start[1:] - start[:-1]
     cliques, joined = np.full((count, 8), -1), np.zeros(count, np.int64)
     order, rank = np.empty(count, np.int64), np.full(count, -1)
     begin, below = np.zeros(count + 1, np.int64), np.empty(16 * count + 64, np.int64)
     merged, mark, stamp = np.zeros(count, np.bool_), np.full(count, -1), 0
     head, after, before = np.full((3, count + 1), -1)
-    degree = owns.copy()
+    degree = counts.copy()
     for v in range(count - 1, -1, -1):
         _enter(v, degree[v], head, after, before)
     least = 0
@@ -115,8 +115,8 @@ def _least_degree(start, other, stop):
             below = np.concatenate((below, np.empty(len(below) + count, np.int64)))
         stamp += 1
         end = begin[k]
-        for q in range(start[pivot], start[pivot] + owns[pivot]):
-            end = _collect(own[q], rank, mark, stamp, below, end)
+        for q in range(start[pivot], start[pivot] + counts[pivot]):
+            end = _collect(neighbours[q], rank, mark, stamp, below, end)
         for q in range(joined[pivot]):
             clique = cliques[pivot, q]
             if not merged[clique]:
@@ -129,13 +129,24 @@ def _least_degree(start, other, stop):
             v = below[m]
             if joined[v] == cliques.shape[1]:
                 cliques = np.concatenate((cliques, np.full_like(cliques, -1)), axis=1)
-            _join(v, k, rank, mark, inside, start, own, owns, cliques, joined, merged)
+            _join(v, k, rank, mark, inside, start, neighbours, counts, cliques, joined, merged)
         for m in range(begin[k], end):
             v = below[m]
             stamp += 1
             _leave(v, degree[v], head, after, before)
             outside = _outside(
-                v, rank, mark, stamp, inside, start, own, owns, cliques, joined, begin, below
+                v,
+                rank,
+                mark,
+                stamp,
+                inside,
+                start,
+                neighbours,
+                counts,
+                cliques,
+                joined,
+                begin,
+                below,
             )
             degree[v] = end - begin[k] - 1 + outside
             _enter(v, degree[v], head, after, before)
@@ -176,14 +187,14 @@ def _collect(v, rank, mark, stamp, below, end):
 
 
 @within
-def _join(v, clique, rank, mark, inside, start, own, owns, cliques, joined, merged):
+def _join(v, clique, rank, mark, inside, start, neighbours, counts, cliques, joined, merged):
     """Add v to a new clique, which replaces merged ones and neighbours that are also in it."""
     left = start[v]
-    for q in range(start[v], start[v] + owns[v]):
-        if mark[own[q]] != inside and rank[own[q]] < 0:
-            own[left] = own[q]
+    for q in range(start[v], start[v] + counts[v]):
+        if mark[neighbours[q]] != inside and rank[neighbours[q]] < 0:
+            neighbours[left] = neighbours[q]
             left += 1
-    owns[v] = left - start[v]
+    counts[v] = left - start[v]
     left = 0
     for q in range(joined[v]):
         if not merged[cliques[v, q]]:
@@ -194,9 +205,11 @@ def _join(v, clique, rank, mark, inside, start, own, owns, cliques, joined, merg
 
 
 @within
-def _outside(v, rank, mark, stamp, inside, start, own, owns, cliques, joined, begin, below):
+def _outside(
+    v, rank, mark, stamp, inside, start, neighbours, counts, cliques, joined, begin, below
+):
     """Number of neighbours of v outside its newest clique, whose grains are marked `inside`."""
-    number = owns[v]
+    number = counts[v]
     for q in range(joined[v] - 1):
         clique = cliques[v, q]
         for m in range(begin[clique], begin[clique + 1]):
@@ -204,8 +217,8 @@ def _outside(v, rank, mark, stamp, inside, start, own, owns, cliques, joined, be
             if rank[u] < 0 and mark[u] != inside and mark[u] != stamp:
                 mark[u] = stamp
                 number += 1
-    for q in range(start[v], start[v] + owns[v]):
-        if mark[own[q]] == stamp:
+    for q in range(start[v], start[v] + counts[v]):
+        if mark[neighbours[q]] == stamp:
             number -= 1
     return number
 

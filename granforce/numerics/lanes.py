@@ -81,18 +81,18 @@ def room(*shape: int, value: float = 0.0) -> Floats:
     size = int(np.prod(shape))
     longer = np.zeros(size + _LINE - 1)
     first = -(longer.ctypes.data // longer.itemsize) % _LINE
-    found = longer[first : first + size].reshape(shape)
+    array = longer[first : first + size].reshape(shape)
     if value:
-        found.fill(value)
-    return found
+        array.fill(value)
+    return array
 
 
 def side_by_side(values: npt.ArrayLike, width: int) -> Floats:
     """Values (n,) repeated in each of `width` lanes: (n, width)."""
     values = np.asarray(values)
-    found = room(len(values), width)
-    found[:] = values[:, None]
-    return found
+    array = room(len(values), width)
+    array[:] = values[:, None]
+    return array
 
 
 _DOUBLE = ir.DoubleType()
@@ -122,8 +122,8 @@ def _kinds(*kinds):
 
     A plain number combined with lanes is used in each of them.
     """
-    own = tuple(kind if isinstance(kind, Lanes) else types.float64 for kind in kinds)
-    return next((kind for kind in own if isinstance(kind, Lanes)), types.float64), own
+    typed = tuple(kind if isinstance(kind, Lanes) else types.float64 for kind in kinds)
+    return next((kind for kind in typed if isinstance(kind, Lanes)), types.float64), typed
 
 
 def _alike(builder, kind, values):
@@ -150,8 +150,8 @@ def instruction(plain):
 def _plain_load(array, index, lanes):
     if array.ndim == _SHARED:
         return _plain_same(lanes, array.reshape(-1)[index])
-    found = array.reshape(-1, len(lanes))[index]
-    return found[0] if len(lanes) == 1 else found.copy()
+    values = array.reshape(-1, len(lanes))[index]
+    return values[0] if len(lanes) == 1 else values.copy()
 
 
 def _plain_store(array, index, lanes, value):
@@ -163,8 +163,8 @@ def _plain_same(lanes, value):
 
 
 def _plain_pick(a, b, yes, no):
-    found = np.where(a > b, yes, no)
-    return found if found.ndim else found[()]
+    values = np.where(a > b, yes, no)
+    return values if values.ndim else values[()]
 
 
 def _plain_larger(a, b):

@@ -130,9 +130,9 @@ def _work(
         cancelling.check()
         interior_point.look(problem, True, at, work, lanes)
         gap, unbalance = work.product[0], work.unbalance[0]
-        there = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
-        there |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
-        left = np.flatnonzero(there & (number >= 0))
+        done = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
+        done |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
+        left = np.flatnonzero(done & (number >= 0))
         for lane in left.tolist():
             loaded = programs[number[lane]].loaded
             arrived.append(_outcome(problem, at, lane, number[lane], loaded, steps[lane]))

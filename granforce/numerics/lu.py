@@ -113,8 +113,8 @@ def _divide_by_unit(U, x, L, d, lanes):
 @within
 def _inverse(pivot):
     """One over a pivot of either sign; 0 for a missing pivot."""
-    there = pick(size(pivot), NO_PIVOT, pivot, 1.0)
-    return pick(size(pivot), NO_PIVOT, 1.0 / there, 0.0)
+    safe = pick(size(pivot), NO_PIVOT, pivot, 1.0)
+    return pick(size(pivot), NO_PIVOT, 1.0 / safe, 0.0)
 
 
 @within

@@ -53,7 +53,7 @@ class WallMatrix(NamedTuple):
     contact: Integers  # (walls,) contact of each wall
     normal: Floats  # (walls, 2) B: change of its slack per unit f_n, f_t/μ
     C: Floats  # (N_c, 3) nn, nt, tt of each conductance
-    own: Floats  # (N_c, 3) the same without W, which gives f − f° from the slacks
+    unweighted: Floats  # (N_c, 3) the same without W, which gives f − f° from the slacks
     factors: Factors  # of A C Aᵀ, one number for all lanes
     times: int = 1  # how often balance is restored
 
@@ -71,7 +71,7 @@ class WallMatrix(NamedTuple):
         that of rounding and of the weights. C (N_c, 3): conductances to use instead of the matrix's
         own.
         """
-        found = np.empty_like(g)
+        moved = np.empty_like(g)
         for first in range(0, len(g), LANES):
             part = slice(first, first + LANES)
             count = len(g[part])
@@ -81,8 +81,8 @@ class WallMatrix(NamedTuple):
             if pulls is not None:
                 at.f[:, :count] = pulls[:, None] if pulls.ndim == 1 else pulls[part].T
             _move(self, self.C if C is None else C, times * self.times, at, lanes)
-            found[part] = at.out[:, :count].T
-        return found
+            moved[part] = at.out[:, :count].T
+        return moved
 
     def rows(self, walls: Integers) -> Floats:
         """Rows (k, walls) of K for walls (k,)."""
@@ -92,7 +92,7 @@ class WallMatrix(NamedTuple):
 
     def on_hull(self, away: Floats) -> Floats:
         """The nearest point to `away` (k, walls) that satisfies the balance."""
-        return self.moved(away, None, POLISH, self.own)
+        return self.moved(away, None, POLISH, self.unweighted)
 
 
 class Scratch(NamedTuple):
@@ -152,11 +152,11 @@ def _without_dependent(corner: Floats, weight: Floats) -> None:
     factor = np.tril(corner, -1) + np.diag(pivot)
     rest = factor @ factor.T
     for a in range(len(corner)):
-        there = rest[a, a] > DEPENDENT * weight[a]
-        column = rest[a:, a] / np.sqrt(rest[a, a]) if there else np.zeros(len(corner) - a)
+        independent = rest[a, a] > DEPENDENT * weight[a]
+        column = rest[a:, a] / np.sqrt(rest[a, a]) if independent else np.zeros(len(corner) - a)
         rest[a:, a:] -= np.outer(column, column)
         corner[a:, a] = column
-        corner[a, a] = 1 / column[0] if there else 0.0
+        corner[a, a] = 1 / column[0] if independent else 0.0
 
 
 def global_rows(network: Network, factors: Factors) -> int:
@@ -167,9 +167,9 @@ def global_rows(network: Network, factors: Factors) -> int:
 def log_determinant(network: Network, factors: Factors) -> float:
     """ln det A C Aᵀ from its factors, without rows that lack a pivot."""
     m = network.border.shape[1] // 2
-    own = factors.lower[cholesky.diagonals(network)].ravel()
+    diagonal = factors.lower[cholesky.diagonals(network)].ravel()
     corner = factors.corner[:: m + 1].ravel() if m else np.zeros(0)
-    pivots = np.concatenate([own[own > 1e-30], corner[corner > 0]])
+    pivots = np.concatenate([diagonal[diagonal > 1e-30], corner[corner > 0]])
     return -2 * np.log(pivots).sum()
 
 

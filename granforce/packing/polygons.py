@@ -103,13 +103,13 @@ def polygons_meet(a: Floats, b: Floats, tolerance: float) -> Meeting:
     gap = float(max(side.least.max() for side in sides))
     if abs(gap) > tolerance:
         return Meeting(gap, None, False)
-    found = []
+    touches = []
     for side, sign in zip(sides, (1.0, -1.0), strict=True):
         for edge in np.flatnonzero(side.least >= -tolerance).tolist():
             touch = side.touch(edge, sign, tolerance)
             if touch is not None:
-                found.append((np.ptp(touch.points, axis=0).max(), touch))
-    best = max(found, key=lambda one: one[0], default=(0.0, None))[1]
+                touches.append((np.ptp(touch.points, axis=0).max(), touch))
+    best = max(touches, key=lambda one: one[0], default=(0.0, None))[1]
     return Meeting(gap, best, best is None)
 
 

@@ -142,29 +142,29 @@ def critical_load(
     precision finer than that of the load factor.
     """
     refuse_options(critical_load, protocol, Protocol._fields[1:])
-    S, asked = with_idle(ensemble), checked(Protocol(**protocol))
+    S, settings = with_idle(ensemble), checked(Protocol(**protocol))
     precision = positive(precision, "precision", most=MOST_LOAD_PRECISION)
     limit = _limit(S, load)
     if not np.isfinite(limit.factor):
         raise InputError(NO_LIMIT)
     direction, unit = _direction(S, limit.load)
     unit /= S.force_scale
-    asked = asked._replace(precision=_bracket(limit, precision, unit))
+    settings = settings._replace(precision=_bracket(limit, precision, unit))
     step, start = make_step(S), starting_network(S) / S.force_scale
     push = Push(start, 0, 0.0, STEADY_STEPS, STEADY, direction)
     ends: list[Raised] = []
-    work = raised(push, limit.factor * unit, asked)
-    follow(step, [work], lambda _, found: ends.append(found))
-    found, moving = ends[0], ends[0].moving
+    work = raised(push, limit.factor * unit, settings)
+    follow(step, [work], lambda _, end: ends.append(end))
+    end, moving = ends[0], ends[0].moving
     if moving is None:
-        beyond = found.high + asked.precision
-        moving = relax(step, push._replace(forces=found.forces, load=beyond))
-    forces = found.forces * S.force_scale
-    balanced = replace(S, b=S.b - found.low * S.force_scale * direction)
+        beyond = end.high + settings.precision
+        moving = relax(step, push._replace(forces=end.forces, load=beyond))
+    forces = end.forces * S.force_scale
+    balanced = replace(S, b=S.b - end.low * S.force_scale * direction)
     displacement, rotation = _motion(S, moving)
     return CriticalLoad(
-        low=found.low / unit,
-        high=found.high / unit,
+        low=end.low / unit,
+        high=end.high / unit,
         precision=precision,
         load_factor=limit.factor,
         load=limit.load,
@@ -174,8 +174,8 @@ def critical_load(
         displacement=displacement,
         rotation=rotation,
         breach=moving.breach,
-        converged=bool(found.high - found.low <= asked.precision and moving.converged),
-        counts={name: n for name, n in found.counts.items() if name != "seconds"},
+        converged=bool(end.high - end.low <= settings.precision and moving.converged),
+        counts={name: n for name, n in end.counts.items() if name != "seconds"},
     )
 
 

@@ -100,13 +100,15 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
         names.append(pair_names(snapshot.ids, contacts.i, contacts.j))
     pairs, places = over_frames(names)
     arrays = {name: np.full((len(done), len(pairs), 2), np.nan) for name in _FORCES}
-    for k, ((_, snapshot, (bounds, *_)), (here, into)) in enumerate(zip(done, places, strict=True)):
-        arrays["forces"][k, into] = snapshot.packing.forces[here]
+    for k, ((_, snapshot, (bounds, *_)), (source, into)) in enumerate(
+        zip(done, places, strict=True)
+    ):
+        arrays["forces"][k, into] = snapshot.packing.forces[source]
         for name in ("low", "high"):
             # Contacts outside the backbone carry no force in any network.
             forces = np.zeros_like(snapshot.packing.forces)
             forces[bounds["backbone"].values] = bounds[name].values
-            arrays[name][k, into] = forces[here]
+            arrays[name][k, into] = forces[source]
     rows = [_scalars(number, snapshot.packing, *results) for number, snapshot, results in done]
     variables: dict[str, Any] = {}
     for name, meaning in _FORCES.items():

@@ -159,8 +159,8 @@ class Puller:
         rounded: the nearest network of S is used.
         """
         state, _ = self.near(state)
-        (here,) = self._points(axes, state[None])
-        k, (a, b) = _triangle(fan.points, here, _inside(fan.points, np.asarray(point, float)))
+        (origin,) = self._points(axes, state[None])
+        k, (a, b) = _triangle(fan.points, origin, _inside(fan.points, np.asarray(point, float)))
         after = (k + 1) % len(fan.points)
         forces = (1 - a - b) * state + a * fan.states[k] + b * fan.states[after]
         return forces, float(self._S.residual(forces[None])[0])
@@ -193,9 +193,9 @@ def _inside(corners: Floats, point: Floats) -> Floats:
     return nearest[np.argmin(((nearest - point) ** 2).sum(axis=1))]
 
 
-def _triangle(corners: Floats, here: Floats, point: Floats) -> tuple[int, Floats]:
-    """(k, weights (2,)) of a point in the triangle of `here` and corners k and k + 1."""
-    first, second, away = corners - here, np.roll(corners, -1, axis=0) - here, point - here
+def _triangle(corners: Floats, origin: Floats, point: Floats) -> tuple[int, Floats]:
+    """(k, weights (2,)) of a point in the triangle of `origin` and corners k and k + 1."""
+    first, second, away = corners - origin, np.roll(corners, -1, axis=0) - origin, point - origin
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         a = (away[0] * second[:, 1] - away[1] * second[:, 0]) / area

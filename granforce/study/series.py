@@ -232,10 +232,10 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     quantities += ["standard_error"] if all("standard_error" in one for _, one in done) else []
     arrays = {name: np.full(shape, np.nan) for name in quantities}
     added = np.zeros(shape[:2], dtype=bool)
-    for k, ((_, one), (here, into)) in enumerate(zip(done, places, strict=True)):
+    for k, ((_, one), (source, into)) in enumerate(zip(done, places, strict=True)):
         for name, values in arrays.items():
-            values[k, into] = one[name].values[here]
-        added[k, into] = one["added"].values[here]
+            values[k, into] = one[name].values[source]
+        added[k, into] = one["added"].values[source]
     change = np.full(shape, np.nan)
     change[1:] = np.diff(arrays["inferred"], axis=0)
     accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]

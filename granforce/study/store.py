@@ -482,8 +482,8 @@ def _is_stale(temporary: Path) -> bool:
     except FileNotFoundError:
         return False  # renamed or removed meanwhile
     host, _, pid = temporary.name.removeprefix(".tmp-").rpartition("-")[0].rpartition("-")
-    here = host == _host() and pid.isdigit() and os.name == "posix"
-    return age > STALE_SECONDS or (here and not _is_alive(int(pid)))
+    local = host == _host() and pid.isdigit() and os.name == "posix"
+    return age > STALE_SECONDS or (local and not _is_alive(int(pid)))
 
 
 def _is_alive(pid: int) -> bool:

@@ -110,8 +110,8 @@ def _wake_by_signals(mouth: socket.socket) -> bool:
 
 def _watch(scope: _Scope, ears: socket.socket, asks: bool) -> None:
     while not scope.flag[0]:
-        heard, _, _ = select.select([ears], [], [], _ASK_EVERY if asks else None)
-        numbers = ears.recv(64) if heard else b""
+        readable, _, _ = select.select([ears], [], [], _ASK_EVERY if asks else None)
+        numbers = ears.recv(64) if readable else b""
         if signal.SIGINT in numbers:
             scope.flag[0] = True
         if 0 in numbers:

@@ -43,11 +43,11 @@ def tell_when_compiling(
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]  # numba has no type hints
-        said = False
+        announced = False
 
         def on_start(self, happening: Any) -> None:
-            if not self.said:
-                self.said = True
+            if not self.announced:
+                self.announced = True
                 say()
 
         def on_end(self, happening: Any) -> None:

@@ -14,12 +14,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_asked = threading.Event()
+_pressed = threading.Event()
 
 
 def interrupted() -> bool:
     """Whether Ctrl-C was pressed during the running command."""
-    return _asked.is_set()
+    return _pressed.is_set()
 
 
 @contextmanager
@@ -37,15 +37,15 @@ def noted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-        _asked.clear()
+        _pressed.clear()
 
 
 def check() -> None:
     """Raise the recorded KeyboardInterrupt, if any."""
-    if _asked.is_set():
+    if _pressed.is_set():
         raise KeyboardInterrupt
 
 
 def _note(number: int, frame: FrameType | None) -> None:
-    _asked.set()
+    _pressed.set()
     raise KeyboardInterrupt

@@ -262,4 +262,4 @@ def place(page, x, y):
 
 
 def here(page):
-    return [column(page, "here", name)[0] for name in "xy"]
+    return [column(page, "current", name)[0] for name in "xy"]

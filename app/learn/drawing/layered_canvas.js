@@ -23,7 +23,7 @@ export class Easel {
   /** A frame with its static parts, which `paint` repaints when a value of `key` changes. */
   begin(paper, key, paint) {
     const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
-    const whole = [paper, ...size, ...key], own = this.g
+    const whole = [paper, ...size, ...key], visible = this.g
     if (!this.key || whole.some((value, k) => value !== this.key[k])) {
       this.key = whole
       for (const canvas of [this.canvas, this.still]) [canvas.width, canvas.height] = size
@@ -32,10 +32,10 @@ export class Easel {
       this.g.fillStyle = paper
       this.g.fillRect(0, 0, this.wide, this.high)
       paint()
-      this.g = own
+      this.g = visible
     }
-    own.setTransform(1, 0, 0, 1, 0, 0)
-    own.drawImage(this.still, 0, 0)
-    own.setTransform(ratio, 0, 0, ratio, 0, 0)
+    visible.setTransform(1, 0, 0, 1, 0, 0)
+    visible.drawImage(this.still, 0, 0)
+    visible.setTransform(ratio, 0, 0, ratio, 0, 0)
   }
 }

@@ -47,11 +47,11 @@ export function drawAxis(space, index, at, d = 0) {
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
   const marked = [...extremes(space, value, d).map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
     .map((mark) => ({ ...mark, x: mark.place[d] }))
-  const own = look.axes?.get(index) // the colour of its arrows
+  const axisColour = look.axes?.get(index) // the colour of its arrows
   const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
   const beside = (x, text, colour) => (d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(x + 5, at - 10, text, colour, 12, "left"))
-  g.strokeStyle = own ?? look.edge
+  g.strokeStyle = axisColour ?? look.edge
   g.lineWidth = 1
   const least = index % 2 ? ends[0] : (d ? Math.min : Math.max)(ends[0], place(0)) // no normal force is below 0
   line(g, ...[slope > 0 ? least : ends[0], ends[1]].map((x) => (d ? [at, x] : [x, at])))
@@ -65,16 +65,16 @@ export function drawAxis(space, index, at, d = 0) {
   for (const [x, text] of ticks) write(x, text, look.ink, 11)
   g.lineWidth = 1
   g.setLineDash([2, 4])
-  for (const { x, place: there, colour } of marked) {
+  for (const { x, place: position, colour } of marked) {
     g.strokeStyle = colour
-    stroke(x, there[1 - d], at)
+    stroke(x, position[1 - d], at)
   }
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) beside(x, number(v), colour) })
   const { r, load } = body.scene, one = r.length === 1 && Math.abs(Math.hypot(load[0], load[1]) - 1) < 1e-9
   const unit = one ? ` (weight of the ${body.scene.one} = 1)` : ""
   const name = forceName(body.scene, index) + unit, words = slope > 0 ? `${name} →` : `← ${name}`
-  nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
+  nameAxis(space, words, axisColour ?? look.ink, d ? null : at + 33)
 }
 
 /** Least and largest value of a force in S, with their positions, except where S is unbounded; none while unknown. */

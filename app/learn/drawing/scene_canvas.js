@@ -81,23 +81,23 @@ export class Arrows {
 
   /** Both ends of every contact: {contact, disk, at, inward: force on the disk for f_n = 1, across}. */
   ends() {
-    const { scene } = this.body, disks = scene.r.length, found = []
-    if (this.endsOf === scene) return this.found
-    Object.assign(this, { endsOf: scene, found, places: [] })
+    const { scene } = this.body, disks = scene.r.length, ends = []
+    if (this.endsOf === scene) return this.contactEnds
+    Object.assign(this, { endsOf: scene, contactEnds: ends, places: [] })
     for (let c = 0; c < scene.i.length; c++) {
       const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
       const [b_i, b_j] = scene.levers.slice(2 * c, 2 * c + 2)
       for (const [disk, sign, arm, b] of [[scene.i[c], -1, scene.arm_i[c], b_i], [scene.j[c], 1, scene.arm_j[c], b_j]]) {
         if (disk >= disks) continue
         const at = [scene.x[2 * disk] - sign * arm * nx - b * ny, scene.x[2 * disk + 1] - sign * arm * ny + b * nx]
-        found.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
+        ends.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
       }
-      const [one, other] = found.slice(-2)
+      const [one, other] = ends.slice(-2)
       if (!scene.box[0] || Math.hypot(one.at[0] - other.at[0], one.at[1] - other.at[1]) < 1e-6) continue
       Object.assign(one, { copy: other.at }) // its position on a copy of its disk
       Object.assign(other, { copy: one.at })
     }
-    return found
+    return ends
   }
 
   draw(look) {
@@ -175,12 +175,12 @@ export class Arrows {
 
   drawDisks() {
     const { context: g, body, look } = this, { x, r } = body.scene, copies = this.copies()
-    const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
-    for (const [k, { disk, at }] of [...own, ...copies].entries()) {
+    const originals = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
+    for (const [k, { disk, at }] of [...originals, ...copies].entries()) {
       const outline = this.outline(disk)
       if (outline) polygon(g, outline.map((corner) => this.px(...corner)))
       else circle(g, at, r[disk] * this.unit)
-      g.globalAlpha = k < own.length ? 1 : 0.3
+      g.globalAlpha = k < originals.length ? 1 : 0.3
       g.fillStyle = look.disk === disk ? look.lit : look.fill
       g.fill()
       g.strokeStyle = look.edge
@@ -198,15 +198,15 @@ export class Arrows {
 
   /** Visible copies of the disks of a periodic scene. */
   copies() {
-    const { x, r, box } = this.body.scene, { wide, high } = this.easel, found = []
-    if (!box[0]) return found
+    const { x, r, box } = this.body.scene, { wide, high } = this.easel, copies = []
+    if (!box[0]) return copies
     for (let disk = 0; disk < r.length; disk++) {
       for (const a of [-1, 0, 1]) for (const b of [-1, 0, 1]) {
         const at = this.px(x[2 * disk] + a * box[0], x[2 * disk + 1] + b * box[1]), R = r[disk] * this.unit
-        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) found.push({ disk, at })
+        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) copies.push({ disk, at })
       }
     }
-    return found
+    return copies
   }
 
   beginNumbers() {
@@ -264,17 +264,17 @@ export class Arrows {
       return
     }
     const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
-    const own = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
-    const apart = own && body.scene.r.length <= NAMED // the numbered component separately
+    const axisColour = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
+    const apart = axisColour && body.scene.r.length <= NAMED // the numbered component separately
     if (named) {
       g.globalAlpha = 0.45
       this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
       g.globalAlpha = 1
       this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
-    const colour = lit ? look.hand : slides ? look.warm : (!apart && own) || look.cold, thick = lit || (own && !apart) ? 3.5 : 2.5
+    const colour = lit ? look.hand : slides ? look.warm : (!apart && axisColour) || look.cold, thick = lit || (axisColour && !apart) ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
-    if (apart) this.arrow(px, py, inward.map((v) => v * normal), own, 3.5)
+    if (apart) this.arrow(px, py, inward.map((v) => v * normal), axisColour, 3.5)
     g.globalAlpha *= 0.35
     if (copy) this.arrow(...this.px(...copy), force, colour, thick)
     g.globalAlpha = 1
@@ -347,8 +347,8 @@ export class Arrows {
   /** The forces on one disk, weight first, joined into a polygon that closes. */
   drawPolygon(disk, F) {
     const { context: g, body, look } = this, forces = [[body.load[3 * disk], body.load[3 * disk + 1], look.weight]]
-    for (const { contact, disk: own, inward, across } of this.ends()) {
-      if (own !== disk || F[2 * contact] < 1e-9) continue
+    for (const { contact, disk: touched, inward, across } of this.ends()) {
+      if (touched !== disk || F[2 * contact] < 1e-9) continue
       const [n, t] = [F[2 * contact], F[2 * contact + 1]]
       forces.push([n * inward[0] + t * across[0], n * inward[1] + t * across[1], look.contacts.has(contact) ? look.hand : look.cold])
     }
@@ -371,9 +371,9 @@ export class Arrows {
     g.fillText(body.scene.r.length > 1 ? `forces on ${body.scene.one} ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
     const x0 = left + 17 - unit * Math.min(...xs) + ((side - 34) - unit * (Math.max(...xs) - Math.min(...xs))) / 2
     const y0 = top + 17 + unit * Math.max(...ys) + ((side - 34) - unit * (Math.max(...ys) - Math.min(...ys))) / 2
-    const own = this.unit * this.forceUnit
+    const pixels = this.unit * this.forceUnit
     forces.forEach(([x, y, colour], k) => {
-      this.arrow(x0 + unit * corners[k][0], y0 - unit * corners[k][1], [(x * unit) / own, (y * unit) / own], colour, 2)
+      this.arrow(x0 + unit * corners[k][0], y0 - unit * corners[k][1], [(x * unit) / pixels, (y * unit) / pixels], colour, 2)
     })
   }
 
@@ -400,15 +400,15 @@ export class Arrows {
   }
 
   grabbed(px, py, event) {
-    const found = this.find(px, py)
-    if (this.handler("press", { found, at: this.back(px, py) })) {
+    const target = this.find(px, py)
+    if (this.handler("press", { target, at: this.back(px, py) })) {
       this.held = { taken: true }
       this.canvas.setPointerCapture(event.pointerId)
       return
     }
-    this.handler("select", found)
-    if (!found || found.loose) return
-    this.held = found
+    this.handler("select", target)
+    if (!target || target.loose) return
+    this.held = target
     this.canvas.setPointerCapture(event.pointerId)
     event.preventDefault()
   }
@@ -416,9 +416,9 @@ export class Arrows {
   moved(px, py) {
     if (this.held?.taken) return this.handler("carry", { at: this.back(px, py) })
     if (this.held) return this.pull(px, py)
-    const found = this.find(px, py)
-    this.canvas.style.cursor = found && !found.loose ? "grab" : "default"
-    this.handler("hover", found)
+    const target = this.find(px, py)
+    this.canvas.style.cursor = target && !target.loose ? "grab" : "default"
+    this.handler("hover", target)
   }
 
   pull(px, py) {

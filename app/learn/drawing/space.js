@@ -66,8 +66,8 @@ export class Space {
     if (body.h > 3) return this.shadow
     if (body.h !== 2) return []
     // Computed once, so that friction does not turn the picture.
-    if (this.own?.of !== body.axes) this.own = { of: body.empty ? null : body.axes, forces: body.empty ? [] : readBy(body).map((c) => 2 * c) }
-    return this.own.forces
+    if (this.chosenAxes?.of !== body.axes) this.chosenAxes = { of: body.empty ? null : body.axes, forces: body.empty ? [] : readBy(body).map((c) => 2 * c) }
+    return this.chosenAxes.forces
   }
 
   /** Contacts whose forces are read from the point: on the axis below S, and on the one next to it. */

@@ -33,17 +33,17 @@ export class Chance extends PackingExperiment {
     this.now = this.drawn.filter(({ number }) => number <= this.count).at(-1)
     const { row } = this.now, { normal, contacts, states } = this.packing
     this.network = normal.subarray(row * contacts, (row + 1) * contacts)
-    if (this.count > 0.99 * states) this.found = true
+    if (this.count > 0.99 * states) this.answered = true
     this.changed()
   }
 
   get picture() {
-    const { packing: { least, largest, low, high, states }, contact, found, count } = this
+    const { packing: { least, largest, low, high, states }, contact, answered, count } = this
     const rows = this.drawn.filter(({ number }) => number <= count)
     return {
       now: [this.now.value, count], words: `network ${count}`,
       exact: [rectangle(least[contact], largest[contact], states)], filled: true,
-      seen: found ? [[[low[contact], states], [high[contact], states]]] : [], brush: 8,
+      seen: answered ? [[[low[contact], states], [high[contact], states]]] : [], brush: 8,
       dots: rows.map(({ value, number }) => [value, number]),
     }
   }

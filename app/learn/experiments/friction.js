@@ -33,7 +33,7 @@ export class Friction extends PackingExperiment {
       this.canvas.show(packing, packing.grabbed)
       this.say(`picture: a packing made at μ = ${packing.mu}`)
     }
-    this.found ||= visited.size === stops.length
+    this.answered ||= visited.size === stops.length
     this.changed()
   }
 
@@ -66,10 +66,10 @@ export class Friction extends PackingExperiment {
   }
 
   get picture() {
-    const { stops, spreads, value, visited, found } = this, curve = stops.map((mu, k) => [mu, spreads[k]])
+    const { stops, spreads, value, visited, answered } = this, curve = stops.map((mu, k) => [mu, spreads[k]])
     return {
       now: curve[stops.indexOf(value)], words: `μ = ${value}`, seen: [], brush: 2,
-      dots: curve.filter(([mu]) => visited.has(mu)), thin: true, exact: found ? [curve] : [],
+      dots: curve.filter(([mu]) => visited.has(mu)), thin: true, exact: answered ? [curve] : [],
     }
   }
 

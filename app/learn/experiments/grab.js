@@ -68,7 +68,7 @@ export class Grab extends PackingExperiment {
     const { normal, tangential } = networkAt(rail, now)
     Object.assign(this, { network: normal, tangential })
     this.seen = [Math.min(this.value, seen?.[0] ?? start), Math.max(this.value, seen?.[1] ?? start)]
-    if (contact === this.contact) this.found ||= high - now < FOUND * (high - low)
+    if (contact === this.contact) this.answered ||= high - now < FOUND * (high - low)
     else this.say(`this line: ${now.toFixed(2)}, possible ${rail.lower.toFixed(2)} to ${rail.upper.toFixed(2)}`)
     this.changed()
   }
@@ -93,10 +93,10 @@ export class Grab extends PackingExperiment {
   }
 
   get picture() {
-    const { packing, contact, seen, found } = this
+    const { packing, contact, seen, answered } = this
     return {
       now: [this.value, 0], seen: seen ? [seen.map((x) => [x, 0])] : [],
-      exact: found ? [[[packing.least[contact], 0], [packing.largest[contact], 0]]] : [],
+      exact: answered ? [[[packing.least[contact], 0], [packing.largest[contact], 0]]] : [],
     }
   }
 }

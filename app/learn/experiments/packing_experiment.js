@@ -7,7 +7,7 @@ const AT_LIMIT = 1e-4 // mean forces: distance from the limit of friction, or fr
 
 export class PackingExperiment {
   constructor(host, options, changed, palettes) {
-    Object.assign(this, { host, options, changed, locked: true, found: false, seen: null, palettes })
+    Object.assign(this, { host, options, changed, locked: true, answered: false, seen: null, palettes })
     this.canvas = new PackingPicture(host, palettes, this)
     this.label = host.appendChild(createElement("div", { className: "label", hidden: true }))
   }

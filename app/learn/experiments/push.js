@@ -60,7 +60,7 @@ export class Push extends PackingExperiment {
     Object.assign(this, { network: normal, tangential })
     Object.assign(this.canvas, { push: this.value / limit, motion: moves ? path.displacement : null })
     if (moves) {
-      this.found = true
+      this.answered = true
       limits[start] = { value: limit, words: `network ${path.number}: ${limit.toFixed(2)}` }
     }
     if (!this.still && moves !== Boolean(this.canvas.scene.offset)) this.sway.take(this.canvas.motion)
@@ -77,9 +77,9 @@ export class Push extends PackingExperiment {
   get limited() { return this.moving ? this.path : super.limited }
 
   get picture() {
-    const { value, found, limits, path } = this
+    const { value, answered, limits, path } = this
     const bound = { value: path.limit, words: `S allows ${path.limit.toFixed(2)}` }
-    return { now: [value, 0], seen: [[[0, 0], [value, 0]]], lines: found ? [bound, ...limits.slice(1)] : [] }
+    return { now: [value, 0], seen: [[[0, 0], [value, 0]]], lines: answered ? [bound, ...limits.slice(1)] : [] }
   }
 
   stop() {

@@ -14,7 +14,7 @@ const STEPS = 20, SECONDS = 0.4 // to other forces behind the same dot
 export class SceneExperiment {
   /** options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. */
   constructor(host, options, changed) {
-    Object.assign(this, { host, options, changed, way: [], locked: true, found: false, lit: new Set() })
+    Object.assign(this, { host, options, changed, way: [], locked: true, answered: false, lit: new Set() })
     this.canvas = host.appendChild(document.createElement("canvas"))
     Object.assign(this.canvas, { role: "img", ariaLabel: "Disks, and the force on them at every contact" })
     this.arrows = new Arrows(this.canvas, (what, given) => this.respond(what, given))
@@ -104,7 +104,7 @@ export class SceneExperiment {
     if (!way.length) way.push(this.start)
     if (Math.hypot(at[0] - before[0], at[1] - before[1]) > 1e-3) way.push(at)
     if (way.length > WAY) way.splice(1, 1)
-    if (this.high - at[0] < FOUND * (this.high - this.low)) this.found = true
+    if (this.high - at[0] < FOUND * (this.high - this.low)) this.answered = true
     this.changed()
   }
 
@@ -123,12 +123,12 @@ export class SceneExperiment {
 
   /** The contents of the plot. */
   get picture() {
-    const { way, found, options: { y }, low, high, outline } = this, xs = way.map(([x]) => x)
+    const { way, answered, options: { y }, low, high, outline } = this, xs = way.map(([x]) => x)
     const line = way.length ? [[[Math.min(...xs), 0], [Math.max(...xs), 0]]] : []
     return {
       now: this.at,
       seen: y === null ? line : way.length ? [way] : [],
-      exact: !found ? [] : y === null ? [[[low, 0], [high, 0]]] : [outline],
+      exact: !answered ? [] : y === null ? [[[low, 0], [high, 0]]] : [outline],
       filled: y !== null,
       brush: y === null ? 10 : 14,
       clip: y === null ? null : outline,

@@ -121,13 +121,13 @@ class Packings:
         scale, rows = replay.force_scale, np.linspace(0, len(replay.number) - 1, STARTS).astype(int)
         row = int(rows[start])
         state = np.stack([replay.normal[row], replay.tangential[row]], axis=1).astype(float) * scale
-        found = self._puller().given_way(int(replay.backbone[contact]), state, limit)
-        motion = found.motion
+        pushed = self._puller().given_way(int(replay.backbone[contact]), state, limit)
+        motion = pushed.motion
         return {
             "contact": contact,
             "starts": STARTS,
             "number": int(replay.number[row]),
-            **path(found.under, scale),
+            **path(pushed.under, scale),
             "limit": limit / scale,
             "opened": motion.opened.astype(np.uint8),
             "slid": motion.slid.astype(np.uint8),
@@ -140,10 +140,10 @@ class Packings:
         Of the firm ones near the centre, it is the one that gives way farthest below its limit
         load, relative to it.
         """
-        replay, found = self.shown(MU).replay, self._pushed()
+        replay, pushed = self.shown(MU).replay, self._pushed()
         position = {int(number): k for k, number in enumerate(replay.backbone)}
-        contacts = np.array([position[int(number)] for number in found["backbone"].values])
-        carried, limit = found["critical_low"].values, found["limit_load"].values
+        contacts = np.array([position[int(number)] for number in pushed["backbone"].values])
+        carried, limit = pushed["critical_low"].values, pushed["limit_load"].values
         fits = (_away(replay)[contacts] < NEAR) & (carried > FIRM * replay.force_scale)
         row = int(np.argmax(np.where(fits, 1 - carried / limit, -1.0)))
         return int(contacts[row]), float(limit[row])
@@ -154,16 +154,17 @@ class Packings:
         spread: variation of forces; touching: contacts per disk; free: free numbers. They are means
         over the packings of the study or, without a study, those of each packing.
         """
-        own = self.frictions
+        frictions = self.frictions
         measured = [dict(study_data.against_friction(name)) for name in CURVES.values()]
-        stops = [mu for mu in measured[0] if own and own[0] <= mu <= own[-1]]
+        stops = [mu for mu in measured[0] if frictions and frictions[0] <= mu <= frictions[-1]]
         if not stops:
-            stops = own
-            summaries = [self.shown(mu).replay.summary for mu in own]
+            stops = frictions
+            summaries = [self.shown(mu).replay.summary for mu in frictions]
             measured = [{one["mu"]: one[name] for one in summaries} for name in CURVES.values()]
-        packed = [min(own, key=lambda one: abs(np.log(one / mu))) for mu in stops]
+        packed = [min(frictions, key=lambda one: abs(np.log(one / mu))) for mu in stops]
         curves = {
-            name: [float(by[mu]) for mu in stops] for name, by in zip(CURVES, measured, strict=True)
+            name: [float(values[mu]) for mu in stops]
+            for name, values in zip(CURVES, measured, strict=True)
         }
         return {"mu": stops, "packed": packed, **curves}
 

@@ -136,8 +136,8 @@ export class Body {
     if (!this.whole || trial.cut(most).empty) return null
     let [low, high] = [this.mu, most]
     while (high - low > 1e-3) { const mu = (low + high) / 2; if (trial.cut(mu).empty) low = mu; else high = mu }
-    const found = Math.ceil(100 * high) / 100
-    return trial.cut(found).empty ? null : found
+    const mu = Math.ceil(100 * high) / 100
+    return trial.cut(mu).empty ? null : mu
   }
 
   /** Outward direction along the sides that meet in a distant corner, to rounding; null if there is none. */
@@ -168,14 +168,14 @@ export class Body {
 
   /** Points where h sides meet and no constraint is violated, {u, cap}. */
   meetings(rows) {
-    const { h } = this, found = []
+    const { h } = this, points = []
     const add = (picked) => {
       const u = h ? solve(picked.map((row) => row.slope), picked.map((row) => -row.rest)) : []
       if (!u) return
       const size = 1 + Math.hypot(...u)
       if (rows.some((row) => dot(row.slope, u) + row.rest < -SMALL * size)) return
-      if (found.some((other) => Math.hypot(...other.u.map((v, k) => v - u[k])) < 1e-7 * size)) return
-      found.push({ u, cap: rows.some((row) => row.cap && Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * size) })
+      if (points.some((other) => Math.hypot(...other.u.map((v, k) => v - u[k])) < 1e-7 * size)) return
+      points.push({ u, cap: rows.some((row) => row.cap && Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * size) })
     }
     const pick = (from, picked) => {
       if (picked.length === h) return add(picked)
@@ -183,7 +183,7 @@ export class Body {
     }
     if (h === 3) this.edges(rows, (picked) => add(picked.map((k) => rows[k])))
     else pick(0, [])
-    return found
+    return points
   }
 
   /** met([row, row, row]) at both ends of the part inside all other sides of the line in which two sides meet. */
@@ -209,20 +209,20 @@ export class Body {
 
   /** Sides: {corners in order, stops: [[contact, what], …], cap}; coinciding sides are joined. */
   faces(rows) {
-    const { h } = this, found = new Map()
+    const { h } = this, byCorners = new Map()
     for (const row of rows) {
       const on = []
       this.corners.forEach(({ u }, k) => {
         if (Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u))) on.push(k)
       })
       if (on.length < Math.max(1, h) || !h) continue
-      const key = on.join(), side = found.get(key) ?? { corners: on, stops: new Map(), slope: row.slope, rest: row.rest }
+      const key = on.join(), side = byCorners.get(key) ?? { corners: on, stops: new Map(), slope: row.slope, rest: row.rest }
       if (row.cap) side.cap = true
       else if (side.stops.has(row.contact) && side.stops.get(row.contact) !== row.what) side.stops.set(row.contact, OPENS)
       else side.stops.set(row.contact, row.what)
-      found.set(key, side)
+      byCorners.set(key, side)
     }
-    const sides = [...found.values()].map((side) => ({ ...side, stops: [...side.stops] }))
+    const sides = [...byCorners.values()].map((side) => ({ ...side, stops: [...side.stops] }))
     for (const side of sides) if (h === 3) side.corners = this.around(side)
     return sides
   }

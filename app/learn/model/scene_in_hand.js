@@ -48,17 +48,17 @@ export class SceneInHand {
   }
 
   /** The pointer is over {contact, disk, loose} in the picture of the disks, or over nothing. */
-  point(found) {
-    this.disk = found ? found.disk : null
-    if (!this.chosen) this.choose(found && !found.loose ? found.contact : null)
+  point(target) {
+    this.disk = target ? target.disk : null
+    if (!this.chosen) this.choose(target && !target.loose ? target.contact : null)
     this.side = null
   }
 
   /** The same, on pressing. */
-  select(found) {
-    this.chosen = Boolean(found && !found.loose)
-    this.disk = found ? found.disk : null
-    this.choose(this.chosen ? found.contact : null)
+  select(target) {
+    this.chosen = Boolean(target && !target.loose)
+    this.disk = target ? target.disk : null
+    this.choose(this.chosen ? target.contact : null)
     this.side = null
     if (this.chosen) this.remember()
   }

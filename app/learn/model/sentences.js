@@ -74,18 +74,18 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
   const free = h === 1 ? "number" : "numbers"
-  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point}</b>`
-  return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}: ${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}: ${why})</span>`
+  const statement = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point}</b>`
+  return scene.box[0] ? `${statement} <details><summary>Why ${equations}?</summary>${sum}: ${why} (${forces}).</details>` : `${statement} <span>(${forces}; ${sum}: ${why})</span>`
 }
 
 /** The sum that gives the number of equations, and its parts. */
 function equationsOf({ grains, r, pressing, box, equations }) {
   const disks = box[0] ? [...(grains ?? [])].filter((grain) => grain < r.length).length : r.length, walls = 2 * pressing.length // loose disks of a box have no load
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
-  const said = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
+  const conditions = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
   if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations`, `three for each disk, less two that follow from the others, plus one for the pressure`]
   const rank = (equations ?? whole) === whole ? "" : `, of which ${equations} are independent`
-  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations${rank}`, said + (walls ? "; and two of the wall that presses" : "")]
+  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations${rank}`, conditions + (walls ? "; and two of the wall that presses" : "")]
 }
 
 /** The meaning of the bars below; empty if there are none. */
@@ -152,11 +152,11 @@ function gripped(body) {
 }
 
 /** Why S is empty: the disks and walls that give way in the motion that proves it, and a sufficient friction. */
-function falling({ scene: { r, box, pressing, load: own }, load }, mu, { fall, enough }) {
+function falling({ scene: { r, box, pressing, load: weights }, load }, mu, { fall, enough }) {
   const moving = fall ? Array.from({ length: fall.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...fall.slice(3 * k, 3 * k + 3)) > 0.05) : []
   const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length
   const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
-  const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
+  const pushed = load.some((v, k) => v !== weights[k]) ? " and the push" : ""
   const loads = pressing.length ? "the press does" : box[0] ? `the pressure${pushed} does` : `the weights${pushed} do`
   const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and the contacts cannot balance them.` : ""
   const mended = enough ? ` With friction of at least μ = ${enough} it would hold.` : ""

@@ -37,7 +37,7 @@ def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]
 
 def packing_of(name: str, mu: float | None = None, built: str = "") -> Packing:
     """The Packing of a scene, by name or built, balanced or not."""
-    return own(built, mu) if name == OWN else scenes.sketched(name, mu)
+    return built_packing(built, mu) if name == OWN else scenes.sketched(name, mu)
 
 
 def geometry(packing: Packing) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def geometry(packing: Packing) -> dict[str, Any]:
         walls = _touched_sides(outlines[count:], packing.contact_points[contacts.j >= count])
     lids = packing.info.get("pressing", [])
     loaded = bool(np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any())
-    found = hulls.hull(packing) if len(contacts.i) and loaded else None
+    space = hulls.hull(packing) if len(contacts.i) and loaded else None
     box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
     return {
         "one": _one(packing),
@@ -71,7 +71,7 @@ def geometry(packing: Packing) -> dict[str, Any]:
         "arm_j": contacts.arm_j,
         "levers": contacts.offsets.ravel(),
         "names": names(packing, count),
-        **({} if found is None else _balance(found)),
+        **({} if space is None else _balance(space)),
     }
 
 
@@ -84,15 +84,15 @@ def _touched_sides(bodies: Sequence[Floats], points: Floats) -> Floats:
     return sides[(np.abs(points[:, None] - nearest).max(axis=-1) < SNAP).any(axis=0)]
 
 
-def _balance(found: hulls.BalanceSpace) -> dict[str, Any]:
+def _balance(space: hulls.BalanceSpace) -> dict[str, Any]:
     return {
-        "A": found.A.ravel(),
-        "b": found.b,
-        "lift": found.lift.ravel(),
-        "axes": found.axes.ravel(),
-        "h": len(found.axes),
-        "equations": found.equations,
-        "grains": found.grains.astype(np.int32),
+        "A": space.A.ravel(),
+        "b": space.b,
+        "lift": space.lift.ravel(),
+        "axes": space.axes.ravel(),
+        "h": len(space.axes),
+        "equations": space.equations,
+        "grains": space.grains.astype(np.int32),
     }
 
 
@@ -129,13 +129,13 @@ def names(packing: Packing, count: int) -> list[str]:
 def _ends(packing: Packing) -> list[str]:
     """For contacts at the two ends of a shared edge, which end, in words; empty for others."""
     i, j, points = packing.contacts.i, packing.contacts.j, packing.contact_points
-    found = [""] * len(i)
+    ends = [""] * len(i)
     for c in range(len(i)) if packing.shapes is not None else ():
         for other in np.flatnonzero((i == i[c]) & (j == j[c]) & (np.arange(len(i)) != c)):
             x, y = points[c] - points[other]
             upright = ("upper" if y > 0 else "lower", "right" if x > 0 else "left")
-            found[c] = f" ({upright[int(abs(y) < abs(x))]} end)"
-    return found
+            ends[c] = f" ({upright[int(abs(y) < abs(x))]} end)"
+    return ends
 
 
 def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
@@ -179,11 +179,11 @@ def measured(
     is above `most`.
     """
     packing = _loaded(packing, load)
-    found = hulls.bounds(packing)
-    if found is None:
+    intervals = hulls.bounds(packing)
+    if intervals is None:
         most = DRAWN * float(np.nansum(np.hypot(*packing.load[:, :2].T)))
         return {"most": most, "outline": hulls.outline(packing, plane, most).ravel().tolist()}
-    bounds = [None if np.isnan(low) else [float(low), float(high)] for low, high in found]
+    bounds = [None if np.isnan(low) else [float(low), float(high)] for low, high in intervals]
     return {"bounds": bounds, "outline": hulls.outline(packing, plane).ravel().tolist()}
 
 
@@ -197,7 +197,7 @@ def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
     return packing._replace(load=changed)
 
 
-def own(text: str, mu: float | None = None) -> Packing:
+def built_packing(text: str, mu: float | None = None) -> Packing:
     """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", bodies and walls, under gravity.
 
     A body of five numbers is a block: x, y of its centre, width, height and turn in degrees. With a
@@ -213,12 +213,12 @@ def own(text: str, mu: float | None = None) -> Packing:
     pressing[lids] = np.hypot(*(walls[lids, 2:] - walls[lids, :2]).T)
     mu = 0.5 if mu is None else friction(mu)
     if any(len(body) == 5 for body in bodies):
-        made = _of_blocks(bodies, walls, mu, None if not press else pressing)
+        packing = _of_blocks(bodies, walls, mu, None if not press else pressing)
     else:
         x, r = np.hsplit(np.array(bodies), [2])
         load = scenes.weights(r[:, 0]) * (not press)
-        made = scenes.assembled(x, r[:, 0], walls, load, mu, pressing=pressing, tolerance=SNAP)
-    return made._replace(info=made.info | {"scene": OWN})
+        packing = scenes.assembled(x, r[:, 0], walls, load, mu, pressing=pressing, tolerance=SNAP)
+    return packing._replace(info=packing.info | {"scene": OWN})
 
 
 def _of_blocks(

@@ -19,7 +19,7 @@ export class Address {
   /** Update the address to the present scene. */
   write({ scene: { name, built }, mu }, dark) {
     if (this.returning) return
-    const there = new URLSearchParams(window.location.search).get("scene"), step = there && there !== name
+    const scene = new URLSearchParams(window.location.search).get("scene"), step = scene && scene !== name
     window.history[step ? "pushState" : "replaceState"](null, "", `?${this.query({ scene: name, mu: String(Number(mu.toPrecision(6))), built }, dark)}`)
   }
 

@@ -93,11 +93,11 @@ export class Builder {
   /** Typed width, height or degrees (side 0, 1, 2) of new blocks, and of the chosen one if there is room. */
   size(side, text) {
     const value = Number(text.replace(",", ".")), { block, sizes } = this
-    const given = (block?.slice(2) ?? sizes.block).with(side, side < 2 ? Math.min(SIZES[1], Math.max(SIZES[0], value)) : value % 360)
-    const meant = text.trim() && Number.isFinite(value), fits = meant && (!block || this.reshape(this.chosen, given))
-    if (fits) sizes.block = given
+    const changed = (block?.slice(2) ?? sizes.block).with(side, side < 2 ? Math.min(SIZES[1], Math.max(SIZES[0], value)) : value % 360)
+    const valid = text.trim() && Number.isFinite(value), fits = valid && (!block || this.reshape(this.chosen, changed))
+    if (fits) sizes.block = changed
     this.tell()
-    if (!fits) this.host.querySelector(".how").textContent = meant ? "There is no room to change the block like this." : "Type a number."
+    if (!fits) this.host.querySelector(".how").textContent = valid ? "There is no room to change the block like this." : "Type a number."
   }
 
   /** Choose pressure or gravity. */
@@ -141,8 +141,8 @@ export class Builder {
   press(at, unit = this.unit) {
     this.unit = unit
     if (this.tool === "pull") return false
-    const point = shape([...at, 0]), own = this.bodies.findIndex((body) => gap(shape(body), point) < 0)
-    if (this.tool === "remove") return this.remove(own, at)
+    const point = shape([...at, 0]), index = this.bodies.findIndex((body) => gap(shape(body), point) < 0)
+    if (this.tool === "remove") return this.remove(index, at)
     if (this.tool === "press") return this.switchWall(at)
     if (this.tool === "wall") {
       if (this.walls.length >= MOST_WALLS) return true
@@ -151,31 +151,31 @@ export class Builder {
       return true
     }
     if (this.block && Math.hypot(...this.handle[1].map((v, k) => v - at[k])) < GRIP / unit) this.held = { body: this.chosen, turns: true }
-    else if (own >= 0) this.take(own, at)
+    else if (index >= 0) this.take(index, at)
     else if (this.bodies.length < MOST_BODIES) this.add(at)
     return true
   }
 
-  take(own, at) {
-    const [x, y] = this.bodies[own]
-    this.chosen = own
-    this.held = { body: own, grip: [x - at[0], y - at[1]] }
+  take(index, at) {
+    const [x, y] = this.bodies[index]
+    this.chosen = index
+    this.held = { body: index, grip: [x - at[0], y - at[1]] }
   }
 
   /** Add a body; a block lies flat on the nearest edge. */
   add(at) {
-    const put = this.placed([...at, ...this.sizes[this.tool]], -1, 45)
-    if (!put) return
-    this.take(this.bodies.push(put) - 1, at)
+    const row = this.placed([...at, ...this.sizes[this.tool]], -1, 45)
+    if (!row) return
+    this.take(this.bodies.push(row) - 1, at)
     this.publish()
   }
 
-  remove(own, at) {
+  remove(index, at) {
     const wall = this.wallAt(at)
-    if (own >= 0) this.bodies.splice(own, 1)
+    if (index >= 0) this.bodies.splice(index, 1)
     else if (wall >= 0) this.walls.splice(wall, 1)
     this.chosen = null
-    if (own >= 0 || wall >= 0) this.publish()
+    if (index >= 0 || wall >= 0) this.publish()
     return true
   }
 
@@ -209,16 +209,16 @@ export class Builder {
   }
 
   /** Give a body another size or turn, and move it as far as contacts need; returns whether there is room. */
-  reshape(own, size) {
-    const row = [...this.bodies[own].slice(0, 2), ...size], at = this.settled(row, own) ?? this.settled(row, own, Math.hypot(...size.slice(0, 2)) / 2)
-    if (at) this.replace(own, [...at, ...size])
+  reshape(index, size) {
+    const row = [...this.bodies[index].slice(0, 2), ...size], at = this.settled(row, index) ?? this.settled(row, index, Math.hypot(...size.slice(0, 2)) / 2)
+    if (at) this.replace(index, [...at, ...size])
     return Boolean(at)
   }
 
   /** Put another row in place of a body, if there is one and it differs. */
-  replace(own, row) {
-    if (!row || row.every((v, k) => v === this.bodies[own][k])) return
-    this.bodies[own] = row
+  replace(index, row) {
+    if (!row || row.every((v, k) => v === this.bodies[index][k])) return
+    this.bodies[index] = row
     this.tell()
     this.publish()
   }
@@ -275,15 +275,15 @@ export class Builder {
 
   /** A row at the nearest position in contact, a block after turning by up to `most` degrees onto an edge; null if there
    * is no room. */
-  placed(row, own, most) {
-    const turned = row.length > 3 ? row.with(4, this.flat(row, own, most)) : row, at = this.settled(turned, own)
+  placed(row, index, most) {
+    const turned = row.length > 3 ? row.with(4, this.flat(row, index, most)) : row, at = this.settled(turned, index)
     if (at) return [...at, ...turned.slice(2)]
-    return turned[4] === row[4] ? null : this.placed(row, own, 0)
+    return turned[4] === row[4] ? null : this.placed(row, index, 0)
   }
 
   /** Degrees of a block that lies flat on the nearest edge, if it turns by `most` at most. */
-  flat(row, own, most) {
-    const edges = this.others(own).filter((other) => other.length > 3).map((other) => {
+  flat(row, index, most) {
+    const edges = this.others(index).filter((other) => other.length > 3).map((other) => {
       const angle = other[4] ?? (Math.atan2(other[3] - other[1], other[2] - other[0]) * 180) / Math.PI
       const turned = angle - 90 * Math.round((angle - row[4]) / 90)
       return { turned, far: gap(shape(row.with(4, turned)), shape(other)) }
@@ -292,19 +292,19 @@ export class Builder {
     return nearest?.turned ?? row[4]
   }
 
-  others(own) { return [...this.bodies.filter((_, k) => k !== own), ...this.walls] }
+  others(index) { return [...this.bodies.filter((_, k) => k !== index), ...this.walls] }
 
   /** The nearest position where a body touches two others, one, or none; null if there is none. */
-  settled([x, y, ...size], own, near = NEAR) {
-    const others = this.others(own).map(shape), moved = shape([0, 0, ...size])
+  settled([x, y, ...size], index, near = NEAR) {
+    const others = this.others(index).map(shape), moved = shape([0, 0, ...size])
     const far = (place) => Math.hypot(place[0] - x, place[1] - y)
-    const free = (place) => { const there = shape([...place, ...size]); return others.every((other) => gap(there, other) > -1e-9) }
+    const free = (place) => { const body = shape([...place, ...size]); return others.every((other) => gap(body, other) > -1e-9) }
     const curves = others.flatMap((other) => contactCurves(moved, other)).filter((curve) => far(foot(curve, [x, y])) < near)
     const feet = curves.filter((curve) => beside(curve, [x, y])).map((curve) => foot(curve, [x, y]))
     const twice = curves.flatMap((curve, k) => curves.slice(k + 1).flatMap((other) => meet(curve, other)))
     for (const places of [twice, feet, [[x, y]]]) {
-      const there = places.filter((place) => far(place) < 1.5 * near).sort((a, b) => far(a) - far(b)).find(free)
-      if (there) return there
+      const nearest = places.filter((place) => far(place) < 1.5 * near).sort((a, b) => far(a) - far(b)).find(free)
+      if (nearest) return nearest
     }
     return null
   }

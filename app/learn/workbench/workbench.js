@@ -1,6 +1,6 @@
 // The workbench of small scenes: the disks and their S side by side, friction, and the tools.
 
-import { goneBanner } from "../../browser/connection_lost.js"
+import { connectionBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
 import { sceneOptions } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
@@ -23,12 +23,12 @@ const FEW = 12 // contacts up to which all intervals are visible at once
 
 class Workbench {
   constructor(model, view) {
-    Object.assign(this, { model, view, hand: null, next: null, asked: false, filled: false, chosenMu: false, frame: 0, resting: 0, painted: 0, written: {}, parts: {} })
+    Object.assign(this, { model, view, hand: null, next: null, requested: false, filled: false, chosenMu: false, frame: 0, resting: 0, painted: 0, written: {}, parts: {} })
     const root = this.root = document.createElement("div")
     root.className = "bench"
     root.innerHTML = layout(MOST_MU)
-    this.gone = goneBanner(view, "What is in the page still moves.")
-    root.prepend(this.gone)
+    this.banner = connectionBanner(view, "What is in the page still moves.")
+    root.prepend(this.banner)
     this.builder = new Builder(this.part("own"), (built) => this.build(built))
     this.arrows = new Arrows(this.part("packing"), (what, given) => this.respond(what, given))
     this.space = new Space(this.part("space"), (what, given) => this.respond(what, given))
@@ -49,7 +49,7 @@ class Workbench {
   follow() {
     const { model, root } = this, key = (event) => this.key(event)
     const sized = new ResizeObserver(() => { this.arrows.wide = 0; this.soon() })
-    for (const seen of [root, this.part("packing"), this.part("space")]) sized.observe(seen)
+    for (const element of [root, this.part("packing"), this.part("space")]) sized.observe(element)
     window.addEventListener("keydown", key)
     model.on("remove", () => {
       window.removeEventListener("keydown", key)
@@ -78,15 +78,15 @@ class Workbench {
     this.frame = 0
     const { hand, root, arrows, space, builder } = this, canvas = this.part("packing")
     if (!hand || !root.isConnected) return
-    const { body } = hand, own = body.scene.name === "own", colours = palette(this.model.dark)
+    const { body } = hand, buildable = body.scene.name === "own", colours = palette(this.model.dark)
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = this.builds && root.getRootNode().activeElement === canvas ? builder.cursor : null
     const axes = new Map(space.axed.map((force, k) => [force, [colours.across, colours.up][k]]))
-    const { disk, contact, side, fall, enough, lit } = hand, carried = builder.bodies[builder.held?.body], handle = own && builder.handle
+    const { disk, contact, side, fall, enough, lit } = hand, carried = builder.bodies[builder.held?.body], handle = buildable && builder.handle
     const look = { ...colours, carried, handle, disk, contact, side, fall, enough, contacts: hand.contacts, wall, cursor, axes, dots: this.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== canvas.clientWidth) {
-      arrows.fit(body, own && arrows.own === canvas.clientWidth)
-      arrows.own = own ? canvas.clientWidth : 0
+      arrows.fit(body, buildable && arrows.builtWidth === canvas.clientWidth)
+      arrows.builtWidth = buildable ? canvas.clientWidth : 0
       arrows.wide = canvas.clientWidth
     }
     arrows.draw({ ...look, contacts: lit })
@@ -96,8 +96,8 @@ class Workbench {
   }
 
   /** Write text into a part of the page if it differs: unchanged parts are not laid out again. */
-  write(name, said, how = "textContent") {
-    const one = this.hand?.scene.one ?? "disk", text = said.replaceAll("disks", one === "body" ? "bodies" : `${one}s`).replaceAll("disk", one)
+  write(name, content, how = "textContent") {
+    const one = this.hand?.scene.one ?? "disk", text = content.replaceAll("disks", one === "body" ? "bodies" : `${one}s`).replaceAll("disk", one)
     if (this.written[name] !== text) this.part(name)[how] = this.written[name] = text
   }
 
@@ -118,8 +118,8 @@ class Workbench {
   // Loading of scenes
 
   show() {
-    const { model: { scene }, space, builder } = this, before = this.hand?.scene, own = scene.name === "own"
-    this.part("own").hidden = !own
+    const { model: { scene }, space, builder } = this, before = this.hand?.scene, buildable = scene.name === "own"
+    this.part("own").hidden = !buildable
     this.root.classList.toggle("waiting", !scene.i)
     if (!scene.i) {
       this.part("name").value = new URLSearchParams(window.location.search).get("scene") ?? this.part("name").value
@@ -129,17 +129,17 @@ class Workbench {
     this.pushes(false)
     this.hand = new SceneInHand(scene, () => this.changed())
     const { body } = this.hand
-    if (own && this.built() && builder.read(scene.built, scene.begins)) this.arrows.own = 0
+    if (buildable && this.built() && builder.read(scene.built, scene.begins)) this.arrows.builtWidth = 0
     Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
     space.shadow = this.axes.show(body, (force) => forceName(scene, force))
     if (this.filled) space.fill()
     this.part("name").value = scene.name
     this.part("ranges").open = body.count <= FEW || tall(scene)
-    this.root.classList.toggle("explained", Boolean(scene.box[0]) || own)
-    this.root.classList.toggle("building", own)
+    this.root.classList.toggle("explained", Boolean(scene.box[0]) || buildable)
+    this.root.classList.toggle("building", buildable)
     this.root.classList.toggle("tall", tall(scene))
     this.address.returning = false
-    if (before && !(own && before.name === "own")) this.address.write(this.hand, this.model.dark)
+    if (before && !(buildable && before.name === "own")) this.address.write(this.hand, this.model.dark)
     this.showMu()
     this.say(before ? "" : this.model.note)
     this.rest()
@@ -156,18 +156,18 @@ class Workbench {
   /** A built scene: one is requested at a time; of those built meanwhile, only the last one. */
   build(built) {
     this.next = built
-    if (!this.asked) this.askNext()
+    if (!this.requested) this.askNext()
   }
 
   askNext() {
     const { model, view, next: built } = this
-    Object.assign(this, { asked: true, next: null })
+    Object.assign(this, { requested: true, next: null })
     ask(model, view, { built, mu: this.hand.mu })
   }
 
   /** The requested scene arrived or failed; returns whether the visitor has not changed it since. */
   built() {
-    this.asked = false
+    this.requested = false
     const last = this.next === null
     if (!last) this.askNext()
     return last
@@ -274,11 +274,11 @@ class Workbench {
     this.soon()
   }
 
-  press({ found, at }) {
+  press({ target, at }) {
     if (this.builds) return this.builder.press(at, this.arrows.unit)
-    if (!this.push.on || found?.disk === undefined) return false
+    if (!this.push.on || target?.disk === undefined) return false
     this.walk.pause()
-    this.push.take(found.disk, at, this.arrows.forceUnit)
+    this.push.take(target.disk, at, this.arrows.forceUnit)
     return true
   }
 
@@ -374,7 +374,7 @@ class Workbench {
       clearTimeout(this.resting)
       return this.address.leave(scene, chosenMu ? mu : null, model.dark)
     }
-    if (!this.gone.hidden) { // the page reloads its address once the server is back
+    if (!this.banner.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)
       return this.say("This scene opens once the connection is back.")
     }

@@ -33,7 +33,7 @@ class Workbench(Scripted):
         """
         super().__init__(titles=scene_links.titles(), **params)
         self._task, self._saving = task, saving
-        self._made = True  # the scene requested last
+        self._ready = True  # the scene requested last
         for one in (task, saving):
             one.param.watch(self._failed, "message")
         self._show(request.scene, request.mu, request.built)
@@ -41,12 +41,12 @@ class Workbench(Scripted):
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name in scene_links.LARGE:  # has its own page
             return
-        self._made = name not in made.EVERY or not made.EVERY[name].packed
-        if not self._made:
-            self._task.start(lambda job: small_scenes.drawn(name, mu), self._put)
+        self._ready = name not in made.EVERY or not made.EVERY[name].packed
+        if not self._ready:
+            self._task.start(lambda job: small_scenes.drawn(name, mu), self._replace)
             return
         try:
-            self._put(small_scenes.drawn(name, mu, built))
+            self._replace(small_scenes.drawn(name, mu, built))
         except (InputError, NotJammedError) as error:
             if self.scene:
                 self.tell({"error": str(error)})
@@ -54,15 +54,15 @@ class Workbench(Scripted):
                 self.note = str(error)
                 self._show(name)
 
-    def _put(self, scene: dict[str, Any]) -> None:
+    def _replace(self, scene: dict[str, Any]) -> None:
         for task in (self._task, self._saving):  # drop pending results for the previous scene
             task.cancel()
-        self._made = True
+        self._ready = True
         self.scene = scene
 
     def _failed(self, event: Any) -> None:
         if event.new:
-            self._made = True
+            self._ready = True
             self.tell({"error": event.new})
 
     def _heard(self, message: Message) -> None:
@@ -96,10 +96,10 @@ class Workbench(Scripted):
         Nothing for a scene that was replaced, or is about to be: the answer would stop the
         computation of the next one.
         """
-        if not self._made or (scene, built) != (self.scene["name"], self.scene["built"]):
+        if not self._ready or (scene, built) != (self.scene["name"], self.scene["built"]):
             return
 
-        def found(job: Job) -> Message:
+        def compute(job: Job) -> Message:
             packing = small_scenes.packing_of(scene, mu, built)
             match what:
                 case "file":
@@ -112,4 +112,4 @@ class Workbench(Scripted):
                     return {"measured": small_scenes.measured(packing, load, plane), **values}
 
         task = self._saving if what == "file" else self._task
-        task.start(found, self.tell)
+        task.start(compute, self.tell)

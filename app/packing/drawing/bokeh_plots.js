@@ -9,7 +9,7 @@ export class Plots {
     this.document = document
     this.handles = [
       new Handles(this, "bars", "bars", ["rank", "now"], dots),
-      new Handles(this, "path", "here", ["x", "y"], point),
+      new Handles(this, "path", "current", ["x", "y"], point),
     ]
     this.plane = {}
     this.onData = onData
@@ -60,18 +60,18 @@ export class Plots {
   /** Intervals, and the measures of a walk in progress. */
   show(replay, scale) {
     this.replay = replay
-    const bars = this.find("bars"), growth = this.find("growth"), { walk, seen } = replay
+    const bars = this.find("bars"), growth = this.find("growth"), { walk, passed } = replay
     if (replay.bounds && bars && bars.data !== this.filled) this.fillBounds(replay, scale)
     if (bars?.get_column("at")) this.showBars(bars, replay, scale)
     if (!walk.numbers || !(growth?.get_column("state")?.length >= walk.number.length)) return
     let most = 0
     for (const name of ["eta1", "eta2", "eta3"]) {
       const column = growth.get_column(name), factor = name === "eta3" ? 0.15 : 1, all = walk[name]
-      for (let k = 0; k <= seen; k++) {
+      for (let k = 0; k <= passed; k++) {
         column[k] = factor * all[k]
         if (column[k] > most) most = column[k]
       }
-      column.fill?.(NaN, seen + 1)
+      column.fill?.(NaN, passed + 1)
     }
     this.reach(most)
     this.changed(growth, "growth")

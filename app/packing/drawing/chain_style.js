@@ -141,22 +141,22 @@ export class Look {
 
   /** The forces on a grain: {arm ax, ay from its centre, force fx, fy} of each contact. */
   forcesOn(grain, { normal, tangential }) {
-    const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, found = [], seen = new Set()
-    const r = walk.radius[grain], own = this.one === "body" ? walk.grain.indexOf(grain) : -1
+    const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, forces = [], seen = new Set()
+    const r = walk.radius[grain], index = this.one === "body" ? walk.grain.indexOf(grain) : -1
     for (let k = 0; k < contact.length; k++) {
       if ((i[k] !== grain && j[k] !== grain) || seen.has(contact[k])) continue
       seen.add(contact[k])
       const c = contact[k], far = Math.hypot(x1[k] - x0[k], y1[k] - y0[k]), out = i[k] === grain ? 1 : -1
       const nx = (x1[k] - x0[k]) / far, ny = (y1[k] - y0[k]) / far, n = normal[c], t = tangential[c]
       // The normal points from i to j, and the force acts on j; t = (−n_y, n_x).
-      found.push({
-        ax: own < 0 ? out * r * nx : (x0[k] + x1[k]) / 2 - walk.x[own],
-        ay: own < 0 ? out * r * ny : (y0[k] + y1[k]) / 2 - walk.y[own],
+      forces.push({
+        ax: index < 0 ? out * r * nx : (x0[k] + x1[k]) / 2 - walk.x[index],
+        ay: index < 0 ? out * r * ny : (y0[k] + y1[k]) / 2 - walk.y[index],
         fx: -out * (n * nx - t * ny),
         fy: -out * (n * ny + t * nx),
       })
     }
-    return found
+    return forces
   }
 
   /** Stress on a disk, σ = (1/πr²) Σ r n F, compression positive: its mean principal stress, half the

@@ -18,8 +18,8 @@ export class Layer {
   }
 
   get view() {
-    if (!this.found?.el?.isConnected) this.found = this.fig.document?.views_manager?.find_one(this.fig) ?? null
-    return this.found
+    if (!this.cached?.el?.isConnected) this.cached = this.fig.document?.views_manager?.find_one(this.fig) ?? null
+    return this.cached
   }
 
   /** Take the moving parts over from Bokeh, or give them back. */
@@ -87,12 +87,12 @@ export const LAYERS = {
     context.fill()
   },
 
-  growth(context, { x, y }, plots, { seen }) {
+  growth(context, { x, y }, plots, { passed }) {
     const growth = plots.find("growth"), state = growth.get_column("state")
     for (const name of ["eta1", "eta2", "eta3"]) {
       context.strokeStyle = plots.colours[name]
       context.lineWidth = 2
-      curve(context, state, growth.get_column(name), x, y, Math.min(seen + 1, state.length), 1)
+      curve(context, state, growth.get_column(name), x, y, Math.min(passed + 1, state.length), 1)
     }
   },
 

@@ -70,14 +70,14 @@ export class Split {
     const { model, replay } = this.player, { walk } = replay, { contacts } = walk
     const from = this.pinned * contacts, cut = (values) => values.slice(from, from + contacts)
     const mixed = { normal: cut(walk.normal), tangential: cut(walk.tangential) }
-    this.dress(model, walk, { ...replay, mixed, seen: 0 })
+    this.dress(model, walk, { ...replay, mixed, passed: 0 })
   }
 
   showOther() {
     const { model } = this.player, { walk } = this.other
     this.other.go(this.along)
-    const own = { exact: walk.exact, loads: null, reference: 0 }
-    this.dress(new Proxy(own, { get: (mine, name) => (name in mine ? mine[name] : model[name]) }), walk, this.other)
+    const overrides = { exact: walk.exact, loads: null, reference: 0 }
+    this.dress(new Proxy(overrides, { get: (target, name) => (name in target ? target[name] : model[name]) }), walk, this.other)
   }
 
   /** Make the twin show a network of a walk, as set in the model. */

@@ -55,9 +55,9 @@ export class Sheet {
   clearRect() {}
 
   /** The drawing as text, with colour bar, scale and caption below. */
-  svg([left, right, bottom, top], { background, ink, bar, width, lines: told, unit, bodies }) {
+  svg([left, right, bottom, top], { background, ink, bar, width, lines: caption, unit, bodies }) {
     const [high, remark] = bar.high.split(/ (?=\()/) // which may be long
-    const lines = [remark ? `Colours: ${remark.slice(1, -1)}.` : "", ...told].filter(Boolean).flatMap(wrapped)
+    const lines = [remark ? `Colours: ${remark.slice(1, -1)}.` : "", ...caption].filter(Boolean).flatMap(wrapped)
     const scale = PIXELS / (right - left)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
     const element = ({ name, ...given }) =>

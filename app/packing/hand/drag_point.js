@@ -48,11 +48,11 @@ export class PointHand {
       if (this.active) { this.drop(); hand.still() }
       return
     }
-    const here = hand.player.plots.projected(mixed)
-    if (!here) return
+    const start = hand.player.plots.projected(mixed)
+    if (!start) return
     this.fan = fan
     this.at = null
-    this.from = { here, normal: mixed.normal.slice(), tangential: mixed.tangential.slice() }
+    this.from = { start, normal: mixed.normal.slice(), tangential: mixed.tangential.slice() }
     this.from.residual = hand.replay.residual
     hand.remember()
     this.set()
@@ -62,11 +62,11 @@ export class PointHand {
   /** The network at the target, or at the nearest point of the polygon. */
   set() {
     const { fan, from, hand } = this, { contacts } = hand.replay.walk
-    const point = inside(fan, this.target), { k, next, a, b } = triangle(fan, from.here, point)
+    const point = inside(fan, this.target), { k, next, a, b } = triangle(fan, from.start, point)
     const held = { normal: new Float32Array(contacts), tangential: new Float32Array(contacts) }
     for (const name of FORCES) {
-      const out = held[name], all = fan[name], own = from[name], i = k * contacts, j = next * contacts
-      for (let c = 0; c < contacts; c++) out[c] = (1 - a - b) * own[c] + a * all[i + c] + b * all[j + c]
+      const out = held[name], all = fan[name], initial = from[name], i = k * contacts, j = next * contacts
+      for (let c = 0; c < contacts; c++) out[c] = (1 - a - b) * initial[c] + a * all[i + c] + b * all[j + c]
     }
     held.residual = Math.max(from.residual || 0, fan.residual[k], fan.residual[next])
     this.at = point

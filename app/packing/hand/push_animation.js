@@ -13,7 +13,7 @@ export class Pushed {
   /** Stop pushing: the network of before is shown again, without its pulls. */
   end() {
     this.load = this.part = 0
-    this.there = false // whether disks start to move
+    this.moves = false // whether disks start to move
     const { player } = this, held = this.held
     this.held = null
     player.sway?.take(null)
@@ -34,7 +34,7 @@ export class Pushed {
     const { player } = this, { replay, scene } = player
     if (!player.pushable || player.live.moves || player.grows) return
     if (load > 0 && player.playing) player.play(false)
-    Object.assign(this, { load, part, there: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
+    Object.assign(this, { load, part, moves: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
     this.tellMotion()
     if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
       if (this.held) this.leave()
@@ -47,5 +47,5 @@ export class Pushed {
   }
 
   /** Disks move only under a sufficient push. */
-  tellMotion() { this.player.sway.take(this.there ? this.player.model.displacement : null) }
+  tellMotion() { this.player.sway.take(this.moves ? this.player.model.displacement : null) }
 }

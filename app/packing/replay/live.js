@@ -18,14 +18,14 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
   const [wide, high] = box
   // In a tilted cell: distances from its sides b and a; x and y in a straight one.
   const narrow = high / Math.hypot(tilt, high), across = (px, py) => (px - (tilt * py) / high) * narrow
-  const seen = (low, up, side) => up > -margin && low < side + margin
+  const visible = (low, up, side) => up > -margin && low < side + margin
   const touching = new Int32Array(radius.length)
   for (let c = 0; c < i.length; c++) { touching[i[c]]++; touching[j[c]]++ }
   for (const s of [0, -1, 1]) for (const t of [0, -1, 1]) {
     const a = s * wide + t * tilt, b = t * high, image = s || t ? 2 : 0
     for (let g = 0; g < radius.length; g++) {
       const px = x[2 * g] + a, py = x[2 * g + 1] + b, r = radius[g], at = across(px, py)
-      if (!seen(at - r, at + r, wide * narrow) || !seen(py - r, py + r, high)) continue
+      if (!visible(at - r, at + r, wide * narrow) || !visible(py - r, py + r, high)) continue
       drawn.x.push(px); drawn.y.push(py); drawn.r.push(r); drawn.grain.push(g)
       drawn.touching.push(touching[g]); drawn.kind.push(image + (touching[g] ? 0 : 1))
     }
@@ -33,8 +33,8 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
       const x0 = x[2 * i[c]] + a, y0 = x[2 * i[c] + 1] + b
       const x1 = x0 + reach[2 * c], y1 = y0 + reach[2 * c + 1]
       const at = across(x0, y0), to = across(x1, y1)
-      if (!seen(Math.min(at, to), Math.max(at, to), wide * narrow)) continue
-      if (!seen(Math.min(y0, y1), Math.max(y0, y1), high)) continue
+      if (!visible(Math.min(at, to), Math.max(at, to), wide * narrow)) continue
+      if (!visible(Math.min(y0, y1), Math.max(y0, y1), high)) continue
       drawn.x0.push(x0); drawn.y0.push(y0); drawn.x1.push(x1); drawn.y1.push(y1)
       drawn.contact.push(c); drawn.i.push(i[c]); drawn.j.push(j[c])
     }
@@ -93,12 +93,12 @@ export class Live {
     this.tell = tell
     this.window = null // of the first picture of a moving packing, while one is on screen
     this.pictures = 0
-    this.onSeen = () => this.tell({ seen: !document.hidden })
-    document.addEventListener("visibilitychange", this.onSeen)
-    this.tell({ anew: true, seen: !document.hidden })
+    this.onVisibility = () => this.tell({ visible: !document.hidden })
+    document.addEventListener("visibilitychange", this.onVisibility)
+    this.tell({ anew: true, visible: !document.hidden })
   }
 
-  remove() { document.removeEventListener("visibilitychange", this.onSeen) }
+  remove() { document.removeEventListener("visibilitychange", this.onVisibility) }
 
   /** Whether a moving packing is on screen. */
   get moves() { return this.window !== null }

@@ -78,18 +78,18 @@ export class Playback {
   tick(now) {
     const { stage } = this, { replay } = stage
     if (!this.running || !stage.shown) return
-    const took = Math.max(0, now - this.before), again = () => requestAnimationFrame((next) => this.tick(next))
+    const elapsed = Math.max(0, now - this.before), again = () => requestAnimationFrame((next) => this.tick(next))
     this.before = now
     if (this.resting !== null) {
-      if (this.rest(replay, took)) return
+      if (this.rest(replay, elapsed)) return
       stage.paint()
       return void again()
     }
     if (stage.grows && replay.atEnd && !replay.swinging) return void again()
-    replay.go(replay.position + this.direction * this.steps(replay, took / 1000))
+    replay.go(replay.position + this.direction * this.steps(replay, elapsed / 1000))
     if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.turn(replay.atEnd ? -1 : 1)
     stage.paint()
-    if (now - this.painted > Math.max(PLOTS_MS, PLOTS_FRAMES * took)) stage.paintPlots(now)
+    if (now - this.painted > Math.max(PLOTS_MS, PLOTS_FRAMES * elapsed)) stage.paintPlots(now)
     if (replay.swinging || !replay.atEnd || stage.grows) return void again()
     this.run(false)
     stage.show(replay.last)

@@ -26,7 +26,7 @@ export class Replay {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
     this.held = null // a pulled network, shown instead of the states
-    this.seen = 0 // networks passed; the original one (frame 0) is not a state of the walk
+    this.passed = 0 // number of networks passed; the original one (frame 0) is not a state of the walk
     this.follow(between)
   }
 
@@ -64,7 +64,7 @@ export class Replay {
 
   go(to) {
     this.position = Math.max(0, Math.min(this.last, to))
-    if (!this.swinging) this.seen = this.frame
+    if (!this.swinging) this.passed = this.frame
     this.mix()
   }
 

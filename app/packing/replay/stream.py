@@ -36,7 +36,7 @@ class Stream:
             if self.work.live is not None:
                 self.work.live.rewind()
         self._painted = message.get("painted", self._painted)
-        self._awake = message.get("seen", self._awake)
+        self._awake = message.get("visible", self._awake)
 
     def _show(self, *events: Any) -> None:
         self.player.requested = self.state.requested

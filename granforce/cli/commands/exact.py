@@ -17,10 +17,10 @@ from granforce.cli.results import (
     different,
     extension,
     extents,
-    found,
     get_packing,
     known_forces,
     numbers,
+    stored_result,
     unit,
 )
 from granforce.cli.tables import write_columns
@@ -56,7 +56,7 @@ def solved(dataset: xr.Dataset) -> dict[str, int]:
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
     chosen = different("--contacts", arguments.contacts, int)
-    _, parameters, dataset, ends = found(
+    _, parameters, dataset, ends = stored_result(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
         random=None if arguments.all or chosen is not None else arguments.random,
@@ -99,7 +99,7 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
     contacts = different("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
     chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
-    return found(arguments, kind, arguments.out, **chosen)
+    return stored_result(arguments, kind, arguments.out, **chosen)
 
 
 def intervals(arguments: argparse.Namespace) -> None:
@@ -228,31 +228,31 @@ def load_factor(arguments: argparse.Namespace) -> None:
 def rest(arguments: argparse.Namespace) -> None:
     """Test whether contact dynamics leaves a packing at rest."""
     S = ensemble(importers.load_packing(arguments.packing), mu=arguments.ensemble_mu)
-    found = motion.rest(S)
-    lines: dict[str, Any] = {"at_rest": found.at_rest}
-    lines |= {} if found.at_rest else {"reason": found.reason}
+    result = motion.rest(S)
+    lines: dict[str, Any] = {"at_rest": result.at_rest}
+    lines |= {} if result.at_rest else {"reason": result.reason}
     # Dynamics may come to rest from forces that do not balance.
     checked = {"residual": S.residual, "violation": S.violation}
     lines |= {name: float(check(S.original)) for name, check in checked.items()}
-    lines |= {"distance_to_rest": found.distance, "noise": list(found.noise)}
-    lines |= {"draws_at_rest": found.stayed.sum(axis=1).tolist(), "draws": found.stayed.shape[1]}
+    lines |= {"distance_to_rest": result.distance, "noise": list(result.noise)}
+    lines |= {"draws_at_rest": result.stayed.sum(axis=1).tolist(), "draws": result.stayed.shape[1]}
     print_report(lines, arguments.json)
 
 
 def stress(arguments: argparse.Namespace) -> None:
     """Compute or load the outline of stresses, and report it."""
     chosen = {"angles": arguments.angles, **known_forces(arguments)}
-    _, parameters, dataset, ends = found(arguments, kinds.STRESS, arguments.out, **chosen)
-    own, carried = dataset["stress_own"].values, dataset["stress_inner"].values
+    _, parameters, dataset, ends = stored_result(arguments, kinds.STRESS, arguments.out, **chosen)
+    original, carried = dataset["stress_own"].values, dataset["stress_inner"].values
     packing, _ = get_packing(arguments.store, parameters["packing"])
     middle = stress_inside(carried, packing.pressure)
     lines = {
         **extension(dataset),
         "largest_shear_over_pressure": dataset["friction"].item(),
         "certainly_not_above": dataset["friction_bound"].item(),
-        "own_shear_over_pressure": float(np.hypot(*own)),
-        "own_normal_difference": float(own[0]),
-        "own_shear_stress": float(own[1]),
+        "own_shear_over_pressure": float(np.hypot(*original)),
+        "own_normal_difference": float(original[0]),
+        "own_shear_stress": float(original[1]),
         "normal_difference_from_to": np.quantile(carried[:, 0], [0, 1]).tolist(),
         "shear_stress_from_to": np.quantile(carried[:, 1], [0, 1]).tolist(),
         "admissible_stress": ",".join(f"{value:.8g}" for value in middle),

@@ -11,8 +11,8 @@ from granforce.cli.report_lines import MIXING
 from granforce.cli.results import (
     conditions,
     contact_labels,
-    found,
     sample_notes,
+    stored_result,
     unit,
     without_work,
 )
@@ -28,7 +28,7 @@ INFERENCE_LINES = (*MIXING, "held", "setup_seconds", "sampling_seconds")
 
 def informative(arguments: argparse.Namespace) -> None:
     """Rank contacts worth measuring, or load the ranking, and report them."""
-    entry, parameters, dataset, ends = found(
+    entry, parameters, dataset, ends = stored_result(
         *(arguments, kinds.INFORMATIVE, arguments.out),
         k=arguments.best,
         check=arguments.check,
@@ -68,7 +68,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
     arguments.packing = arguments.files[0] if arguments.files else None
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = read_measurement(arguments.measured)
-    entry, parameters, dataset, ends = found(
+    entry, parameters, dataset, ends = stored_result(
         *(arguments, kinds.INFERENCE, arguments.out),
         options={"measured": measured},
         measured=measured,

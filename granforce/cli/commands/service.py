@@ -188,7 +188,7 @@ def cache(arguments: argparse.Namespace) -> int:
         entries = store.find(arguments.kind)
         if arguments.json:
             params = [{"params": json.dumps(kinds.typed(entry.params))} for entry in entries]
-            print(json_text([e._asdict() | own for e, own in zip(entries, params, strict=True)]))
+            print(json_text([e._asdict() | more for e, more in zip(entries, params, strict=True)]))
         else:
             _print_entries(entries)
     return 0

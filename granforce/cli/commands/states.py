@@ -15,9 +15,9 @@ from granforce.cli.results import (
     different,
     extension,
     extents,
-    found,
     packing_options,
     sample_notes,
+    stored_result,
     unit,
     walked,
     without_work,
@@ -63,7 +63,7 @@ UNIFORM_LINES = (
 
 def uniform(arguments: argparse.Namespace) -> int:
     """Draw or load a uniform sample and report it. Returns 1 if it missed the requested size."""
-    entry, parameters, dataset, ends = found(
+    entry, parameters, dataset, ends = stored_result(
         *(arguments, kinds.UNIFORM, arguments.out),
         states=arguments.states,
         seed=arguments.sample_seed,
@@ -99,7 +99,7 @@ def volume(arguments: argparse.Namespace) -> int:
         "seed": arguments.volume_seed,
         **conditions(arguments),
     }
-    entry, _, dataset, ends = found(arguments, kinds.VOLUME, **chosen)
+    entry, _, dataset, ends = stored_result(arguments, kinds.VOLUME, **chosen)
     down, up = dataset["log_volume_ladders"].values
     reached = bool(dataset["reached"].item())
     lines = {

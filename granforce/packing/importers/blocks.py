@@ -46,29 +46,29 @@ def read_blocks(
     """
     file, text = read_text(source)
     if text.lstrip()[:1] in "{[":
-        found = _from_json(file, text)
+        bodies = _from_json(file, text)
     else:
         table = io.StringIO(text)
         table.name = file
-        found = _from_table(read_csv(table))
-    if density is not None and None not in found.density:
+        bodies = _from_table(read_csv(table))
+    if density is not None and None not in bodies.density:
         raise InputError(f"{file} gives the density of every body: leave out --density (density=)")
     usual = 1.0 if density is None else positive(density, "density")
     try:
-        own = [
+        densities = [
             usual if one is None else positive(one, f"the density of body {name}")
-            for name, one in zip(found.names, found.density, strict=True)
+            for name, one in zip(bodies.names, bodies.density, strict=True)
         ]
-        areas = [area(body, name) for name, body in zip(found.names, found.outlines, strict=True)]
+        areas = [area(body, name) for name, body in zip(bodies.names, bodies.outlines, strict=True)]
         packing = blocks(
-            found.outlines,
+            bodies.outlines,
             mu,
-            fixed=np.flatnonzero(found.fixed),
-            weights=np.array(own) * areas,
-            materials=found.materials,
-            friction=found.friction,
+            fixed=np.flatnonzero(bodies.fixed),
+            weights=np.array(densities) * areas,
+            materials=bodies.materials,
+            friction=bodies.friction,
             tolerance=tolerance,
-            names=found.names,
+            names=bodies.names,
         )
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None

@@ -120,13 +120,13 @@ def read_yade(
     at_wall = np.flatnonzero((one != two) & named)
     on_walls = None
     if len(at_wall):
-        there = links.some(at_wall)
-        normal, shear = _yade_forces(there, plane)
+        wall_links = links.some(at_wall)
+        normal, shear = _yade_forces(wall_links, plane)
         # Forces act on the second body.
         wall = one[at_wall].astype(int)
-        ends = np.array([there.fields("id1"), there.fields("id2")])
+        ends = np.array([wall_links.fields("id1"), wall_links.fields("id2")])
         places = np.arange(len(wall))
-        grain = there._replace(header=("id",), rows=[[end] for end in ends[1 - wall, places]])
+        grain = wall_links._replace(header=("id",), rows=[[end] for end in ends[1 - wall, places]])
         names, number = np.unique(ends[wall, places], return_inverse=True)
         sign = np.where(wall, 1.0, -1.0)[:, None]
         unit = np.maximum(np.hypot(*normal.T), _TINY)[:, None]
@@ -199,14 +199,14 @@ def open_mercury(
     mu, cell = friction(mu), _cell(box, tilt)
     steps, lost = _mercury_steps(data)
     contacts, times, cut = _mercury_contacts(fstat)
-    there = np.unique(times)
-    nearest = np.array([there[np.argmin(np.abs(there - step.time))] for step in steps])
-    own = np.array([step.time for step in steps])
-    both = np.abs(nearest - own) <= 1e-4 * np.maximum(np.abs(nearest), np.abs(own))
+    stored = np.unique(times)
+    nearest = np.array([stored[np.argmin(np.abs(stored - step.time))] for step in steps])
+    step_times = np.array([step.time for step in steps])
+    both = np.abs(nearest - step_times) <= 1e-4 * np.maximum(np.abs(nearest), np.abs(step_times))
     numbers = np.flatnonzero(both).tolist()
     if not numbers:
         raise InputError(
-            f"{contacts.name}: no contacts at time {own[-1]:g}; "
+            f"{contacts.name}: no contacts at time {step_times[-1]:g}; "
             f"they are of {times.min():g} … {times.max():g}"
         )
     if cut and len(numbers) > 1 and nearest[numbers[-1]] == times[-1]:
@@ -217,7 +217,7 @@ def open_mercury(
         links = contacts.some(np.flatnonzero(times == nearest[number]))
         arguments = mu, cell, walls, reverse, most_grains
         packing = _mercury_packing(steps[number], links, *arguments)
-        info = packing.info | {"time": float(own[number])}
+        info = packing.info | {"time": float(step_times[number])}
         grains, walls_there = len(steps[number].rows), int(info.get("walls", 0))
         ids = np.concatenate([np.arange(grains), -1.0 - np.arange(walls_there)])
         return Snapshot(packing._replace(info=info), ids)
@@ -261,12 +261,12 @@ def _mercury_packing(
     at_wall = np.flatnonzero((first >= 0) & (second < 0))
     on_walls = None
     if len(at_wall):
-        there = links.some(at_wall)
-        grain = there.lookup("i", ids)
-        point = np.column_stack([there.numbers(axis) for axis in plane])
+        wall_links = links.some(at_wall)
+        grain = wall_links.lookup("i", ids)
+        point = np.column_stack([wall_links.numbers(axis) for axis in plane])
         out = cell.nearest(point - x[grain])
-        normal, force = _mercury_forces(there, plane)
-        names, number = np.unique(there.fields("j"), return_inverse=True)
+        normal, force = _mercury_forces(wall_links, plane)
+        names, number = np.unique(wall_links.fields("j"), return_inverse=True)
         # The force acts on the grain if n points to it, away from the wall.
         sign = np.where(np.sum(normal * out, axis=1) < 0, -1.0, 1.0)[:, None]
         on_walls = _OnWalls(grain, number, sign * normal, sign * force, names.tolist())
@@ -368,12 +368,12 @@ def _as_grains(on_walls: _OnWalls, x: Floats, r: Floats) -> tuple[Floats, Floats
     # Walls parallel to the plane exert no force in it.
     pressed = np.flatnonzero(on_walls.normal.any(axis=1) & on_walls.force.any(axis=1))
     grain, normal = on_walls.grain[pressed], on_walls.normal[pressed]
-    seen, wall = np.unique(on_walls.wall[pressed], return_inverse=True)
+    walls, wall = np.unique(on_walls.wall[pressed], return_inverse=True)
     radius = r.mean()
     behind = x[grain] + (r[grain] + 2 * radius)[:, None] * normal
-    places = np.zeros((len(seen), 2))
+    places = np.zeros((len(walls), 2))
     np.add.at(places, wall, behind / np.bincount(wall)[wall][:, None])
-    radii = np.concatenate([r, np.full(len(seen), radius)])
+    radii = np.concatenate([r, np.full(len(walls), radius)])
     contacts = make_contacts(grain, len(r) + wall, normal, r[grain] + radius, radii)
     contacts = contacts._replace(arm_i=r[grain], arm_j=np.zeros(len(grain)))
     forces = components(on_walls.force[pressed], normal)

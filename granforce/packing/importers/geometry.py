@@ -161,8 +161,8 @@ def once(
         return np.arange(len(i))
     low, high = np.minimum(i, j), np.maximum(i, j)
     order = np.lexsort((high, low))
-    again = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
-    first, second = order[again], order[again + 1]
+    repeated = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
+    first, second = order[repeated], order[repeated + 1]
     on_high = np.where((i > j)[:, None], -force, force)
     off = np.hypot(*(on_high[first] - on_high[second]).T)
     for c in np.flatnonzero(off > allowed * np.hypot(*force.T).mean())[:1]:

@@ -45,8 +45,8 @@ class Snapshots(NamedTuple):
             return found if note is None else _noted(found, note)
         if number not in self.numbers:
             ends = sorted({self.numbers[0], self.numbers[-1]})
-            there = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
-            raise InputError(f"no {self.word} {number}: {there}")
+            available = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
+            raise InputError(f"no {self.word} {number}: {available}")
         return self.read(self.numbers[self.numbers.index(number)])  # 100.0 is 100
 
 

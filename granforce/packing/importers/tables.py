@@ -85,8 +85,8 @@ def read_table(
     pressure = positive(1.0 if pressure is None else pressure, "pressure")
     if hasattr(grains, "columns"):
         raise InputError("read_table reads files; pass centres and radii of a table to from_disks")
-    found = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
-    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *found)
+    files = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
+    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *files)
     pairs = [_with_full_names(one) for one in pairs]
     _check_columns(table, "x", "y", "r")
     for one in pairs:

@@ -133,7 +133,7 @@ class Table(NamedTuple):
 
     def lookup(self, column: str, index: Mapping[Any, int]) -> Integers:
         """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown label."""
-        found = np.empty(len(self.rows), dtype=np.int64)
+        positions = np.empty(len(self.rows), dtype=np.int64)
         for row, text in enumerate(self.fields(column)):
             position = index.get(_label(text))
             if position is None:
@@ -141,8 +141,8 @@ class Table(NamedTuple):
                     f"{self.place(row)}: {column} names grain {_quoted(text)}, which is not "
                     "among the grains; correct it or add the grain"
                 )
-            found[row] = position
-        return found
+            positions[row] = position
+        return positions
 
 
 def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: list[int]) -> Table:
@@ -179,8 +179,8 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
     """
     if not isinstance(columns, Mapping) or not all(isinstance(v, str) for v in columns.values()):
         raise InputError(f"columns must be {{name here: name in the files}}, got {columns!r:.60}")
-    here = {theirs.lower(): name for name, theirs in columns.items()}
-    if len(here) < len(columns):
+    by_column = {theirs.lower(): name for name, theirs in columns.items()}
+    if len(by_column) < len(columns):
         raise InputError("one column is used for two names; give each its own column")
     header = [one for table in tables for one in table.header]
     for name, theirs in columns.items():
@@ -190,8 +190,8 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
             raise InputError(f"no column {theirs[:40]!r}; the columns are {some_of(header)}")
 
     def ours(column: str, header: Sequence[str]) -> str:
-        if column.lower() in here:
-            return here[column.lower()]
+        if column.lower() in by_column:
+            return by_column[column.lower()]
         # A column whose name is assigned to another column is renamed.
         taken = column in columns and columns[column].lower() in map(str.lower, header)
         return f"other {column}" if taken else column
@@ -287,10 +287,10 @@ def _from_the_header(lines: list[str]) -> list[str]:
     comments = [k for k in filled if first is None or k < first]
     if first is None or not comments:
         return lines
-    found = [""] * first + lines[first:]
+    kept = [""] * first + lines[first:]
     if all(map(_is_number, re.split(r"[,;\s]+", lines[first].strip(" ,;\t")))):
-        found[comments[-1]] = lines[comments[-1]].lstrip(_COMMENT + " \t")
-    return found
+        kept[comments[-1]] = lines[comments[-1]].lstrip(_COMMENT + " \t")
+    return kept
 
 
 def _is_number(text: str) -> bool:

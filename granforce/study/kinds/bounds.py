@@ -33,21 +33,21 @@ def _exact_parameters(
     mu: Any = None,
     contacts: Iterable[int] | None = None,
     slice_: Sequence[float] | None = None,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of exact bounds or limit loads of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
     packing's contact list, by default all in the backbone. slice_: (x0, x1, y0, y1) in fractions of
-    the box: contacts with a grain outside are frozen at their original forces. asked: the
-    conditions.
+    the box: contacts with a grain outside are frozen at their original forces. conditions: on
+    the forces.
     """
-    if slice_ is not None and asked.get("prescribed") == "stress":
+    if slice_ is not None and conditions.get("prescribed") == "stress":
         raise InputError(
             "the forces around a slice determine its stress: prescribe nothing with a slice"
         )
     return {
-        **cones_of(packing, mu, **asked),
+        **cones_of(packing, mu, **conditions),
         "contacts": chosen_contacts(contacts),
         "slice": None if slice_ is None else slices.edges(slice_),
     }
@@ -93,19 +93,19 @@ def _outline_parameters(
     components: Any = None,
     states: Any = None,
     tolerance: float = 1e-3,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of the outline of S in a plane.
 
     mu: friction coefficient of the ensemble, by default the packing's. components: two pairs
     (contact as its number in the packing, 0 for f_n or 1 for f_t); or states: parameters of the
-    walk or sample whose principal axes span the plane. tolerance: as for `outline`. asked: the
-    conditions.
+    walk or sample whose principal axes span the plane. tolerance: as for `outline`. conditions: on
+    the forces.
     """
     if (components is None) == (states is None):
         raise InputError("the plane of an outline is given by two components, or by states")
     chosen = None if components is None else _components(components)
-    named = cones_of(packing, mu, **asked) | {"tolerance": positive(tolerance, "tolerance")}
+    named = cones_of(packing, mu, **conditions) | {"tolerance": positive(tolerance, "tolerance")}
     return named | {"components": chosen, "states": states}
 
 

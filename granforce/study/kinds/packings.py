@@ -125,13 +125,13 @@ def keep_packing(
     return save(store, PACKING, parameters, packing_dataset(packing), hold=hold)
 
 
-def cones_of(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
+def cones_of(packing: Parameters, mu: Any, **named: Any) -> Parameters:
     """The parameters of an ensemble: its packing, friction coefficient (default: its), conditions.
 
-    asked: prescribed, stress and known, as for `conditions`.
+    named: prescribed, stress and known, as for `conditions`.
     """
     cones = {"packing": packing, "mu": packing["mu"] if mu is None else friction(mu)}
-    return cones | conditions(**asked)
+    return cones | conditions(**named)
 
 
 def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:

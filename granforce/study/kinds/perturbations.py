@@ -39,16 +39,16 @@ def _perturbation_parameters(
     precision: float = 0.01,
     rise: float = RISE,
     max_steps: int = MOST_STEPS,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of the local perturbation of contacts of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
     packing's contact list, by default the whole backbone; or random: this many of the backbone, the
-    first in an order drawn from seed. precision, rise, max_steps: as for `critical_force`. asked:
-    prescribed and stress.
+    first in an order drawn from seed. precision, rise, max_steps: as for `critical_force`.
+    conditions: prescribed and stress.
     """
-    if asked.get("known") is not None:
+    if conditions.get("known") is not None:
         raise InputError(
             "moving grains change their forces, so known forces cannot hold: perturb the packing "
             "without them (limit loads accept known forces)"
@@ -56,7 +56,7 @@ def _perturbation_parameters(
     if contacts is not None and random is not None:
         raise InputError("name the contacts to perturb, or how many at random, not both")
     return {
-        **cones_of(packing, mu, **asked),
+        **cones_of(packing, mu, **conditions),
         "contacts": chosen_contacts(contacts),
         "random": None if random is None else whole(random, "the number of random contacts", 1),
         "seed": None if random is None else random_seed(seed),
@@ -144,11 +144,11 @@ def _perturbed_contact_parameters(
     precision: float = 0.01,
     rise: float = RISE,
     max_steps: int = MOST_STEPS,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of one perturbed contact (its number in the packing)."""
     return {
-        **cones_of(packing, mu, **asked),
+        **cones_of(packing, mu, **conditions),
         "contact": whole(contact, "the number of a contact"),
         **_protocol(precision, rise, max_steps),
     }

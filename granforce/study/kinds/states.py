@@ -52,7 +52,7 @@ def _walk_parameters(
     residual: float | None = None,
     attempts: int | None = None,
     skip: bool = True,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of a walk: those of its packing, and its own options.
 
@@ -60,7 +60,7 @@ def _walk_parameters(
     spaced states to store (measures always come from all). residual: in ⟨f_n⟩, at which sweeps
     alone (relax="gauss_seidel_only") end, by default EQUILIBRIUM. attempts: after this many per
     state the walk is stored with the states it has; by default too few states are an error. skip:
-    whether to skip relaxation if S is one point. asked: the conditions.
+    whether to skip relaxation if S is one point. conditions: on the forces.
     """
     if relax not in RELAXATIONS:
         raise InputError(
@@ -71,7 +71,7 @@ def _walk_parameters(
         raise InputError("there must be at least as many states as chains")
     if keep is not None and keep >= size["states"]:
         size["keep"] = None
-    cones = cones_of(packing, mu, **asked)
+    cones = cones_of(packing, mu, **conditions)
     if relax.startswith("gauss_seidel") and {"prescribed", "known"} & cones.keys():
         raise InputError(
             "contact dynamics supports only the pressure and Coulomb's law: with other conditions "
@@ -196,16 +196,16 @@ def _uniform_parameters(
     chains: int = 4,
     effective: float | None = None,
     keep: int | None = None,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of a uniform sample: those of its packing, and its own options.
 
-    mu, keep, asked: as for a walk; states, chains, effective: as for `sample_uniform`.
+    mu, keep, conditions: as for a walk; states, chains, effective: as for `sample_uniform`.
     """
     if effective is not None:
         effective = positive(effective, "effective sample size")
     size = _size(packing, states, seed, chains, keep, effective or 1)
-    return {**cones_of(packing, mu, **asked), **size, "effective": effective}
+    return {**cones_of(packing, mu, **conditions), **size, "effective": effective}
 
 
 def _uniform(
@@ -231,16 +231,16 @@ def _uniform(
 
 
 def _volume_parameters(
-    packing: Parameters, accuracy: float = 0.05, seed: int = 0, *, mu: Any = None, **asked: Any
+    packing: Parameters, accuracy: float = 0.05, seed: int = 0, *, mu: Any = None, **conditions: Any
 ) -> Parameters:
     """The parameters of a volume of S.
 
     accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
-    packing's. asked: the conditions.
+    packing's. conditions: on the forces.
     """
     accuracy = positive(accuracy, "accuracy", least=LEAST_ACCURACY)
     named = {"accuracy": accuracy, "seed": random_seed(seed)}
-    return {**cones_of(packing, mu, **asked), **named}
+    return {**cones_of(packing, mu, **conditions), **named}
 
 
 def _volume(
@@ -265,20 +265,20 @@ def _inference_parameters(
     mu: Any = None,
     chains: int = 4,
     keep: int | None = None,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of an inference: its packing, its measurement, and its draws.
 
     measured: a Measurement, identified by a hash of its arrays; mu, keep: as for a walk; states,
     chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks created
     by dynamics. certain: whether to test which unmeasured contacts carry force in every network.
-    asked: the conditions.
+    conditions: on the forces.
     """
     size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
     spread = None if unmeasured is None else positive(unmeasured, "unmeasured")
     named = {"measured": hash_of(*measured), "unmeasured": spread}
     named |= {"again": True} if again else {}
-    return {**cones_of(packing, mu, **asked), **size, **named, "certain": bool(certain)}
+    return {**cones_of(packing, mu, **conditions), **size, **named, "certain": bool(certain)}
 
 
 def _inference(
@@ -332,17 +332,17 @@ def _informative_parameters(
     seed: int = 0,
     *,
     mu: Any = None,
-    **asked: Any,
+    **conditions: Any,
 ) -> Parameters:
     """The parameters of a ranking of contacts by the information from measuring them.
 
     mu: friction coefficient of the ensemble, by default the packing's. k, check, states, seed: as
-    for `informative`. asked: the conditions.
+    for `informative`. conditions: on the forces.
     """
     size = _size(packing, states, seed, 1, None)
     counts = {"k": whole(k, "k", 1), "check": whole(check, "check")}
     drawn = {name: size[name] for name in ("states", "seed")}
-    return {**cones_of(packing, mu, **asked), **counts, **drawn}
+    return {**cones_of(packing, mu, **conditions), **counts, **drawn}
 
 
 def _informative(

@@ -151,10 +151,10 @@ def test_between_two_states_the_straight_line_is_shown(run):
             const replay = new Replay(walk, null)
             return [3, 1.3, 1].map((to) => {
                 replay.go(to)
-                const { mixed, residual, seen, place } = replay
+                const { mixed, residual, passed, place } = replay
                 return {
                     normal: [...mixed.normal], tangential: [...mixed.tangential],
-                    seen, residual, place,
+                    passed, residual, place,
                 }
             }).slice(1)
         }""",
@@ -164,7 +164,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
     np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
     np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
     assert (there["residual"], there["place"]) == (0.2, "of 3")
-    assert back["seen"] == 1  # the original is no state
+    assert back["passed"] == 1  # the original is no state
     assert back["normal"] == NORMAL[1].tolist()
 
 

@@ -23,7 +23,7 @@ def test_computations_are_listed_named_opened_and_deleted(computed):
     state, view = computed, Mine(computed)
     wait_for(state)
     newest, older = sorted(view.rows, key=lambda row: "3 networks" in row["what"])
-    assert newest["here"] and not older["here"] and newest["when"] >= older["when"]
+    assert newest["shown"] and not older["shown"] and newest["when"] >= older["when"]
     assert (
         "3 networks" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
     )

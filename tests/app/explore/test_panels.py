@@ -521,10 +521,10 @@ def test_figures_of_the_paper_are_there_at_once_with_the_packing_on_screen(state
     for k, column in enumerate(view.figures):
         points = drawn_points(column)
         assert len(points) > 5 and (k not in wanted or np.isclose(points, wanted[k]).any())
-    here = view.indeterminacy.etas.here.data
+    here = view.indeterminacy.etas.marks.data
     assert list(here["x"]) == [0.1] * 3
     np.testing.assert_allclose(here["y"], [row["eta1"], row["eta2"], 0.15 * row["eta3"]])
-    assert list(view.indeterminacy.z.here.data["y"]) == [row["coordination"]]
+    assert list(view.indeterminacy.z.marks.data["y"]) == [row["coordination"]]
 
 
 def test_what_is_said_of_friction_is_made_from_the_study(state):
@@ -552,9 +552,9 @@ def test_a_tap_on_a_point_opens_such_a_packing_or_computes_it(state):
     view = friction_tab(state)
     points = view.indeterminacy.etas.points[0].data_source
     rings = []
-    state.param.watch(lambda event: rings.extend(view.indeterminacy.etas.here.data["x"]), "replay")
+    state.param.watch(lambda event: rings.extend(view.indeterminacy.etas.marks.data["x"]), "replay")
     points.selected.indices = [list(points.data["x"]).index(1)]
-    wait_for(state, lambda: list(view.indeterminacy.etas.here.data["x"]) == [1, 1, 1])
+    wait_for(state, lambda: list(view.indeterminacy.etas.marks.data["x"]) == [1, 1, 1])
     assert state.cell.mu == 1 and not state.missing  # the store has it
     assert not rings  # the old ring was removed as the new packing appeared
     points.selected.indices = [list(points.data["x"]).index(0.3)]
@@ -717,7 +717,7 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert f"{pushed.limit:.4g}" in numbers and len(view.plots.objects) == 1
     assert f"{pushed.opened} contacts open" in view.lead.object
     assert state.displacement is None  # before the slider is at its end
-    view.load.hear({"gave": True})
+    view.load.hear({"reached": True})
     backbone = int((state.replay.disks.contacts[~state.replay.disks.image] > 0).sum())
     assert len(pushed.size) == backbone
     assert np.sqrt(np.mean(pushed.size**2)) == pytest.approx(1)
@@ -755,7 +755,7 @@ def pushed(state):
     view = perturb_view.View(state)
     view.load.hear({"push": True})
     wait_for(state, lambda: view.pushed is not None)
-    view.load.hear({"gave": True})
+    view.load.hear({"reached": True})
     return view
 
 

@@ -85,9 +85,9 @@ def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
     for _ in range(2):
         page.locator("button.step").dispatch_event("click")  # the sidebar may lie above it
     page.wait_for_function(
-        f"() => Math.abs({MODEL}('here').get_column('x')[0] - {path[2, 0]}) < 1e-6"
+        f"() => Math.abs({MODEL}('current').get_column('x')[0] - {path[2, 0]}) < 1e-6"
     )
-    assert column(page, "here", "y")[0] == pytest.approx(path[2, 1], abs=1e-6)
+    assert column(page, "current", "y")[0] == pytest.approx(path[2, 1], abs=1e-6)
     outer = np.stack([column(page, "outer", name) for name in "xy"], axis=1)
     assert np.all(path.max(axis=0) <= outer.max(axis=0) + 1e-6)
 

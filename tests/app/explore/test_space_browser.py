@@ -62,7 +62,8 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.mouse.move(u, v)
     until(page, f"scene.hand.spot.at !== null && scene.hand.frames > {frames}")
     page.wait_for_function(
-        f"([u, v]) => Math.abs({MODEL}('here').get_column('x')[0] - u) < 1e-2 * (1 + Math.abs(u))",
+        f"([u, v]) => Math.abs({MODEL}('current').get_column('x')[0] - u)"
+        " < 1e-2 * (1 + Math.abs(u))",
         arg=middle,
     )
     during = normal(page)
@@ -72,7 +73,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.mouse.move(u + 5000, v)
     until(page, "scene.hand.spot.at[0] < 1e3")
     edge = max(column(page, "outer", "x"))
-    page.wait_for_function(f"() => {MODEL}('here').get_column('x')[0] <= {edge} + 1e-6")
+    page.wait_for_function(f"() => {MODEL}('current').get_column('x')[0] <= {edge} + 1e-6")
     page.mouse.move(u, v)
     page.mouse.up()
     page.wait_for_function("() => /pull=.*[pn]%3A/.test(location.search)")
@@ -118,8 +119,8 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     ready(page)
     spot = scene(page, "scene.hand.player.plots.projected(scene.mixed)")
     page.wait_for_function(
-        f"([x, y]) => Math.hypot({MODEL}('here').get_column('x')[0] - x, "
-        f"{MODEL}('here').get_column('y')[0] - y) < 1e-4",
+        f"([x, y]) => Math.hypot({MODEL}('current').get_column('x')[0] - x, "
+        f"{MODEL}('current').get_column('y')[0] - y) < 1e-4",
         arg=spot,
     )
     x, y = place(page, *spot)

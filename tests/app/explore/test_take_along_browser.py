@@ -43,9 +43,9 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
     expect(alone.locator(".state")).to_have_text("of 30")  # the state that was on screen
     alone.keyboard.press("Home")
-    before = column(alone, "bars", "now"), column(alone, "here", "x")
+    before = column(alone, "bars", "now"), column(alone, "current", "x")
     alone.locator("button.step").click()
-    after = column(alone, "bars", "now"), column(alone, "here", "x")
+    after = column(alone, "bars", "now"), column(alone, "current", "x")
     assert before[0] != after[0] and before[1] != after[1]
     assert len(column(alone, "outer", "x")) > 3  # the exact outline of S
     alone.locator("button.play").click()

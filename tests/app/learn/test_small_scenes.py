@@ -88,7 +88,7 @@ def test_a_hull_holds_all_networks_and_nothing_else():
 
 
 def test_a_built_scene_is_that_of_the_library():
-    built, made = small_scenes.own(PYRAMID, 0.4), gf.scene("pyramid", 0.4)
+    built, made = small_scenes.built_packing(PYRAMID, 0.4), gf.scene("pyramid", 0.4)
     assert len(built.contacts.i) == len(made.contacts.i)
     low, high = gf.body(gf.ensemble(built)).intervals
     expected = gf.body(gf.ensemble(made)).intervals
@@ -97,17 +97,19 @@ def test_a_built_scene_is_that_of_the_library():
 
 
 def test_a_built_scene_is_saved_and_opened_by_the_library():
-    file = small_scenes.file_of(small_scenes.own(PYRAMID, 0.4))
+    file = small_scenes.file_of(small_scenes.built_packing(PYRAMID, 0.4))
     packing = gf.load_packing(io.BytesIO(file))
     assert gf.ensemble(packing).admits(packing.forces)
     # Where nothing balances, the disks are kept, and the library says why.
-    empty = gf.load_packing(io.BytesIO(small_scenes.file_of(small_scenes.own(PYRAMID, 0.1))))
+    empty = gf.load_packing(
+        io.BytesIO(small_scenes.file_of(small_scenes.built_packing(PYRAMID, 0.1)))
+    )
     with pytest.raises(gf.NotJammedError):
         gf.ensemble(empty)
 
 
 def test_walls_of_a_built_scene_press():
-    built, made = small_scenes.own(UNDER_PRESS, 0.4), gf.scene("press", 0.4)
+    built, made = small_scenes.built_packing(UNDER_PRESS, 0.4), gf.scene("press", 0.4)
     assert not built.load[:3].any() and built.load[3].tolist() == [0, -3.2, 0]  # as it is long
     expected = gf.body(gf.ensemble(made)).intervals
     for end, exact in zip(gf.body(gf.ensemble(built)).intervals, expected, strict=True):
@@ -118,7 +120,9 @@ def test_walls_of_a_built_scene_press():
 
 
 def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
-    packing = gf.load_packing(io.BytesIO(small_scenes.file_of(small_scenes.own(UNDER_PRESS, 0.4))))
+    packing = gf.load_packing(
+        io.BytesIO(small_scenes.file_of(small_scenes.built_packing(UNDER_PRESS, 0.4)))
+    )
     S = gf.ensemble(packing)
     assert S.admits(packing.forces) and S.dimension == 1
     assert packing.info["pressing"] == [1]
@@ -128,7 +132,7 @@ def test_blocks_are_built_as_the_library_places_them():
     angle = np.radians(20)
     x = [-0.5 * np.sin(angle), 0.5 * np.cos(angle)]
     text = f"{x[0]},{x[1]},1,1,20|{-np.cos(angle)},{-np.sin(angle)},1,{np.tan(angle)}"
-    built, made = small_scenes.own(text, 0.5), gf.scene("slope", 0.5)
+    built, made = small_scenes.built_packing(text, 0.5), gf.scene("slope", 0.5)
     for end in range(2):
         bounds = [gf.intervals(gf.ensemble(packing))[end] for packing in (built, made)]
         np.testing.assert_allclose(*(np.sort(bound, axis=0) for bound in bounds), atol=1e-9)
@@ -141,7 +145,10 @@ def test_blocks_are_built_as_the_library_places_them():
 
 def test_a_wall_presses_a_block_and_a_disk():
     text = "1,0.5,2,1,0;2.5,0.5,0.5|0,0,4,0;0,1,4,1|p1"
-    built, drawn = small_scenes.own(text, 0.5), small_scenes.drawn(scene_links.OWN, 0.5, text)
+    built, drawn = (
+        small_scenes.built_packing(text, 0.5),
+        small_scenes.drawn(scene_links.OWN, 0.5, text),
+    )
     assert not built.load[:2].any() and built.load[2].tolist() == [0, -4, 0]
     assert drawn["one"] == "body" and drawn["names"][0] == "between bodies 1 and 2"
     forces = gf.load_packing(io.BytesIO(small_scenes.file_of(built))).forces
@@ -155,11 +162,14 @@ def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
     alone = small_scenes.drawn(
         scene_links.OWN, 0.4, "1,5,1|0,0,8,0"
     )  # a weight that falls is no such scene
-    assert not alone["idle"] and small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
+    assert (
+        not alone["idle"]
+        and small_scenes.falling(small_scenes.built_packing("1,5,1|0,0,8,0", 0.4))[1] < 0
+    )
 
 
 def test_a_press_that_is_not_borne_gives_way():
-    motion = small_scenes.falling(small_scenes.own(UNDER_PRESS, 0.2)).reshape(-1, 3)
+    motion = small_scenes.falling(small_scenes.built_packing(UNDER_PRESS, 0.2)).reshape(-1, 3)
     assert len(motion) == 4 and motion[3, 1] < 0
 
 
@@ -190,11 +200,13 @@ def test_a_plane_that_is_not_there_is_refused(plane):
 
 
 def test_a_disk_in_the_air_falls_and_the_others_stay():
-    motion = small_scenes.falling(small_scenes.own("1,1,1;3,1,1;2,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
+    motion = small_scenes.falling(
+        small_scenes.built_packing("1,1,1;3,1,1;2,5,1|0,0,8,0", 0.5)
+    ).reshape(-1, 3)
     assert motion[2, 1] < 0 and np.abs(motion[:2]).max() < 1e-9
-    alone = small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
+    alone = small_scenes.falling(small_scenes.built_packing("1,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
     assert alone[0, 1] < 0
-    beside_a_wall = small_scenes.falling(small_scenes.own("1,3,1|0,0,4,0;0,0,0,5", 0.5))
+    beside_a_wall = small_scenes.falling(small_scenes.built_packing("1,3,1|0,0,4,0;0,0,0,5", 0.5))
     for falls in (motion[2], alone[0], beside_a_wall):
         np.testing.assert_allclose(falls, [0, -1, 0], atol=1e-9)
 
@@ -209,7 +221,7 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
 )
 def test_what_cannot_be_built_is_refused(text):
     with pytest.raises(InputError):
-        small_scenes.own(text)
+        small_scenes.built_packing(text)
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ class Browser:
         self.player = PackingView(state).player
         self.stream = Stream(state, self.player)
         self.player.tell = self._take
-        self.player.hear({"live": {"anew": True, "seen": awake}})
+        self.player.hear({"live": {"anew": True, "visible": awake}})
 
     def _take(self, news):
         assert listed(TO_BROWSER, "Player", news), sorted(news)
@@ -37,7 +37,7 @@ class Browser:
 
     def look(self, awake):
         self.awake = awake
-        self.player.hear({"live": {"seen": awake}})
+        self.player.hear({"live": {"visible": awake}})
 
     def parts(self, name):
         return [news[name] for news in self.got if name in news]

@@ -463,11 +463,11 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     assert page.locator("section.results").evaluate(results)
     # the state on screen moves in all of them
     until(page, "scene.hand.player.replay.frame === 0 && !scene.hand.player.grows")
-    page.wait_for_function(f"() => Number.isFinite({MODEL}('here').get_column('x')[0])")
-    before = column(page, "here", "x")[0]
+    page.wait_for_function(f"() => Number.isFinite({MODEL}('current').get_column('x')[0])")
+    before = column(page, "current", "x")[0]
     page.locator("button.step").click()
     until(page, "scene.hand.player.replay.frame === 1")
-    page.wait_for_function(f"b => {MODEL}('here').get_column('x')[0] !== b", arg=before)
+    page.wait_for_function(f"b => {MODEL}('current').get_column('x')[0] !== b", arg=before)
     page.set_viewport_size({"width": 1280, "height": 900})
     page.get_by_role("tab", name="Force space").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280

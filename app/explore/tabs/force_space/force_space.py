@@ -141,7 +141,7 @@ class View(TabView):
             self.details.object = ONE_POINT
             return
         work = planes.outline(state.library, state.cell, replay, plane)
-        self.task.start(work, lambda found: self._outlined(replay, found))
+        self.task.start(work, lambda outlined: self._outlined(replay, outlined))
 
     def _components(self, replay: Replay) -> Plane:
         """The plane of one contact's forces, or of two contacts' normal forces."""

@@ -27,7 +27,7 @@ class SpaceFigure:
         """tab: of the view; show(row): called when a dot is clicked."""
         none: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(none | {"state": []}, name="path")
-        self.here = ColumnDataSource(none, name="here", tags=["follows", "path", tab])
+        self.current = ColumnDataSource(none, name="current", tags=["follows", "path", tab])
         self.original, self.beside = ColumnDataSource(none), ColumnDataSource(none)
         self.inner, self.outer = (ColumnDataSource(none, name=n) for n in ("inner", "outer"))
         self.outer.data = NOWHERE
@@ -61,10 +61,10 @@ class SpaceFigure:
             "x", "y", source=self.original, marker="diamond", size=14, color=ORIGINAL,
             line_color="#333333",
         )  # fmt: skip
-        here = fig.scatter(
-            "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5
+        current = fig.scatter(
+            "x", "y", source=self.current, size=11, color=DOT, line_color="white", line_width=1.5
         )
-        here.tags = MOVES
+        current.tags = MOVES
         # The state on screen moves too often to be included in the range.
         fig.x_range.renderers = fig.y_range.renderers = [*edges, states]
         rows = ("network", "@state"), ("at", "@x{0.000}, @y{0.000}")
@@ -76,7 +76,7 @@ class SpaceFigure:
     def clear(self) -> None:
         """Remove everything of another plane."""
         self.path.data = {"x": [], "y": [], "state": []}
-        for source in (self.original, self.beside, self.here, self.cone):
+        for source in (self.original, self.beside, self.current, self.cone):
             source.data = {"x": [], "y": []}
         self.forget_outline()
         self.outer.data = NOWHERE
@@ -91,7 +91,7 @@ class SpaceFigure:
         x, y = plane.path.T
         self.path.data = path
         self.original.data = {"x": x[:1], "y": y[:1]}
-        self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
+        self.current.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.forget_outline()
         # Distances are meaningful in principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components

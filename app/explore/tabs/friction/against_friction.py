@@ -41,11 +41,11 @@ class AgainstFriction:
         self.figure = fig
         self.points: list[GlyphRenderer] = []
         self.lines = lines
-        self.here = ColumnDataSource(dict.fromkeys(HERE_COLUMNS, ()), name=f"{name}_here")
+        self.marks = ColumnDataSource(dict.fromkeys(HERE_COLUMNS, ()), name=f"{name}_marks")
         for k, line in enumerate(lines):
             self._draw(k, line)
         rings = fig.scatter(
-            "x", "y", marker="marker", line_color="colour", source=self.here, size=13,
+            "x", "y", marker="marker", line_color="colour", source=self.marks, size=13,
             fill_alpha=0, line_width=2, legend_label=HERE,
         )  # fmt: skip
         fig.add_tools(hover([rings], (HERE, "μ = @x{0.[00000]}"), ("@label", "@y{0.0000}")))
@@ -70,7 +70,7 @@ class AgainstFriction:
         each = [(value, look) for value, look in zip(values, looks, strict=False) if mu > 0]
         rows = [(mu, value, *look) for value, look in each if np.isfinite(value)]
         columns = zip(*rows, strict=True) if rows else ((),) * len(HERE_COLUMNS)
-        self.here.data = dict(zip(HERE_COLUMNS, map(list, columns), strict=True))
+        self.marks.data = dict(zip(HERE_COLUMNS, map(list, columns), strict=True))
         self._entry.visible = len(rows) > 0  # no entry without a mark
 
     def choosable(self, choose: Callable[[float], object]) -> None:

@@ -41,7 +41,7 @@ class Rows(NamedTuple):
     """Numbers of the page's packings made with the same options as the one on screen."""
 
     page: list[Row]
-    here: Row  # that on screen
+    current: Row  # that on screen
 
 
 class View(TabView):
@@ -106,9 +106,9 @@ class View(TabView):
             self._place(self.indeterminacy)
             self.details.object = _claims()
         self.first.object = self.indeterminacy.sentence()
-        self.indeterminacy.mark(rows.here)
+        self.indeterminacy.mark(rows.current)
         yield
-        fig, self.fourth.object = study_figures.extents(rows.page, rows.here["mu"])
+        fig, self.fourth.object = study_figures.extents(rows.page, rows.current["mu"])
         self.figures[1].objects = [plotted(fig)]
         yield
         if self.correlations is None:
@@ -116,7 +116,7 @@ class View(TabView):
             self.correlations.drawn.choosable(self._choose)
             self.figures[2].objects = [plotted(self.correlations.drawn.figure)]
             self.sixth.object = self.correlations.sentence()
-        self.correlations.mark(rows.here)
+        self.correlations.mark(rows.current)
         yield
         self._show_packing(replay, rows)
 
@@ -135,7 +135,7 @@ class View(TabView):
         fig, sentence = forces(replay)
         self.folded[0].objects = [plotted(self.scatter.figure)]
         self.folded[1].objects = [note(sentence), plotted(fig)]
-        self.folded[2].objects = [plotted(study_figures.samplers(rows.here))]
+        self.folded[2].objects = [plotted(study_figures.samplers(rows.current))]
 
     def _mark(self, *events: Any) -> None:
         if self.scatter is not None and self.visible:

@@ -54,10 +54,10 @@ class Indeterminacy:
         legend_above(self.etas.figure)
         _small(self.z.figure)
 
-    def mark(self, here: Row) -> None:
+    def mark(self, current: Row) -> None:
         """Mark the packing on screen."""
-        self.etas.mark(here["mu"], *(factor * here[name] for name, _, factor in MEASURES))
-        self.z.mark(here["mu"], here["coordination"])
+        self.etas.mark(current["mu"], *(factor * current[name] for name, _, factor in MEASURES))
+        self.z.mark(current["mu"], current["coordination"])
 
     def sentence(self) -> str:
         """The μ at which each η is largest, and why it falls again, as HTML."""
@@ -102,7 +102,7 @@ def _maxima(lines: Iterable[Line]) -> str:
     return ", ".join(map(" ".join, zip(values, where, strict=True)))
 
 
-def samplers(here: Row) -> Figure:
+def samplers(current: Row) -> Figure:
     """0.15 η3 by every sampler and exact, with the packing on screen."""
     lines = [
         Line(
@@ -113,7 +113,7 @@ def samplers(here: Row) -> Figure:
         for part, label in SAMPLERS.items()
     ]
     drawn = AgainstFriction("samplers", "0.15 η₃", lines, height=280)
-    drawn.mark(here["mu"], 0.15 * here["eta3"])
+    drawn.mark(current["mu"], 0.15 * current["eta3"])
     legend_above(drawn.figure, 3)
     return drawn.figure
 
@@ -127,16 +127,16 @@ def extents(page_rows: list[Row], mu: float) -> tuple[Figure, str]:
     table = study_data.study()
     known = {} if table is None else table.extents("walk")
     curves = [(f"μ = {value:g}", known[value]) for value in SHOWN if value in known]
-    here = distributions.groups(page_rows, mu).get(mu)
-    every = [group for _, group in curves] + ([here] if here else [])
+    current = distributions.groups(page_rows, mu).get(mu)
+    every = [group for _, group in curves] + ([current] if current else [])
     largest = max((np.quantile(np.concatenate(group), 0.999) for group in every), default=1.0)
     edges = np.linspace(0, largest, BINS + 1)
     tails = []
     for k, (label, group) in enumerate(curves):
         _density(fig, group, edges, label, COLOURS[k], MARKERS[k], 1.6)
         tails.append(f"{label}: b = {statistics.tail_exponent(np.concatenate(group)):.2f}")
-    if here:
-        _density(fig, here, edges, f"on this page, μ = {mu:g}", DOT, "circle_x", 2.5)
+    if current:
+        _density(fig, current, edges, f"on this page, μ = {mu:g}", DOT, "circle_x", 2.5)
     if every:
         legend_above(fig)
     means = {label: float(np.mean(np.concatenate(group))) for label, group in curves}
@@ -181,9 +181,9 @@ class Correlations:
         self.drawn = AgainstFriction("correlation", "corr(fₙ, ΔFₙ)", lines, height=280)
         legend_above(self.drawn.figure, 2)
 
-    def mark(self, here: Row) -> None:
+    def mark(self, current: Row) -> None:
         """Mark the packing on screen."""
-        self.drawn.mark(here["mu"], here.get("correlation", np.nan))
+        self.drawn.mark(current["mu"], current.get("correlation", np.nan))
 
     def sentence(self) -> str:
         """The range of the walk's correlation, as HTML; empty without a study."""

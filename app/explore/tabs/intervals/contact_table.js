@@ -112,12 +112,12 @@ export function render({ model, view }) {
   const soon = () => { pending ||= setTimeout(() => { pending = 0; fill() }, AGAIN_MS) }
   part("thead").addEventListener("click", ({ target: { dataset } }) => {
     if (dataset.k === undefined) return
-    const by = Number(dataset.k)
-    sorted.down = by === sorted.by ? !sorted.down : by > 1
-    sorted.by = by
+    const column = Number(dataset.k)
+    sorted.down = column === sorted.by ? !sorted.down : column > 1
+    sorted.by = column
     from = 0
     fill()
-    part(`[data-k="${by}"]`).focus()
+    part(`[data-k="${column}"]`).focus()
   })
   body.addEventListener("click", ({ target }) => { const row = target.closest("tr"); if (row) select(row) })
   body.addEventListener("keydown", (event) => {

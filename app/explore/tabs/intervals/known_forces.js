@@ -16,19 +16,19 @@ export function render({ model, view }) {
   const point = (contact) => view.model.document.get_model_by_name("player")?.player?.mark(contact)
 
   function chip([contact, text]) {
-    const it = createElement("span", { className: "chip" })
+    const item = createElement("span", { className: "chip" })
     const look = { className: "release", title: "release it", ariaLabel: `release: ${text}` }
-    it.append(
+    item.append(
       button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),
       button("×", () => tell({ release: contact }), look),
     )
-    return it
+    return item
   }
 
   function row([contact, text]) {
-    const it = document.createElement("li")
-    it.append(button(text, () => tell({ choose: contact })))
-    return it
+    const item = document.createElement("li")
+    item.append(button(text, () => tell({ choose: contact })))
+    return item
   }
 
   const shown = {

@@ -16,14 +16,14 @@ export function render({ model, view }) {
       <span class="scale"></span></span></label>
     <span class="status"><output></output> × mean force<b></b></span>
     <button type="button" class="soft">Find F<sub>crit</sub>: increase the push</button>`
-  const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
+  const part = (name) => root.querySelector(name), range = part("input"), output = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.values?.length > 0, end = () => (known() ? model.path.values.at(-1) : Infinity)
-  let load = 0, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: the owner of the shown load
+  let load = 0, requested = false, reached = false, rises = 0, rising = 0, owner = null, shows = false // owner: of the shown load
 
   function find() {
-    if (known() || asked) return
-    asked = true
+    if (known() || requested) return
+    requested = true
     ask(model, view, { push: true })
   }
 
@@ -32,37 +32,37 @@ export function render({ model, view }) {
     load = value > top - Number(range.step) / 2 ? top : value // the last step may be rounded away
     if (load > 0) find()
     show()
-    if (load < end() || gave) return
-    gave = true
-    ask(model, view, { gave: true })
+    if (load < end() || reached) return
+    reached = true
+    ask(model, view, { reached: true })
   }
 
   /** If a network other than the pushed one is shown, end the push. */
   function look() {
-    if (shows || !(load > 0 && known()) || (by.held && player().replay?.held === by.held)) return
-    by.end()
+    if (shows || !(load > 0 && known()) || (owner.held && player().replay?.held === owner.held)) return
+    owner.end()
     load = rising = 0
     show()
   }
 
   function show() {
-    const there = load >= end(), said = there ? ": the packing starts to move" : ""
+    const note = load >= end() ? ": the packing starts to move" : ""
     range.value = load
-    told.textContent = load.toFixed(2)
-    part("b").textContent = said
-    range.setAttribute("aria-valuetext", `${told.textContent} mean forces${said}`)
+    output.textContent = load.toFixed(2)
+    part("b").textContent = note
+    range.setAttribute("aria-valuetext", `${output.textContent} mean forces${note}`)
     run.disabled = model.contact === null || rising > 0
     player()?.listeners.add(look)
-    by = player()?.pushed
+    owner = player()?.pushed
     shows = true
-    by?.take(model.path, load, load / most())
+    owner?.take(model.path, load, load / most())
     shows = false
   }
 
   /** Another contact, or other networks. */
   function anew() {
     load = rising = 0
-    asked = gave = false
+    requested = reached = false
     scale()
   }
 
@@ -118,10 +118,10 @@ export function render({ model, view }) {
   model.on("most", scale)
   model.on(["path", "limit"], () => {
     if (!known()) return anew() // of another packing
-    asked = true
+    requested = true
     scale()
   })
-  model.on("running", () => { if (!model.running && !known()) { asked = false; rising = 0; show() } })
+  model.on("running", () => { if (!model.running && !known()) { requested = false; rising = 0; show() } })
   scale()
   return root
 }

@@ -17,14 +17,14 @@ class LoadSlider(Scripted):
     most = param.Number(default=1.0, doc="end of the scale until the limit is known")
     running = param.Boolean(doc="whether it is being computed")
 
-    def __init__(self, pushed: Callable[[], object], gave: Callable[[], object]) -> None:
-        """pushed(): moved while no path is known; gave(): moved to the end of the path."""
+    def __init__(self, pushed: Callable[[], object], reached: Callable[[], object]) -> None:
+        """pushed(): moved while no path is known; reached(): moved to the end of the path."""
         super().__init__(sizing_mode="stretch_width", margin=(4, 10))
-        self._pushed, self._gave = pushed, gave
+        self._pushed, self._reached = pushed, reached
 
     def _heard(self, message: Message) -> None:
         match message:
             case {"push": True}:
                 self._pushed()
-            case {"gave": True}:
-                self._gave()
+            case {"reached": True}:
+                self._reached()

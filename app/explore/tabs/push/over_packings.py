@@ -32,8 +32,8 @@ def responses(page_rows: list[Row]) -> tuple[list[Figure], str, str]:
     _against_eta2(force, study, LINES)
     alpha = figure("decay", None, ACROSS, "decay exponent α", height=280)
     _against_eta2(alpha, study, {"decay_exponent": "α of |u| ~ r⁻ᵅ"})
-    _own(force, page_rows, list(LINES))
-    _own(alpha, page_rows, ["decay_exponent"])
+    _ring(force, page_rows, list(LINES))
+    _ring(alpha, page_rows, ["decay_exponent"])
     for fig in (force, alpha):
         if fig.renderers:
             legend_above(fig)
@@ -86,7 +86,7 @@ def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
     )  # fmt: skip
 
 
-def _own(fig: Figure, rows: list[Row], names: Sequence[str]) -> None:
+def _ring(fig: Figure, rows: list[Row], names: Sequence[str]) -> None:
     """Open symbols at rows, in the colours of the lines with these names."""
     for k, name in enumerate(names):
         known = [row for row in rows if np.isfinite(row.get(name, np.nan))]

@@ -55,7 +55,7 @@ class View(TabView):
         self.task = state.work.task()
         self.loads: tuple[Loads, ContactScatter] | None = None
         self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
-        self.gave = False  # whether the push has reached the load at which disks move
+        self.reached = False  # whether the push has reached the load at which disks move
         self._shown: Replay | None = None
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
@@ -87,11 +87,11 @@ class View(TabView):
             self._shown, self.loads = replay, None
         if self.pushed is not None and self.pushed[1:] != (self.contact, replay):
             self.task.cancel()
-            self.pushed, self.gave = None, False
+            self.pushed, self.reached = None, False
         one, fixed = what == "one", replay is None or replay.summary["mu"] == 0
         self.load.visible = one and not fixed
         self.every.visible = what == "all" and not fixed and self.loads is None
-        self.animate.visible = one and self.gave
+        self.animate.visible = one and self.reached
         if replay is None:
             return
         self.load.param.update(
@@ -130,16 +130,16 @@ class View(TabView):
         if contact is None or replay is None or self.what.value != "one":
             return
         work = perturbations.push(state.library, state.cell, replay, contact)
-        self.task.start(work, lambda found: self._found(found, contact, replay))
+        self.task.start(work, lambda pushed: self._push_known(pushed, contact, replay))
 
-    def _found(self, pushed: Pushed, contact: int, replay: Replay) -> None:
+    def _push_known(self, pushed: Pushed, contact: int, replay: Replay) -> None:
         if contact == self.contact and replay is self.state.replay:
-            self.pushed, self.gave = (pushed, contact, replay), False
+            self.pushed, self.reached = (pushed, contact, replay), False
             self.refresh()
 
     def _give_way(self) -> None:
-        self.gave = self.pushed is not None
-        self.animate.visible = self.gave and self.what.value == "one"
+        self.reached = self.pushed is not None
+        self.animate.visible = self.reached and self.what.value == "one"
         self._animate()
 
     def _one(self, replay: Replay) -> Shown:
@@ -156,7 +156,7 @@ class View(TabView):
 
     def _animate(self, *events: Any) -> None:
         """Animate the first motion to and fro on the packing while this tab is visible."""
-        shown = self.visible and self.what.value == "one" and self.animate.value and self.gave
+        shown = self.visible and self.what.value == "one" and self.animate.value and self.reached
         field = self.pushed[0].displacement if shown and self.pushed is not None else None
         if self.state.displacement is not field:
             self.state.displacement = field
@@ -166,7 +166,7 @@ class View(TabView):
     def _find_loads(self) -> None:
         replay = self.state.replay
         work = perturbations.limit_loads(self.state.library, self.state.cell)
-        self.task.start(work, lambda found: self._loads_known(replay, found))
+        self.task.start(work, lambda loads: self._loads_known(replay, loads))
 
     def _loads_known(self, replay: Replay, loads: Loads) -> None:
         if replay is self.state.replay:

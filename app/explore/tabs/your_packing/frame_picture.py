@@ -106,13 +106,13 @@ def dress(fig: Figure, layers: Layers, shown: str, small: bool = False) -> None:
 def _along(frame: Frame, force: Any, width: Any, chosen: Any) -> dict[str, Any]:
     """Columns of the chosen contacts, as rectangles of these widths (N_c,)."""
     visible = chosen & (width > FAINT * WIDEST * frame.r.mean())
-    here = np.flatnonzero(visible & np.isfinite(frame.lines).all(axis=(1, 2)))
-    x, y = frame.lines[here].mean(axis=1).T
-    away = frame.lines[here, 1] - frame.lines[here, 0]
+    contacts = np.flatnonzero(visible & np.isfinite(frame.lines).all(axis=(1, 2)))
+    x, y = frame.lines[contacts].mean(axis=1).T
+    along = frame.lines[contacts, 1] - frame.lines[contacts, 0]
     return {
-        "x": x, "y": y, "length": np.hypot(*away.T), "angle": np.arctan2(*away.T[::-1]),
-        "width": width[here], "contact": here, "f": np.nan_to_num(force[here]),
-        "off": np.nan_to_num(frame.deviation[here, 0]), "error": frame.error[here, 0],
+        "x": x, "y": y, "length": np.hypot(*along.T), "angle": np.arctan2(*along.T[::-1]),
+        "width": width[contacts], "contact": contacts, "f": np.nan_to_num(force[contacts]),
+        "off": np.nan_to_num(frame.deviation[contacts, 0]), "error": frame.error[contacts, 0],
     }  # fmt: skip
 
 

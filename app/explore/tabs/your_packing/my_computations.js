@@ -11,19 +11,19 @@ export function render({ model, view }) {
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
   /** Delete only at a second click. */
-  function remove(entry, it) {
-    if (it.dataset.sure) return ask(model, view, { delete: entry })
-    it.dataset.sure = "yes"
-    it.textContent = "Delete permanently?"
+  function remove(entry, element) {
+    if (element.dataset.sure) return ask(model, view, { delete: entry })
+    element.dataset.sure = "yes"
+    element.textContent = "Delete permanently?"
   }
 
-  function line({ entry, name, what, when, megabytes, here }) {
+  function line({ entry, name, what, when, megabytes, shown }) {
     const row = document.createElement("tr"), look = { className: "soft" }
     const field = createElement("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
     field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
     const words = createElement("span", { textContent: what })
-    const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
-    last.push(" ", button("Delete", (it) => remove(entry, it), look))
+    const last = shown ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
+    last.push(" ", button("Delete", (element) => remove(entry, element), look))
     const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
       [size(megabytes)], last]
     for (const part of parts) row.insertCell().append(...part)

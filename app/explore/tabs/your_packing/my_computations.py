@@ -16,7 +16,7 @@ from ....state.app_state import AppState
 class Mine(Scripted):
     """A table of stored computations, newest first; see my_computations.js."""
 
-    rows = param.List(doc="dicts, see my_results.rows; and `here`, whether it is on screen")
+    rows = param.List(doc="dicts, see my_results.rows; and `shown`, whether it is on screen")
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", **params)
@@ -30,7 +30,7 @@ class Mine(Scripted):
 
     def _show(self, rows: list[dict[str, Any]]) -> None:
         on_screen = self._state.cell and self._state.cell.name
-        self.rows = [row | {"here": row["entry"] == on_screen} for row in rows]
+        self.rows = [row | {"shown": row["entry"] == on_screen} for row in rows]
 
     def _heard(self, message: Message) -> None:
         """The visitor opens, names or deletes one of the rows."""

@@ -91,9 +91,9 @@ class Frames:
             self.playing = self.player.direction
             self.player.pause()
             work = photoelastic_frames.infer(self.files, number=number, **self.options)
-            self.task.start(work, self._came)
+            self.task.start(work, self._inferred)
 
-    def _came(self, frame: Frame) -> None:
+    def _inferred(self, frame: Frame) -> None:
         self.known[frame.report["frame"]] = frame
         self._show(frame)
         if self.player.value not in self.known:  # changed in the meantime
