@@ -119,7 +119,7 @@ SECTIONS = {
         "We compute bounds for 16 contacts, the horizontal load factor and 100 uniform networks of "
         "a dry-stone wall. For the\nbounds, the baseline is one HiGHS model that starts each "
         "program from the last basis; for the load factor, it is\n`scipy.optimize.linprog`. "
-        "Neither certifies its result. An R̂ above 1.1 means that 100 networks are too few to\n"
+        "Neither certifies its result. Where R̂ is above 1.1, 100 networks are too few to\n"
         "represent the uniform distribution.\n\n"
     )
 }

@@ -70,7 +70,6 @@ NAMED = (  # claims that the README names if they are contradicted
     "η ∝ μ at small μ: packings made by contact dynamics",
     "η3 does not depend on how networks are sampled",
     "corr(f_n, ΔF_n) vanishes at large μ",
-    "F_crit rises with η",
 )
 _CLAIM_HEADS = ("claim", "number", "range", "value", "n")
 _SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
@@ -440,17 +439,16 @@ def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
     if same:
         text += f"; {same} left out, as all pairs differ by the same amount"
     if together:
-        return f"{text}. After Bonferroni's correction, {_most(together)}.\n"
+        words = listed([f"{times} for *{word}*" for word, times in together.most_common()])
+        return f"{text}. After Bonferroni's correction, these remain significant: {words}.\n"
     text += f". None of the {tests} remains significant after Bonferroni's correction"
     if stats.binom.sf(alone.total() - 1, tests, level) > level:
         return f"{text}: so few packings show no dependence on the options.\n"
-    return f"{text}. The differences are not independent: {_most(alone)}.\n"
-
-
-def _most(counts: Counter[str]) -> str:
-    """How many significant differences belong to which option, in words."""
-    ((word, times),) = counts.most_common(1)
-    return f"{counts.total()} are significant, {times} of them for *{word}*"
+    ((word, times),) = alone.most_common(1)
+    return (
+        f"{text}. They are not independent: the tables are of the same packings. Of the "
+        f"{alone.total()}, {times} are for *{word}*.\n"
+    )
 
 
 def _apart(rows: Rows, others: Rows, name: str, mu: float) -> _Apart | None:

@@ -164,8 +164,8 @@ def strength(table: StudyTable) -> Iterator[Claim]:
         ("response_long", "with 600 implicit steps over that with 150"),
         (
             "perturb",
-            "with load steps of 0.4 of the remaining distance over that with 0.1, in a different "
-            "set of contacts",
+            "with load steps of 0.4 of the distance to the limit load over that with 0.1 (not the "
+            "same contacts)",
         ),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):

@@ -11,11 +11,12 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.packing.compaction import LONGEST, LONGEST_SETTLED, SETTLED_FROM
-from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS
+from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS, SMALL
 from granforce.paper.claims.verdicts import CONTRADICTED, FEW, REPRODUCED, STRONGLY
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
+from granforce.perturb.critical_force import Protocol
 from granforce.types import Floats, Rows
 
 PEAK = "μ where exact η3 is largest"
@@ -27,6 +28,7 @@ PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 LATE_DRAG = "prepared_late_drag"
 LATER = "drag replaces inertia only when the forces are a hundred times closer to balance"
 FEWEST = 5  # packings of such a mean
+PREPARATION = "results-in-detail.md#dependence-on-the-preparation"
 LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
 STATES = ("nearest", "gauss_seidel", "uniform")
 
@@ -118,8 +120,8 @@ def _maximum(of: _Numbers) -> Highlight:
     lengths = of.claims(LENGTHS, ["exact"]).values()
     also = "".join(f" and ⟨ΔF_n⟩/⟨f_n⟩ at {_quoted(row)}" for row in lengths)
     return Highlight(
-        f"{first}: exact η3 is largest at μ = {_quoted(place)}{also}; the paper finds its largest "
-        f"η near {PAPERS_PEAK:g}.",
+        f"{first}: exact η3 is largest at μ = {_quoted(place)}{also}; the paper finds η1, "
+        f"η2 and η3 to be largest near {PAPERS_PEAK:g}.",
         "samplers",
         "exact-intervals",
         step,
@@ -146,7 +148,8 @@ def _rising_eta2(of: _Numbers) -> Highlight:
     }
     others = "".join(rest[word].format(known) for word, known in names.items() if word in rest)
     return Highlight(
-        f"η2 also has a maximum: as μ grows, it rises and then falls for {names['does']}{others}.",
+        f"With the default preparation, η2 also has a maximum: as μ grows, it rises and then falls "
+        f"for {names['does']}{others}.",
         "samplers",
         "measures",
         _later_eta2(of),
@@ -175,9 +178,9 @@ def _later_drag(of: _Numbers, mu: float) -> str:
         return ""
     usual, late = pairs.T
     return (
-        "This number depends on how packings are brought to rest: with the same "
-        f"{len(late)} seeds, it is {with_error(usual)} by default, but {with_error(late)} if "
-        f"{LATER}."
+        f"The number at μ = {mu:g} depends on how packings are brought to rest: for {len(late)} of "
+        f"these packings, it is {with_error(usual)}, and {with_error(late)} if {LATER} "
+        f"([table]({PREPARATION}))."
     )
 
 
@@ -219,8 +222,8 @@ def _coverage(of: _Numbers) -> Highlight:
         raise KeyError("coverage")
     quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
     return Highlight(
-        f"{of.table.plan['states']} networks show only part of each interval: at intermediate μ, "
-        f"their η3 over the exact η3 is {quoted}.",
+        f"At intermediate friction, {of.table.plan['states']} networks show only part of the "
+        f"intervals: their η3 divided by the exact η3 is {quoted}.",
         "samplers",
         "exact-intervals",
     )
@@ -305,11 +308,25 @@ def _critical(of: _Numbers) -> Highlight:
         else "At intermediate friction, a packing moves before the push reaches its limit load"
     )
     return Highlight(
-        f"{first}: the mean critical force is {_quoted(small)} of the mean limit load at small, "
-        f"{_quoted(middle)} at intermediate and {_quoted(large)} at large μ.",
+        f"{first}: the mean critical force is {_quoted(middle)} of the mean limit load at "
+        f"intermediate and {_quoted(large)} at large μ; at small μ, it is {_quoted(small)}."
+        f"{_within_precision(of)}",
         "figure2_limit",
         "local-perturbation",
     )
+
+
+def _within_precision(of: _Numbers) -> str:
+    """That F_crit may be the limit load at small μ, if they differ by less than its precision."""
+    apart = [
+        row["limit_load"] - row["critical_force"]
+        for row in of.table.responses()
+        if SMALL[0] <= row["mu"] <= SMALL[1]
+    ]
+    precision = Protocol().precision
+    if not apart or np.mean(apart) > precision:
+        return ""
+    return f" There, they may be equal, as F_crit may be up to {precision:g} ⟨f_n⟩ too small."
 
 
 def _stability(of: _Numbers) -> Highlight:
@@ -336,7 +353,7 @@ def _stability(of: _Numbers) -> Highlight:
         f"{first}: over all μ > 0, its rank correlation is {texts}{rest}.",
         "figure2",
         "local-perturbation",
-        f"To reproduce the claim that F_crit rises with η, it would have to be {judged}.",
+        f"We count the claim that F_crit rises with η as reproduced if it is {judged}.",
     )
 
 

@@ -504,7 +504,7 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     assert cells["few"] == "+5.3 ± 1.5" and cells["far"] == "**+10.0100 ± 0.0058**"
     summary = text.splitlines()[-1]
     assert "3 pairs" in summary and "1 of 2 are significant" in summary
-    assert "1 left out" in summary and "1 are significant, 1 of them for *far*" in summary
+    assert "1 left out" in summary and "remain significant: 1 for *far*." in summary
 
 
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
@@ -536,7 +536,7 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     assert [row[0] for row in rows[2::3]] == ["c", "d (PRL)", "b", "a"]
     assert "tests 4 claims" in outcomes.score(judged)
     assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
-    assert "2 are judged by the networks of the paper's own walk;" in outcomes.score(judged)
+    assert "The networks of the paper's own walk decide 2 of them;" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]

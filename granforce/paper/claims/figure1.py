@@ -35,8 +35,8 @@ from granforce.paper.claims.verdicts import (
 from granforce.paper.tables import StudyTable
 
 PEAK = (
-    "μ of the maximum (of a parabola in log μ, through the means within a factor "
-    f"{NEAR_PEAK:g} of that μ)"
+    "μ at the top of a parabola in log μ, fitted to the means within a factor "
+    f"{NEAR_PEAK:g} of the μ with the largest mean"
 )
 # How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
@@ -97,7 +97,7 @@ def _measure_of(sampler: str) -> tuple[str, str]:
 
 
 def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
-    """η ∝ μ at small μ; no data for a range in which a walk leaves S at any μ."""
+    """η ∝ μ at small μ; not measured in a range in which a walk leaves S at any μ."""
     name, label = _measure_of(sampler)
     beyond = [mu for mu in outside(table, SAMPLERS[sampler]) if mu > 0]
     groups = positive_friction(items(drawn(table, sampler), name, positive=(name,)))
@@ -109,7 +109,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
         left = any(low <= mu <= high for mu in beyond)
         few = {} if left else {mu: groups[mu] for mu in groups if low <= mu <= high}
         span = f", μ = {min(few):g} … {max(few):g}" if few else ""
-        yield over_all(
+        claim = over_all(
             f"η ∝ μ at small μ: {word}",
             f"slope of log {label} against log μ{span}",
             slope,
@@ -118,6 +118,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
             fair=(0.7, 1.3),
             source=PRL,
         )
+        yield claim._replace(verdict=UNMEASURED) if left else claim
 
 
 def vanishing(table: StudyTable, sampler: str) -> list[Claim]:

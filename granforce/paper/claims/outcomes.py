@@ -70,6 +70,6 @@ def score(claims: Rows) -> str:
         f"The study that ships with granforce tests {sum(count.values())} claims of the paper and "
         "of an earlier letter (PRL 94, 178001), with variants counted separately: "
         f"{count['reproduced']} are reproduced, {count['contradicted']} contradicted and "
-        f"{count['open']} open (undecided or too few data). {by_walk} are judged by the networks "
-        "of the paper's own walk; the others concern exact intervals, μ = 0 or the packings alone."
+        f"{count['open']} open (undecided or too few data). The networks of the paper's own walk "
+        f"decide {by_walk} of them; exact intervals or the packings alone decide the others."
     )
