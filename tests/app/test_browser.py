@@ -212,13 +212,13 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
 def test_a_click_selects_the_contact_everywhere(page):
     contact, x, y = link_of(page, 3)
     page.mouse.click(*at(page, x, y))
-    page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 1")
+    page.wait_for_function(f"() => {MODEL}('chosen')?.get_column('rank')?.length === 1")
     rank = column(page, "chosen", "rank")[0]
     ranks, which = column(page, "bars", "rank"), column(page, "bars", "at")
     assert which[ranks.index(rank)] == contact
     searched(page, f"select={contact}")
     page.mouse.click(*at(page, x, y))
-    page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 0")
+    page.wait_for_function(f"() => {MODEL}('chosen')?.get_column('rank')?.length === 0")
 
 
 def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):

@@ -309,7 +309,7 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     page.mouse.click(*place)
     until(page, f"`${{scene.pair}}` === '{b},{a}'")
     assert scene(page, "scene.selected") == b
-    page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
+    page.wait_for_function(f"() => {MODEL}('outer')?.get_column('x')?.length > 3")
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
     which = f"Green: contact {backbone[b]}; violet: contact {backbone[a]}."
     page.get_by_text(which).wait_for(state="attached")  # among what is to be opened

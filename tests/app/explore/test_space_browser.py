@@ -166,7 +166,7 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     assert len(x) > seen.sum()  # there is room for more
     page.get_by_role("button", name="Discard").first.click()
     until(page, "!scene.hand.player.grows")
-    page.wait_for_function(f"() => {MODEL}('path').get_column('x').every(Number.isFinite)")
+    page.wait_for_function(f"() => {MODEL}('path')?.get_column('x')?.every(Number.isFinite)")
 
 
 def test_two_networks_side_by_side_with_one_player(visit):

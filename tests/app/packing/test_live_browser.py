@@ -133,7 +133,7 @@ def test_computed_states_are_shown_to_the_last(visit):
     page.keyboard.press("End")  # the last state, where all intervals have been seen
     until(page, "scene.hand.player.replay.frame === scene.hand.player.replay.last")
     page.wait_for_function(
-        f"() => {MODEL}('growth').get_column('eta1').every((v, k) => !k || Number.isFinite(v))"
+        f"() => {MODEL}('growth')?.get_column('eta1')?.every((v, k) => !k || Number.isFinite(v))"
     )
     expect(page.locator(".stage.pale")).to_have_count(0)
     expect(page.locator(".requested")).to_be_empty()
