@@ -31,7 +31,8 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page.keyboard.press("h")
     chips(page, 1)
     assert scene(page, "scene.hand.player.pins.has(4)")
-    page.wait_for_function(f"() => {MODEL}('bars')?.get_column('whole_low')?.every(Number.isFinite)")
+    whole = f"{MODEL}('bars')?.get_column('whole_low')"
+    page.wait_for_function(f"() => {whole}?.every(Number.isFinite)")
     assert span(page, "exact") < 0.99 * span(page, "whole")
     page.get_by_text("All contacts as a table").click()
     page.locator("tr[data-contact]").nth(3).wait_for()
@@ -58,7 +59,8 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     select(page, 9)
     page.keyboard.press("h")
     chips(page, 0)
-    page.wait_for_function(f"() => {MODEL}('bars')?.get_column('whole_low')?.every(Number.isNaN)")
+    whole = f"{MODEL}('bars')?.get_column('whole_low')"
+    page.wait_for_function(f"() => {whole}?.every(Number.isNaN)")
 
 
 def test_contacts_worth_measuring_are_numbered(visit):
