@@ -58,7 +58,10 @@ def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
 
 
 def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _series_by(rows, "method", "h", "seconds_per_state")
+    series = _series_by(
+        [row | {"method": row["method"].replace("_", "-")} for row in rows],
+        *("method", "h", "seconds_per_state"),
+    )
     words = {"title": "Uniform sampling", "x": "h", "y": "CPU time per effective network / s"}
     yield from _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
@@ -108,8 +111,8 @@ def _frame(
     if room > 1:
         axes["ylim"] = min(y) / 2, room * max(y)
     x = [point[0] for points in series.values() for point in points]
-    # Less than a decade: ticks of a logarithmic axis would overprint each other.
-    axes["logx"] = axes.get("logx", False) and max(x, default=1) >= 10 * min(x, default=1)
+    # Less than 1.5 decades: ticks of a logarithmic axis would overprint each other.
+    axes["logx"] = axes.get("logx", False) and max(x, default=1) >= 30 * min(x, default=1)
     for k, (name, points) in enumerate(series.items()):
         colour = style.COLOURS[k % len(style.COLOURS)]
         drawn.append(style.line(sorted(points), name, colour, backend))
