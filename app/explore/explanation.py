@@ -45,7 +45,7 @@ def rest(replay: Replay) -> str:
     loose = summary.get("rattlers", 0)
     forces, grains = 2 * summary["contacts"], summary["n"] - loose
     free, mu, closed = summary["dimension"], summary["mu"], bool(np.isfinite(replay.box).all())
-    carry = f"{grains} of the {summary['n']} disks carry force (the pale ones are loose)."
+    carry = f"{grains} of the {summary['n']} disks carry force (the faint ones are loose)."
     carry = carry if loose else f"All {grains} disks carry force."
     if mu == 0:
         why = (

@@ -35,7 +35,7 @@ LEGEND = """
   <svg width="40" height="12" aria-hidden="true">
   <polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5" fill="currentColor" fill-opacity="0.65"/>
   </svg> {shown:.3g} ⟨fₙ⟩{wide_bounds}</span>
-<span tabindex="0" data-term="rattler">pale disks: no force</span>
+<span tabindex="0" data-term="rattler">faint disks: no force</span>
 <details><summary>Scales</summary>
 <label title="auto: for ΔFₙ, its {saturation:g} quantile in this packing">colours full at
   <input name="full" type="number" step="any" placeholder="auto"
@@ -51,7 +51,7 @@ THRUST = """
 JAMMING = """
 <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
 {colour}
-<span>pale disks: no contacts; dashed: the shrinking box; disks outside: periodic copies</span>
+<span>faint disks: no contacts; dashed: the shrinking box; disks outside: periodic copies</span>
 """
 DIVERGING = [BLUE, GREY, ORANGE]
 MOBILISED = "−1", DIVERGING, "+1 (slides)"

@@ -290,7 +290,8 @@ def _so_far(task: Task) -> Any:
 def _number(value: float, what: str) -> float:
     if not 0 <= value < LARGEST:  # also refuses NaN
         raise InputError(f"{what} must lie between 0 and {LARGEST:g} ⟨fₙ⟩, got {value:g}")
-    return float(value)
+    shown = np.float32(value)  # forces on screen are in single precision: 3.7000000477 is 3.7
+    return float(str(shown)) if float(shown) == value else float(value)
 
 
 def _rounded(value: float) -> float:

@@ -26,8 +26,6 @@ FONT = 'Inter, Roboto, "Helvetica Neue", sans-serif'
 
 # A notice about Ctrl that Bokeh shows whenever the wheel scrolls the page past a plot.
 NOTICE = ".bk-Panel { display: none; }"
-# Bokeh makes the strip behind the tools white.
-TOOLS = ":host(.bk-inner) { background: none; }"
 
 # As many columns of a legend as fit: about 6.6 px a letter, and the mark.
 FITTING = """
@@ -103,17 +101,16 @@ def _faded(colour: tuple[int, ...], part: float) -> str:
 
 
 def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
-    """A figure that fills its width, with a toolbar inside its frame that appears on hover.
+    """A figure that fills its width, with a toolbar beside its frame that appears on hover.
 
     The wheel zooms with Ctrl pressed, and otherwise scrolls the page.
     """
     settled = {
         "tools": "pan,box_zoom,reset",
-        "toolbar_location": "above",
-        "toolbar_inner": True,
+        "toolbar_location": "right",
         "sizing_mode": "stretch_width",
         "min_border_left": 56,
-        "min_border_right": 18,
+        "min_border_right": 0,
         "styles": {"flex-shrink": "0"},  # in a low window texts would cover it
         "stylesheets": [NOTICE],
     }
@@ -121,7 +118,7 @@ def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
     if fig.toolbar.tools:
         fig.add_tools(WheelZoomTool(modifiers={"ctrl": True}))
     fig.toolbar.logo = None
-    fig.toolbar.update(autohide=True, stylesheets=[TOOLS])
+    fig.toolbar.autohide = True
     if title:
         fig.title.update(text_font=FONT, text_font_size="13px")
     for axis in fig.axis:

@@ -29,7 +29,10 @@ LOOK = {
     "& .MuiTabs-root": {
         "minHeight": "36px", "padding": "0 clamp(0px, 3vw - 12px, 10px)",
         "background": "var(--paper)",
-        "@media (min-width: 900px)": {"position": "sticky", "top": 0, "zIndex": 2},
+        "@media (min-width: 900px)": {
+            "position": "sticky", "top": 0, "zIndex": 2,
+            "boxShadow": "0 3px 3px var(--paper)",  # letters below fade instead of being cut
+        },
     },
     "& .MuiTab-root": {
         "minWidth": 0, "minHeight": "36px", "padding": "6px 2px",

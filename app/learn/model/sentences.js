@@ -99,7 +99,7 @@ export function special({ scene }) {
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
-  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity. The dashed square repeats in all directions; pale disks are copies.${rattles}`
+  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity. The dashed square repeats in all directions; faint disks are copies.${rattles}`
 }
 
 /** The meaning of the picture of S. */

@@ -1,6 +1,8 @@
 // Pointer, wheel and touch over the packing: they highlight, select, drag a force, or move the
 // view.
 
+const WHEEL = matchMedia("(pointer: fine)") // a finger has none
+
 /** Listen over a Scene. */
 export function listen(scene) {
   const { root } = scene, fingers = new Map()
@@ -16,7 +18,7 @@ export function listen(scene) {
     event.preventDefault()
     scene.zoom(Math.exp(event.deltaY * 0.0015), ...scene.place(event))
   }, { passive: false })
-  root.addEventListener("pointerenter", ({ pointerType }) => { if (pointerType === "mouse") scene.hintAtZoom() }, { once: true })
+  root.addEventListener("pointerenter", ({ pointerType }) => { if (pointerType === "mouse" && WHEEL.matches) scene.hintAtZoom() }, { once: true })
   root.addEventListener("dblclick", () => scene.reset())
   root.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return

@@ -98,11 +98,11 @@ def test_force_space_opens_without_a_warning_and_its_tools_cover_nothing(visit):
             const page = Bokeh.documents[0]
             const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
             const box = view.canvas_view.el.getBoundingClientRect(), bar = view.model.toolbar
-            const {bottom} = page.views_manager.find_one(bar).el.getBoundingClientRect()
-            return [box.top + view.frame.bbox.top, bottom]
+            const {left} = page.views_manager.find_one(bar).el.getBoundingClientRect()
+            return [box.left + view.frame.bbox.right, left]
         }"""
     )
-    assert tools <= frame
+    assert tools >= frame
     plot, below = page.locator(".bk-Figure").first, page.locator("fieldset", has_text="Plane")
     box = plot.bounding_box()
     assert box["height"] > 200 and below.bounding_box()["y"] >= box["y"] + box["height"] - 1

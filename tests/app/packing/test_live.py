@@ -194,12 +194,12 @@ def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser = Browser(state)
     view = PackingView(state)
-    assert "pale disks: no force" in view.player.legend
+    assert "faint disks: no force" in view.player.legend
     state.ask(asked(0.35, 20_000), at_once=True)
     browser.run(lambda: state.work.moving)
     assert "the shrinking box" in view.player.legend
     browser.run(lambda: state.growing)
-    assert "pale disks: no force" in view.player.legend
+    assert "faint disks: no force" in view.player.legend
     state.work.cancel()
     browser.run()
 

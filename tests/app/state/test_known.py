@@ -38,6 +38,14 @@ def test_a_held_force_narrows_the_others(state):
     )
 
 
+def test_a_force_in_single_precision_is_held_as_it_is_read(state):
+    """A force on screen is a float32: 3.7 arrives as 3.7000000477, but links say 3.7."""
+    state.knowledge.hold(4, float(np.float32(3.7)), float(np.float32(0.1)))
+    assert known.spelled(state.knowledge.known) == "4:3.7:0.1"
+    state.knowledge.hold(4, 3.70000001, 0.1)
+    assert known.spelled(state.knowledge.known) == "4:3.70000001:0.1"
+
+
 def test_colour_and_width_show_what_measuring_took_away(state):
     player = PackingView(state).player
     assert player.reduction is None

@@ -36,7 +36,6 @@ class SpaceFigure:
         self.figure = fig = figure(
             "force_space", None, "", "", x_range=DataRange1d(**around),
             y_range=DataRange1d(**around), sizing_mode="scale_width",
-            toolbar_inner=False,  # the outline of S reaches up to the frame
         )  # fmt: skip
         fig.name = "path_figure"
         edges = [

@@ -17,7 +17,8 @@ F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<su
 LIMIT = term("limit_load", "limit load")
 HEADING = "<b>How hard can the two disks of contact {} be pushed apart?</b> "
 ASKED = (
-    "As packed, they press on each other with {now:.2f} mean forces. A pair of opposite forces "
+    "The push begins with the network as packed, in which they press on each other with {now:.2f} "
+    "mean forces. A pair of opposite forces "
     f"increases until disks start to move: the {F_CRIT}. Beyond the {LIMIT} no network balances "
     "it. Click another line to push that contact."
 )
@@ -27,10 +28,7 @@ FOUND = (
     "({most:.3g} times the rms motion) moves back and forth by one mean radius. "
     "Rotations are not drawn."
 )
-HELD = (
-    " Held forces are ignored here: {} may change like all others, and the push begins with the "
-    "network as packed."
-)
+HELD = " Held forces are ignored here: {} may change like all others."
 COMPUTED = (
     "Of all sets of forces that balance the push, those nearest to the forces as packed are "
     "shown. F<sub>crit</sub> lies between the largest "
