@@ -68,7 +68,10 @@ def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):
     page = visit("", 390)
     assert findings(page) == []
     page.get_by_role("button", name="Help and keys").click()
-    page.get_by_role("dialog").get_by_text("play; pause at the nearest network").wait_for()
+    help = page.get_by_role("dialog")
+    help.get_by_text("play; pause at the nearest network").wait_for()
+    assert help.evaluate("e => e.scrollHeight > e.clientHeight && !e.scrollTop")
+    expect(help.get_by_role("button", name="Close")).to_be_in_viewport(ratio=1)
     assert findings(page) == []
 
 

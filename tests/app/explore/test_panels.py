@@ -704,6 +704,7 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert view.load.contact == state.replay.invited
     state.looks.contact = 5
     number = state.replay.backbone[5]
+    assert "begins with the network as packed" in view.lead.object  # whichever is on screen
     assert view.load.contact == 5 and not view.load.path and f"contact {number}" in view.lead.object
     view.load.hear({"push": True})
     wait_for(state, lambda: view.pushed is not None)
