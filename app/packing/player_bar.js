@@ -98,7 +98,7 @@ export class PlayerBar {
     this.missed = null
     this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)
-    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (last time: ${duration(replay.walk.seconds)})` : "Keep all"
+    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (about ${duration(replay.walk.seconds)})` : "Keep all"
     this.showRate()
   }
 
