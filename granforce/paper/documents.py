@@ -3,7 +3,7 @@
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
 against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
 "score" (how many claims are reproduced, in a sentence), "highlights" (findings, one sentence each),
-"headlines" (the first four of them), "verdicts" (how many claims have which verdict), "claims"
+"headlines" (the first few of them), "verdicts" (how many claims have which verdict), "claims"
 (each claim with its verdict and the number behind it), "disagreements" (claims on which other
 networks give another verdict), "findings" (numbers beyond the claims), "sweeps" (the residual of
 the paper's walk, and its excess over S), "preparation" (how results depend on the packing),
