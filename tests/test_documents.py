@@ -14,6 +14,7 @@ import frames
 import numpy as np
 import pytest
 import simulators
+import yaml
 from packings import packed
 
 import granforce
@@ -117,6 +118,19 @@ def test_all_documents_name_one_version():
     assert version == granforce.__version__.removesuffix(".dev0")
     assert (date == "unreleased") == granforce.__version__.endswith(".dev0")
     assert f"\nversion: {granforce.__version__}\n" in text("CITATION.cff")
+
+
+def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_wheel():
+    recipe = yaml.safe_load(text(".github/recipe/recipe.yaml"))
+    assert recipe["context"]["version"] == granforce.__version__
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    wanted = [re.sub(r"(?=[><])", " ", one, count=1) for one in project["dependencies"]]
+    wanted = [one.replace("matplotlib ", "matplotlib-base ") for one in wanted]
+    python = f"python {project['requires-python']}"
+    assert recipe["requirements"]["run"] == [python, *wanted]
+    assert recipe["build"]["python"]["entry_points"] == [
+        f"{name} = {target}" for name, target in project["scripts"].items()
+    ]
 
 
 def test_the_readme_is_short_and_gives_the_commands_that_install():
