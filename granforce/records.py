@@ -179,7 +179,7 @@ class Packing(NamedTuple):
 
     @property
     def walls(self) -> Floats:
-        """Ends (k, 4) of walls, length; k = 0 if unknown: some files only tell what touches."""
+        """Ends of the walls (k, 4), length; none if only their contacts with grains are known."""
         ends = self.info.get("walls")  # some importers count walls
         return np.array(ends if isinstance(ends, list) else [], dtype=float).reshape(-1, 4)
 

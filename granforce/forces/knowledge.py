@@ -9,13 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 
 from granforce import notebook
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import Contacts, InputError, NotJammedError, are_whole
+from granforce.records import Contacts, InputError, NotJammedError, are_whole, real_array
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT, REVERSED
 from granforce.types import Floats, Integers, Mask
 
@@ -46,7 +45,7 @@ class Known(NamedTuple):
 
 def _both(side: Floats, count: int, unknown: float) -> Floats:
     """Bounds (count, 2) of those given, which are (count, 2) or bounds of f_n alone."""
-    given = _numbers(side)
+    given = real_array(side, "bounds")
     if given.shape == (2,) and count == 1:  # of the only contact
         given = given[None]
     if given.ndim == 0:
@@ -56,13 +55,6 @@ def _both(side: Floats, count: int, unknown: float) -> Floats:
     if given.shape != (count, 2):
         raise ValueError
     return given
-
-
-def _numbers(given: npt.ArrayLike) -> Floats:
-    """The numbers given; TypeError for text, which numpy would read as numbers."""
-    if np.asarray(given).dtype.kind not in "biuf":
-        raise TypeError
-    return np.asarray(given, dtype=np.float64)
 
 
 class Polygons(NamedTuple):
@@ -106,7 +98,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
     try:
         if not isinstance(known, Known):
             raise TypeError
-        contacts = np.atleast_1d(_numbers(known.contacts))
+        contacts = np.atleast_1d(real_array(known.contacts, "contacts"))
         if contacts.ndim > 1:
             raise TypeError
         low, high = known.sides
