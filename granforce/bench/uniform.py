@@ -29,6 +29,7 @@ from granforce.types import Floats
 # Largest dimension for hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79. Beyond it
 # hopsy gets only granforce's rounding.
 MOST_ROUNDED = 60
+NAMES = dict(zip(METHODS, ("billiard", "coordinate hit-and-run"), strict=True))  # in tables
 STATES = 1000
 HOPSY_STATES = 600
 # Most walls for a dense null space: 1600 disks at μ = 0.1.
@@ -74,7 +75,7 @@ def uniform(
 
 
 class _Run(NamedTuple):
-    method: str
+    method: str  # its name in tables
     states: Floats | None  # (chains, k, N_c, 2), None if it could not run
     mixing: Mixing | None
     seconds: float  # processor time of the steps
@@ -106,7 +107,7 @@ def _ours(S: Ensemble, polytope: Any, rows: Any, method: str, seed: int) -> _Run
         _, slacks, _ = step(polytope, ends, count=count, reach=reach, rows=rows, method=method)
         seconds = time.process_time() - begin
     states = forces_of(S, polytope, slacks)
-    return _Run(method, states, mixing(states, varying(S, polytope)), seconds, 0.0)
+    return _Run(NAMES[method], states, mixing(states, varying(S, polytope)), seconds, 0.0)
 
 
 def uniform_growth(

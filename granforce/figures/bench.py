@@ -58,10 +58,7 @@ def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
 
 
 def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
-    series = _series_by(
-        [row | {"method": row["method"].replace("_", "-")} for row in rows],
-        *("method", "h", "seconds_per_state"),
-    )
+    series = _series_by(rows, "method", "h", "seconds_per_state")
     words = {"title": "Uniform sampling", "x": "h", "y": "CPU time per effective network / s"}
     yield from _frame(series, backend, words, room=200.0, logx=True, logy=True)
 

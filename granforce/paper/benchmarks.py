@@ -136,11 +136,17 @@ SUMMARY = (
     ),
     ("nearest network", "Gauss–Seidel sweeps", "relaxation", "solver", "worst_residual", "nearest"),
     ("nearest networks, side by side", "PIQP", "starts", "solver", "", "8 lanes"),
-    ("uniform networks", "coordinate hit-and-run", "uniform", "method", "", "hit_and_run"),
+    (
+        "uniform networks",
+        "coordinate hit-and-run",
+        "uniform",
+        "method",
+        "",
+        "coordinate hit-and-run",
+    ),
     ("critical forces, side by side", "one after another", "pushes", "way", "", "8 lanes"),
     ("inference", "PIQP", "inference", "method", "", "PIQP"),
 )
-_WORDS = {"hit_and_run": "coordinate hit-and-run"}
 
 
 def load(path: str) -> dict[str, Any]:
@@ -172,11 +178,11 @@ def _summary(results: Mapping[str, Any]) -> str:
     lines = []
     for task, baseline, part, column, error, method in SUMMARY:
         rows = [row for row in results.get(part) or [] if row.get(column) == method]
-        factors = [row["ratio_to_piqp" if part == "starts" else "ratio"] for row in rows]
-        factors = [factor for factor in factors if factor is not None]
+        ratio = next((name for row in rows for name in RATIOS if name in row), "")
+        factors = {row[ratio]: _shown(row, ratio) for row in rows if row.get(ratio) is not None}
         if factors:
             errors = [row[error] for row in rows if row.get(error) is not None]
-            ends = sorted({f"{end:.3g}" for end in (min(factors), max(factors))}, key=float)
+            ends = dict.fromkeys(factors[end] for end in (min(factors), max(factors)))
             lines.append([task, baseline, " to ".join(ends), _cell(max(errors)) if errors else ""])
     return markdown_table(["task", "baseline", "times faster", "largest error, ⟨f_n⟩"], lines)
 
@@ -271,7 +277,7 @@ def _cell(value: Any) -> str:
         return "yes" if value else ""
     if isinstance(value, float):
         return f"{value:.3g}"
-    return _WORDS.get(str(value), str(value)).replace(" states", " networks")
+    return str(value).replace(" states", " networks")
 
 
 _TEXTS = {"quick": _extent, "summary": _summary}  # marks that are no part
