@@ -13,23 +13,6 @@ from granforce.paper.claims.groups import outside
 from granforce.records import InputError
 
 DATA = Path(__file__).resolve().parents[2] / "data"
-# Beginnings of the claims about each statistic; see data/claims.json.
-ABOUT = {
-    "eta": ("η", "z "),
-    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "ΔF_n is", "S is more elongated"),
-    "correlation": (
-        *("corr(", "the paper's error bar", "f_n > 2", "strong contacts", "ΔF_n/F_orig"),
-        "weak contacts",
-    ),
-    "other": (
-        "distances between",
-        "the original network",
-        "with only",
-        "and not in",
-        "with frozen",
-    ),
-    "store": ("F_crit", "α ", "the first motion"),
-}
 PEAK = "(μ) is largest near μ = "  # in a claim, before the paper's value
 
 _reading = threading.Lock()
@@ -50,8 +33,8 @@ def _study() -> tables.StudyTable | None:
 
 
 @cache
-def claims(about: str | None = None) -> list[dict[str, Any]]:
-    """The paper's claims about one of ABOUT, or all: dicts with statement, value, low, verdict, …
+def claims(figure: int | None = None) -> list[dict[str, Any]]:
+    """The claims on a figure of the paper, or all: dicts with statement, value, low, verdict, …
 
     Values that could not be measured are NaN, null in the file.
     """
@@ -62,16 +45,14 @@ def claims(about: str | None = None) -> list[dict[str, Any]]:
     return [
         {name: math.nan if value is None else value for name, value in claim.items()}
         for claim in claims_read
-        if about is None or claim["statement"].startswith(ABOUT[about])
+        if figure in (None, claim["figure"])
     ]
 
 
 def maxima() -> list[dict[str, Any]]:
     """The claims about the μ at which each η is largest, as nearest-network walks have it."""
     return [
-        claim
-        for claim in claims("eta")
-        if PEAK in claim["statement"] and claim["sampler"] == "nearest"
+        claim for claim in claims(1) if PEAK in claim["statement"] and claim["sampler"] == "nearest"
     ]
 
 

@@ -3,17 +3,19 @@
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
 against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
 "score" (how many claims are reproduced, in a sentence), "highlights" (findings, one sentence each),
-"headlines" (the first few of them), "verdicts" (how many claims have which verdict), "claims"
-(each claim with its verdict and the number behind it), "disagreements" (claims on which other
-networks give another verdict), "findings" (numbers beyond the claims), "sweeps" (the residual of
-the paper's walk, and its excess over S), "preparation" (how results depend on the packing),
-"figures" (the paper's figures, with captions), "counts" (number of packings of each kind of
-result), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
+"headlines" (the first few of them), "verdicts" (how many claims have which verdict, by each
+sampler), "outcomes" (how many claims on each figure have which outcome), "claims_1" to "claims_6"
+(a figure of the paper, and each claim on it with its verdict, those by other samplers, and the
+number behind it), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's
+walk, and its excess over S), "preparation" (how results depend on the packing), "counts" (number of
+packings of each kind of result), "certificates" (largest gap of the exact bounds, convergence of
+uniform samples).
 """
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +25,7 @@ from scipy import stats
 from granforce.measures import statistics
 from granforce.paper import filled
 from granforce.paper import plan as plans
-from granforce.paper.claims import OUTSIDE
+from granforce.paper.claims import OUTSIDE, TOPICS
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import (
     RANGES,
@@ -37,7 +39,9 @@ from granforce.paper.claims.outcomes import (
     OUTCOMES,
     SYMBOLS,
     by_claim,
+    counted,
     decided,
+    decisive,
     score,
 )
 from granforce.paper.claims.verdicts import FEW, MISSING, PRL, UNMEASURED
@@ -71,7 +75,7 @@ NAMED = (  # claims that the README names if they are contradicted
     "η3 does not depend on how networks are sampled",
     "corr(f_n, ΔF_n) vanishes at large μ",
 )
-_CLAIM_HEADS = ("claim", "number", "range", "value", "n")
+_CLAIM_HEADS = ("", "claim", "number", "value", "range", "n")
 _SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
@@ -84,6 +88,7 @@ _HEADS = {
     "exact": "exact",
     "": "packings alone",
 }
+_BRIEF = {"nearest": "nearest", "uniform": "uniform", "exact": "exact"}  # samplers, in claim tables
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
     "exact": "exact intervals",
@@ -131,7 +136,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
 
     claims, findings: dicts of `claims.Claim`.
     """
-    known = {
+    known: dict[str, Callable[[], str]] = {
         "measures": lambda: measures(table),
         "walks": lambda: walks(table),
         "others": lambda: others(table),
@@ -140,12 +145,11 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
         "verdicts": lambda: verdict_counts(claims),
-        "claims": lambda: claim_tables(claims),
-        "disagreements": lambda: disagreements(claims),
+        "outcomes": lambda: outcome_counts(claims),
+        **{f"claims_{k}": partial(claim_table, table, claims, k) for k in TOPICS},
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "findings": lambda: finding_table(findings),
-        "figures": lambda: shown(table),
         "counts": lambda: counts(table),
         "certificates": lambda: certificates(table),
     }
@@ -156,16 +160,6 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         return typeset(known[name]())
 
     filled.renew(paths, KIND, text_of)
-
-
-def shown(table: StudyTable) -> str:
-    """The paper's figures that the results page shows, each with its caption."""
-    walk = _HEADS[paper_sampler(table)]
-    words = {name: CAPTIONS[name].format(walk=walk) for name in SHOWN}
-    return "\n".join(
-        f"![Figure {name[-1]}]({FIGURES}/{name}.png)\n\n*Figure {name[-1]}.* {caption}\n"
-        for name, caption in words.items()
-    )
 
 
 def measures(table: StudyTable) -> str:
@@ -623,32 +617,59 @@ def verdict_counts(claims: Rows) -> str:
     return markdown_table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
 
 
-def claim_tables(claims: Rows) -> str:
-    """Each claim with the number that decides it: a table for each verdict.
+def outcome_counts(claims: Rows) -> str:
+    """How many claims on each figure have which outcome, as a table; below, where walks leave S."""
+    lines = []
+    for figure, topic in TOPICS.items():
+        count = counted([claim for claim in claims if claim["figure"] == figure])
+        anchor = f"figure-{figure}-{topic.lower().replace(' ', '-')}"
+        lines.append([f"[Figure {figure}: {topic.lower()}](#{anchor})", *map(str, count.values())])
+    lines.append(["all", *map(str, counted(claims).values())])
+    return "\n".join([markdown_table(["claims", *OUTCOMES], lines), *_beyond_notes(claims)])
 
-    Claims of the letter are marked. Below the tables, where walks leave S. `claims.json` contains
-    the numbers of all samplers.
+
+def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
+    """A figure of the paper with its caption, and each claim on it with the number that decides.
+
+    Claims of the letter are marked. Below the symbol of a verdict are those by other samplers, if
+    they differ in outcome. `claims.json` contains the numbers of all samplers.
     """
-    judged, parts = decided(claims), []
-    for verdict in (word for words in OUTCOMES.values() for word in words):
-        lines = [_claim_line(claim) for claim in judged if claim["verdict"] == verdict]
-        if lines:
-            head = f"{SYMBOLS[verdict]} {verdict[0].upper()}{verdict[1:]} ({len(lines)})"
-            parts.append(f"## {head}\n\n{markdown_table(_CLAIM_HEADS, lines)}")
-    return "\n".join([*parts, *_beyond_notes(claims)])
+    of_figure = [claim for claim in claims if claim["figure"] == figure]
+    lines = [_claim_line(by_sampler) for by_sampler in by_claim(of_figure).values()]
+    name, made = f"figure{figure}", markdown_table(_CLAIM_HEADS, lines)
+    if name not in SHOWN:
+        return made
+    caption = CAPTIONS[name].format(walk=_HEADS[paper_sampler(table)])
+    return f"![Figure {figure}]({FIGURES}/{name}.png)\n\n*Figure {figure}.* {caption}\n\n{made}"
 
 
-def _claim_line(claim: dict[str, Any]) -> list[str]:
+def _claim_line(by_sampler: dict[str, dict[str, Any]]) -> list[str]:
     """A claim in the columns of _CLAIM_HEADS."""
+    claim = decisive(by_sampler)
     letter = f" ({PRL})" if claim["source"] == PRL else ""
     place = f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""
     return [
+        "<br>".join([SYMBOLS[claim["verdict"]], *_disagreeing(claim, by_sampler)]),
         claim["statement"] + letter,
-        measured({claim["sampler"]: claim}),
-        claim["criterion"].replace("[", "(").replace("]", ")"),
+        claim["measured"].partition(", at the deciding μ")[0],
         _number(claim) + place,
+        claim["criterion"].replace("[", "(").replace("]", ")"),
         str(claim["packings"] or ""),
     ]
+
+
+def _disagreeing(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
+    """The verdicts with another outcome than a claim's, as "symbol samplers".
+
+    A verdict for want of data is no outcome.
+    """
+    outcome = {verdict: word for word, verdicts in OUTCOMES.items() for verdict in verdicts}
+    names: dict[str, list[str]] = {}
+    for name, other in by_sampler.items():
+        verdict = other["verdict"]
+        if verdict not in _SCARCE and outcome[verdict] != outcome[claim["verdict"]]:
+            names.setdefault(SYMBOLS[verdict], []).append(_BRIEF.get(name, _HEADS[name]))
+    return [f"{symbol} {', '.join(of)}" for symbol, of in names.items()]
 
 
 def _beyond_notes(claims: Rows) -> list[str]:
@@ -662,52 +683,7 @@ def _beyond_notes(claims: Rows) -> list[str]:
     ]
 
 
-def disagreements(claims: Rows) -> str:
-    """The claims on which networks drawn in another way give another outcome, as a table.
-
-    A verdict for want of data is no outcome.
-    """
-    outcome = {verdict: word for word, verdicts in OUTCOMES.items() for verdict in verdicts}
-    heads = [name for name in _used(claims) if name]
-    lines = []
-    for (statement, *_), by_sampler in by_claim(claims).items():
-        verdicts = {name: by_sampler[name]["verdict"] for name in heads if name in by_sampler}
-        enough = {outcome[verdict] for verdict in verdicts.values() if verdict not in _SCARCE}
-        if len(enough) > 1:
-            cells = [SYMBOLS[verdicts[name]] if name in verdicts else "" for name in heads]
-            lines.append([statement, *cells])
-    return markdown_table(["claim", *(_HEADS[name] for name in heads)], lines)
-
-
 def _used(claims: Rows) -> list[str]:
     """The samplers by which any claim is judged, in the order of columns."""
     known = {claim["sampler"] for claim in claims if claim["verdict"] not in _SCARCE}
     return [name for name in _HEADS if name in known]
-
-
-def measured(by_sampler: dict[str, dict[str, Any]]) -> str:
-    """The number of a claim in words, with what is different about it for some samplers."""
-    words = {
-        name: claim["measured"].partition(", at the deciding μ")[0]
-        for name, claim in by_sampler.items()
-        if np.isfinite(claim["value"])
-    } or {"": next(iter(by_sampler.values()))["measured"]}
-    usual, *_ = words.values()
-    others: dict[str, list[str]] = {}
-    for name, text in words.items():
-        if text != usual:
-            others.setdefault(_different(text, usual), []).append(_HEADS[name])
-    notes = [f"{', '.join(names)}: {what}" for what, names in others.items()]
-    return f"{usual} ({'; '.join(notes)})" if notes else usual
-
-
-def _different(text: str, usual: str) -> str:
-    """The parts of a text, separated by commas, that another lacks; only η3 if it has η2 there."""
-    known = usual.split(", ")
-    parts = []
-    for part in text.split(", "):
-        if part.replace("exact η3", "η2").replace("η3", "η2") in known and part not in known:
-            parts.append("η3")
-        elif part not in known:
-            parts.append(part)
-    return ", ".join(dict.fromkeys(parts))

@@ -378,8 +378,8 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
     names += (
-        "claims",
-        "disagreements",
+        *(f"claims_{figure}" for figure in claims.TOPICS),
+        "outcomes",
         "findings",
         "score",
         "headlines",
@@ -510,10 +510,9 @@ def test_differences_of_few_packings_are_judged_by_students_t():
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     def claim(statement, sampler, verdict, value=1.0):
         words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
+        words |= {"sampler": sampler, "verdict": verdict, "measured": "x", "why": ""}
         numbers = {"value": value, "low": value, "high": value, "mu": None, "packings": 3}
-        return (
-            words | numbers | {"sampler": sampler, "verdict": verdict, "measured": "x", "why": ""}
-        )
+        return words | numbers | {"figure": 3}
 
     judged = [
         claim("a", "gauss_seidel", verdicts.REPRODUCED),
@@ -526,14 +525,27 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         claim("c", "uniform", verdicts.MISSING, float("nan")),
         claim("d", "", verdicts.CONTRADICTED) | {"source": "PRL"},
     ]
-    text = documents.claim_tables(judged)
-    heads = ["✗✗ Strongly contradicted", "✗ Contradicted", "… Too few data", "✓ Reproduced"]
-    heads = [f"## {head} (1)" for head in heads]
-    assert [line for line in text.splitlines() if line.startswith("#")] == heads
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    heads = ["claim", "number", "range", "value", "n"]
-    assert rows[::3] == [heads] * 4
-    assert [row[0] for row in rows[2::3]] == ["c", "d (PRL)", "b", "a"]
+    stronger = [
+        claim("e", "exact", verdicts.STRONGLY),
+        claim("e", "uniform", verdicts.CONTRADICTED),
+    ]
+    empty = tables.StudyTable({}, [], {}, [], {}, {})
+    assert "| ✗✗ | e |" in documents.claim_table(empty, stronger, 3)  # contradicted by both
+    text = documents.claim_table(empty, judged, 3)
+    rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in row] for row in rows]
+    assert rows[0] == ["", "claim", "number", "value", "range", "n"]
+    marks = [
+        ["✓<br>✗ exact", "a"],
+        ["…<br>✓ exact", "b"],
+        ["✗✗<br>✓ nearest", "c"],  # want of data is no outcome
+        ["✗", "d (PRL)"],
+    ]
+    assert [row[:2] for row in rows[2:]] == marks
+    lines = [line.split("|") for line in documents.outcome_counts(judged).splitlines()]
+    assert [cell.strip() for cell in lines[-1][1:-1]] == ["all", "2", "1", "1"]
+    assert "(#figure-3-networks-of-one-packing)" in lines[4][1]
+    assert [cell.strip() for cell in lines[4][2:-1]] == ["2", "1", "1"]
     assert "tests 4 claims" in outcomes.score(judged)
     assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
     assert "The networks of the paper's own walk decide 2 of them;" in outcomes.score(judged)
@@ -545,25 +557,6 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     assert counted["✗✗ strongly contradicted"] == [1, 0, 0, 1, 0]
     # The paper's walk decides as many claims as it has judged.
     assert "– not measured" not in counted and counted["all"] == [4, 2, 1, 3, 1]
-
-
-def test_other_networks_disagree_only_by_an_outcome():
-    """Neither a verdict for want of data nor a stronger contradiction is another outcome."""
-    outcomes_of = {
-        "a": (verdicts.REPRODUCED, verdicts.CONTRADICTED),
-        "b": (verdicts.REPRODUCED, verdicts.FEW),
-        "c": (verdicts.CONTRADICTED, verdicts.STRONGLY),
-        "d": (verdicts.REPRODUCED, verdicts.UNDECIDED),
-    }
-    judged = [
-        {"statement": statement, "source": "PRE", "criterion": "≥ 0", "sampler": sampler}
-        | {"verdict": verdict, "value": 1.0}
-        for statement, pair in outcomes_of.items()
-        for sampler, verdict in zip(("gauss_seidel", "nearest"), pair, strict=True)
-    ]
-    head, _, *lines = documents.disagreements(judged).splitlines()
-    assert head == "| claim | paper's walk, to 10⁻³ | nearest-network walk |"
-    assert lines == ["| a | ✓ | ✗ |", "| d | ✓ | ? |"]
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ Claims about packings alone have no sampler. Sources: "PRE", the paper; "PRL", t
 The modules are named after the paper's figures to which the claims belong.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from granforce.paper.claims.figure1 import (
     agreement,
@@ -44,35 +44,37 @@ BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
 BY_WALKS = (*BY_SWEEPS, "nearest")
 BY_STATES = (*BY_WALKS, "uniform")  # these have η1 and η2
 
-# The families, and the samplers of each: none for claims about packings alone.
-FAMILIES = {
-    agreement: BY_STATES,
-    maximum: tuple(SAMPLERS),
-    small_friction: tuple(SAMPLERS),
-    vanishing: tuple(SAMPLERS),
-    measure: BY_STATES,
-    reproducible: ("gauss_seidel", "nearest"),
-    causes: ("exact",),
-    coordination: (),
-    shape: tuple(SAMPLERS),
-    tails: tuple(SAMPLERS),
-    widths: tuple(SAMPLERS),
-    elongation: tuple(SAMPLERS),
-    correlation: tuple(SAMPLERS),
-    error_bars: BY_WALKS,
-    origin: tuple(SAMPLERS),
-    counts: tuple(SAMPLERS),
-    enrichment: tuple(SAMPLERS),
-    patterns: tuple(SAMPLERS),
-    relative: tuple(SAMPLERS),
-    pairs: BY_STATES,
-    centre: BY_STATES,
-    place: ("exact",),
-    frozen: ("exact",),
-    size: ("gauss_seidel", "nearest", "exact"),
-    perturbation: (),
-    law: (),
-    response: tuple(SAMPLERS),
+# The paper's figures, and what the claims about each are about.
+TOPICS = {
+    1: "Indeterminacy against friction",
+    2: "Response to a local force",
+    3: "Networks of one packing",
+    4: "Lengths of the intervals",
+    5: "Strong and undetermined contacts",
+    6: "Correlation of force and interval",
+}
+# The families of each figure, and their samplers: none for claims about packings alone.
+FAMILIES: dict[int, dict[Callable[..., Iterable[Claim]], tuple[str, ...]]] = {
+    1: {
+        agreement: BY_STATES,
+        maximum: tuple(SAMPLERS),
+        small_friction: tuple(SAMPLERS),
+        vanishing: tuple(SAMPLERS),
+        measure: BY_STATES,
+        reproducible: ("gauss_seidel", "nearest"),
+        causes: ("exact",),
+        size: ("gauss_seidel", "nearest", "exact"),
+        coordination: (),
+    },
+    2: {perturbation: (), response: tuple(SAMPLERS), law: ()},
+    3: {pairs: BY_STATES, centre: BY_STATES, relative: tuple(SAMPLERS)},
+    4: dict.fromkeys((shape, tails, widths, elongation), tuple(SAMPLERS)),
+    5: {
+        **dict.fromkeys((counts, enrichment, patterns), tuple(SAMPLERS)),
+        place: ("exact",),
+        frozen: ("exact",),
+    },
+    6: {correlation: tuple(SAMPLERS), error_bars: BY_WALKS, origin: tuple(SAMPLERS)},
 }
 
 
@@ -85,15 +87,14 @@ def judged(table: StudyTable) -> list[Claim]:
     samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
     beyond = {name: outside(table, SAMPLERS[name]) for name in BY_SWEEPS}
     claims = []
-    for family, takes in FAMILIES.items():
-        for sampler in samplers if takes else [""]:
-            if takes and sampler not in takes:
-                continue
-            for claim in family(table, sampler):
-                lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
-                verdict = FEW if lacking else claim.verdict
-                claim = claim._replace(sampler=sampler, verdict=verdict)
-                claims.append(without(claim, beyond.get(sampler, [])))
+    for figure, families in FAMILIES.items():
+        for family, takes in families.items():
+            for sampler in [name for name in samplers if name in takes] if takes else [""]:
+                for claim in family(table, sampler):
+                    lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
+                    verdict = FEW if lacking else claim.verdict
+                    claim = claim._replace(sampler=sampler, verdict=verdict, figure=figure)
+                    claims.append(without(claim, beyond.get(sampler, [])))
     return claims
 
 

@@ -21,7 +21,6 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import (
     CORRELATION,
-    NEAR_PEAK,
     POSITIVE,
     PRL,
     UNMEASURED,
@@ -34,10 +33,7 @@ from granforce.paper.claims.verdicts import (
 )
 from granforce.paper.tables import StudyTable
 
-PEAK = (
-    "μ at the top of a parabola in log μ, fitted to the means within a factor "
-    f"{NEAR_PEAK:g} of the μ with the largest mean"
-)
+PEAK = "μ at the top of a parabola in log μ"
 # How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))

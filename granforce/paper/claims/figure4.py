@@ -99,7 +99,7 @@ def widths(table: StudyTable, sampler: str) -> Iterator[Claim]:
         (np.std, "P(ΔF_n) is broadest at intermediate μ", "the standard deviation of ΔF_n/⟨f_n⟩"),
     ):
         groups = each(everywhere, measure)
-        yield peaked(statement, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
+        yield peaked(statement, groups, f"{PEAK}, for {what}", good=(0.05, 0.3))
 
 
 def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:

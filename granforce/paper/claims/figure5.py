@@ -19,6 +19,7 @@ from granforce.paper.claims.verdicts import FRACTION, POSITIVE, PRL, Claim, at_e
 from granforce.paper.tables import StudyTable
 from granforce.types import Mask
 
+ENRICHMENT = "share of ΔF_n > ⟨ΔF_n⟩ among the contacts with f_n > 2⟨f_n⟩, over that among all"
 FROZEN_SMALL = 0.05  # μ up to which contacts with frozen surroundings are judged as at small μ
 
 
@@ -54,8 +55,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     groups = _marked(table, sampler, _enriched)
     yield at_each(
         "strong contacts are less determined at intermediate μ",
-        "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
-        f"{span_text(MIDDLE)}",
+        f"{ENRICHMENT}, {span_text(MIDDLE)}",
         within(groups, MIDDLE),
         good=(1, np.inf),
         possible=POSITIVE,
@@ -67,7 +67,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
     groups = _marked(table, sampler, _enriched)
     yield at_each(
         "strong contacts and those with long intervals form unrelated patterns at μ = 10",
-        "fraction with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all",
+        ENRICHMENT,
         within(groups, (10, 10)),
         good=(0.8, 1.25),
         fair=(0.5, 2),

@@ -49,6 +49,7 @@ class Claim(NamedTuple):
     why: str = ""  # reason for a negative or open verdict
     mu: float | None = None  # where the number is from, if it is judged at each μ
     packings: int = 0  # at that μ, or the fewest at any
+    figure: int = 0  # of the paper, to which the claim belongs; 0 for findings
 
 
 PRE, PRL = "PRE", "PRL"
@@ -255,8 +256,10 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
     choice of the maximum is accounted for.
     """
     ranges = Ranges((0, np.inf), (0, np.inf))
-    span = f"{min(groups):g} to {max(groups):g}" if groups else "the first to the last"
-    measured = f"the smaller of rise and fall, from μ = {span}, relative to the largest"
+    span = f", μ = {min(groups):g} … {max(groups):g}" if groups else ""
+    measured = (
+        f"the smaller of the rise to the maximum and the fall from it, over the maximum{span}"
+    )
     claim = _missing(statement, source, measured, ranges)
     if len(groups) < 3:
         return claim

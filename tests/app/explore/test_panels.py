@@ -53,7 +53,7 @@ from granforce import measures
 from granforce.measures import statistics
 from granforce.packing.neighbours import find_pairs
 from granforce.packing.scenes import scene
-from granforce.paper.claims import outcomes
+from granforce.paper.claims import TOPICS, outcomes
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -540,7 +540,7 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     assert all(f"{mark} {words}" in told for words, mark in list(outcomes.SYMBOLS.items())[:4])
     assert "η<sub>1</sub>" in told and "F<sub>n</sub>" in told and "F_n" not in told
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
-    shown = [c for about in study_data.ABOUT for c in study_data.claims(about)]
+    shown = [c for figure in TOPICS for c in study_data.claims(figure)]
     assert len(shown) == len(every)  # each once
     assert told.startswith(f"<b>{outcomes.score(every)}</b>")
     heads = re.findall(r"<summary>[^:]*: ([^<]*)</summary>", told)

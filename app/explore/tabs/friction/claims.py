@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.paper import documents
-from granforce.paper.claims import outcomes
+from granforce.paper.claims import TOPICS, outcomes
 from granforce.paper.claims.verdicts import FEW, REPRODUCED, STRONGLY
 from granforce.types import Rows
 
@@ -28,9 +27,9 @@ TABLE = "<div class='judged'><table class='claims'>{}</table></div>"
 CELL = '<td data-by="{}">{}</td>'  # `data-by`: in front of the value where columns do not fit
 
 
-def claims(about: str, heading: str, opened: bool = False) -> str:
-    """The paper's claims about one of `study_data.ABOUT`, a column per sampler, as HTML."""
-    chosen = study_data.claims(about)
+def claims(figure: int, opened: bool = False) -> str:
+    """The claims on a figure of the paper, a column per sampler, as HTML."""
+    chosen = study_data.claims(figure)
     if not chosen:
         return ""
     grouped = outcomes.by_claim(chosen)
@@ -44,7 +43,8 @@ def claims(about: str, heading: str, opened: bool = False) -> str:
         judged = f"<small>{typeset(_judged(one))}</small>"
         rows.append(f"<tr><td>{typeset(statement)}{judged}</td>{cells}</tr>")
     return (
-        f"<details{' open' if opened else ''}><summary>{heading}: {_counted(chosen)}</summary>"
+        f"<details{' open' if opened else ''}><summary>Figure {figure}, "
+        f"{TOPICS[figure].lower()}: {_counted(chosen)}</summary>"
         f"{TABLE.format(''.join(rows))}</details>"
     )
 
@@ -72,7 +72,35 @@ def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
     ranges = f"{outcomes.SYMBOLS[REPRODUCED]} if {good}"
     if wider:
         ranges += f", {outcomes.SYMBOLS[STRONGLY]} unless {fair}"
-    return f"{documents.measured(by_sampler)}; {ranges.replace(' … ', UNBROKEN)}"
+    return f"{_measured(by_sampler)}; {ranges.replace(' … ', UNBROKEN)}"
+
+
+def _measured(by_sampler: dict[str, dict[str, Any]]) -> str:
+    """The number of a claim in words, with what is different about it for some samplers."""
+    words = {
+        name: claim["measured"].partition(", at the deciding μ")[0]
+        for name, claim in by_sampler.items()
+        if np.isfinite(claim["value"])
+    } or {"": next(iter(by_sampler.values()))["measured"]}
+    usual, *_ = words.values()
+    others: dict[str, list[str]] = {}
+    for name, text in words.items():
+        if text != usual:
+            others.setdefault(_different(text, usual), []).append(SAMPLERS[name])
+    notes = [f"{', '.join(names)}: {what}" for what, names in others.items()]
+    return f"{usual} ({'; '.join(notes)})" if notes else usual
+
+
+def _different(text: str, usual: str) -> str:
+    """The parts of a text, separated by commas, that another lacks; only η3 if it has η2 there."""
+    known = usual.split(", ")
+    parts = []
+    for part in text.split(", "):
+        if part.replace("exact η3", "η2").replace("η3", "η2") in known and part not in known:
+            parts.append("η3")
+        elif part not in known:
+            parts.append(part)
+    return ", ".join(dict.fromkeys(parts))
 
 
 def _cell(claim: dict[str, Any]) -> str:

@@ -207,7 +207,7 @@ def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job
         rows = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
         drawn, lead, text = responses(rows)
-        table = claims.claims("store", "The paper's claims and the results", opened=True)
+        table = claims.claims(2, opened=True)
         return Shown(lead, drawn, details=text + table)
 
     return work
