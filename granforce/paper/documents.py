@@ -75,7 +75,8 @@ NAMED = (  # claims that the README names if they are contradicted
     "η3 does not depend on how networks are sampled",
     "corr(f_n, ΔF_n) vanishes at large μ",
 )
-_CLAIM_HEADS = ("", "claim", "number", "value", "range", "n")
+_CLAIM_HEADS = ("", "claim, and the number that decides it", "value", "range", "n")
+UNBROKEN = "\u00a0…\u00a0"  # of a range, in narrow columns
 _SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
@@ -648,28 +649,29 @@ def _claim_line(by_sampler: dict[str, dict[str, Any]]) -> list[str]:
     claim = decisive(by_sampler)
     letter = f" ({PRL})" if claim["source"] == PRL else ""
     place = f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""
+    number = claim["measured"].partition(", at the deciding μ")[0]
     return [
         "<br>".join([SYMBOLS[claim["verdict"]], *_disagreeing(claim, by_sampler)]),
-        claim["statement"] + letter,
-        claim["measured"].partition(", at the deciding μ")[0],
-        _number(claim) + place,
-        claim["criterion"].replace("[", "(").replace("]", ")"),
+        f"{claim['statement']}{letter}<br><small>{number}</small>",
+        (_number(claim) + place).replace(" … ", UNBROKEN),
+        claim["criterion"].replace("[", "(").replace("]", ")").replace(" … ", UNBROKEN),
         str(claim["packings"] or ""),
     ]
 
 
 def _disagreeing(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
-    """The verdicts with another outcome than a claim's, as "symbol samplers".
+    """The verdicts with another outcome than a claim's, as "symbol sampler".
 
     A verdict for want of data is no outcome.
     """
     outcome = {verdict: word for word, verdicts in OUTCOMES.items() for verdict in verdicts}
-    names: dict[str, list[str]] = {}
-    for name, other in by_sampler.items():
-        verdict = other["verdict"]
-        if verdict not in _SCARCE and outcome[verdict] != outcome[claim["verdict"]]:
-            names.setdefault(SYMBOLS[verdict], []).append(_BRIEF.get(name, _HEADS[name]))
-    return [f"{symbol} {', '.join(of)}" for symbol, of in names.items()]
+    differ = [
+        (SYMBOLS[other["verdict"]], _BRIEF.get(name, _HEADS[name]))
+        for name, other in by_sampler.items()
+        if other["verdict"] not in _SCARCE
+        and outcome[other["verdict"]] != outcome[claim["verdict"]]
+    ]
+    return [f"{symbol}\u00a0{name}" for symbol, name in differ]
 
 
 def _beyond_notes(claims: Rows) -> list[str]:

@@ -530,18 +530,18 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         claim("e", "uniform", verdicts.CONTRADICTED),
     ]
     empty = tables.StudyTable({}, [], {}, [], {}, {})
-    assert "| ✗✗ | e |" in documents.claim_table(empty, stronger, 3)  # contradicted by both
+    assert "| ✗✗ | e<br>" in documents.claim_table(empty, stronger, 3)  # contradicted by both
     text = documents.claim_table(empty, judged, 3)
     rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
     rows = [[cell.strip() for cell in row] for row in rows]
-    assert rows[0] == ["", "claim", "number", "value", "range", "n"]
+    assert rows[0] == ["", "claim, and the number that decides it", "value", "range", "n"]
     marks = [
-        ["✓<br>✗ exact", "a"],
-        ["…<br>✓ exact", "b"],
-        ["✗✗<br>✓ nearest", "c"],  # want of data is no outcome
+        ["✓<br>✗\u00a0exact", "a"],
+        ["…<br>✓\u00a0exact", "b"],
+        ["✗✗<br>✓\u00a0nearest", "c"],  # want of data is no outcome
         ["✗", "d (PRL)"],
     ]
-    assert [row[:2] for row in rows[2:]] == marks
+    assert [[row[0], row[1].removesuffix("<br><small>x</small>")] for row in rows[2:]] == marks
     lines = [line.split("|") for line in documents.outcome_counts(judged).splitlines()]
     assert [cell.strip() for cell in lines[-1][1:-1]] == ["all", "2", "1", "1"]
     assert "(#figure-3-networks-of-one-packing)" in lines[4][1]

@@ -8,6 +8,7 @@ import numpy as np
 
 from granforce.paper.claims import TOPICS, outcomes
 from granforce.paper.claims.verdicts import FEW, REPRODUCED, STRONGLY
+from granforce.paper.documents import UNBROKEN
 from granforce.types import Rows
 
 from ....results import study_data
@@ -20,7 +21,6 @@ SAMPLERS = {
     "exact": "exact",
     "": "packings alone",
 }
-UNBROKEN = "\u00a0…\u00a0"  # of a range
 PAPER = "Shaebani, Unger, Kertész, PRE 79, 052302 (2009)"
 HEAD = "<tr><th>claim</th>{}</tr>"
 TABLE = "<div class='judged'><table class='claims'>{}</table></div>"
