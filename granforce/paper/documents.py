@@ -678,8 +678,8 @@ def _beyond_notes(claims: Rows) -> list[str]:
     """Where the networks of each sampler leave S, in sentences."""
     beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
     return [
-        f"{_HEADS[name][0].upper()}{_HEADS[name][1:]}: not judged where it leaves S by more than "
-        f"the length of the exact intervals, at μ = {listed(beyond[name].split(', '))}.\n"
+        f"At μ = {listed(beyond[name].split(', '))}, networks ({_HEADS[name]}) are not judged: they "
+        "leave S by more than the length of the exact intervals.\n"
         for name in _used(claims)
         if beyond.get(name)
     ]
