@@ -186,8 +186,8 @@ class Growth:
     def add(self, state: Floats) -> tuple[float, float, float]:
         """Add a state (N_c, 2); return (η1, η2, η3) of all states so far."""
         if not self.count:
-            float_array(state, (-1, 2), "state")
-            self._first, self._low, self._high = state, state, state
+            # A copy: the caller may use one array for all states.
+            self._first = self._low = self._high = float_array(state, (-1, 2), "state")
             self._shift, self._square = np.zeros(state.shape), np.zeros(len(state))
         self.count += 1
         # Moments about the first state: if all are equal, their variance is exactly 0.

@@ -36,9 +36,11 @@ def proportion_interval(
 ) -> tuple[float, float, float]:
     """Fraction of ones among values 0 or 1 and its exact interval (Clopper and Pearson).
 
-    Unlike Student's, the interval has a length if all values are equal.
+    Unlike Student's, the interval has a length if all values are equal. NaN without values.
     """
     values = _finite(values)
+    if not len(values):
+        return (float("nan"),) * 3
     test = stats.binomtest(int(values.sum()), len(values))
     low, high = test.proportion_ci(level, "exact")
     return float(values.mean()), float(low), float(high)

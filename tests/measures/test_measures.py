@@ -64,6 +64,14 @@ def test_growing_measures_are_those_of_the_first_states(states):
         )
 
 
+def test_growing_measures_do_not_depend_on_the_array_of_a_state(states):
+    growth, buffer = measures.Growth(), np.empty_like(states[0])
+    for state in states:
+        buffer[:] = state
+        found = growth.add(buffer)
+    assert found == tuple(values[-1] for values in measures.growing(states).values())
+
+
 def test_growing_measures_of_one_state_are_zero(states):
     growing = measures.growing(np.repeat(states[:1], 4, axis=0))
     assert not np.any([growing["eta1"], growing["eta2"], growing["eta3"]])

@@ -23,6 +23,7 @@ def test_a_fraction_of_equal_values_has_an_interval():
     assert (value, high) == (1, 1) and low == pytest.approx(0.025 ** (1 / 3))
     value, low, high = statistics.proportion_interval([0.0, 1.0, 1.0, 0.0])
     assert value == 0.5 and low + high == pytest.approx(1)
+    assert np.isnan(statistics.proportion_interval([np.nan])).all()
 
 
 def test_bootstrap_resamples_each_group(rng):
