@@ -199,6 +199,11 @@ def test_distances_and_slices_follow_a_tilted_cell():
     assert 20 < np.count_nonzero(~found) < len(found) - 20
 
 
+def test_an_open_box_has_no_fractions_to_slice():
+    with pytest.raises(gf.InputError, match="this box is open"):
+        slices.outside(gf.scene("column", disks=3), (0, 0.5, 0, 1))
+
+
 def test_a_tilted_packing_is_tiled_by_its_lattice():
     packing = skewed(reference("n100_mu1_s12"))[0]
     S = gf.ensemble(packing)

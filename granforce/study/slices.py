@@ -23,9 +23,12 @@ def edges(given: Sequence[float]) -> list[float]:
 def outside(packing: Packing, slice_: Sequence[float]) -> Mask:
     """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (fractions of a and b).
 
-    Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.
+    Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1, and if the box is open.
     """
     x0, x1, y0, y1 = edges(slice_)
+    if not np.isfinite(packing.volume):
+        words = "is in fractions of the sides of a periodic box, and this box is open; leave it out"
+        raise InputError.of("slice", slice_, words)
     cell, contacts = packing.cell, packing.contacts
     x = cell.wrapped(packing.x)
     place = cell.parts(x)
