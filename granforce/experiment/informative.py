@@ -75,6 +75,7 @@ def informative(
     k, check = whole(k, "k", 1), whole(check, "check")
     if sample is None:
         sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
+        cancelling.check("uniform sample")  # cancelling leaves it shorter
     else:
         ensemble.refuse_foreign(sample.states, sample.residual, "the sample")
     normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)

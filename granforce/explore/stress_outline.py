@@ -114,12 +114,13 @@ def admissible_stress(
     """A stress (3,) that the contacts can carry at the packing's pressure, well inside the outline.
 
     σ_xx, σ_yy and σ_xy, force per length, as ``ensemble(packing, prescribed="stress", stress=…)``
-    takes them. workers, progress, cancel: as for `outline`.
+    takes them. workers, progress: as for `outline`. cancel() returning True raises Cancelled.
 
     Raises InputError as `stress_outline`.
     """
     axes = stress_axes(ensemble)
     polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
+    cancelling.check("outline of stresses")
     return stress_inside(polygons.inner, ensemble.packing.pressure)
 
 

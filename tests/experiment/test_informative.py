@@ -108,6 +108,18 @@ def test_bad_questions_are_told(S):
         informative(S, cancel=lambda: True)
 
 
+def test_a_sample_cut_short_is_not_ranked(S, monkeypatch):
+    drawn = []
+
+    def sample_of(*arguments, **options):
+        drawn.append(sample_uniform(*arguments, **options))
+        return drawn[0]
+
+    monkeypatch.setattr("granforce.experiment.informative.sample_uniform", sample_of)
+    with pytest.raises(Cancelled):
+        informative(S, check=0, states=20, cancel=lambda: bool(drawn))
+
+
 def test_what_carries_for_certain_is_what_exact_bounds_say():
     """Of contacts not measured: the lower bound over all networks within 3 σ of the others."""
     S = ensemble(reference("n100_mu0.1_s11"))

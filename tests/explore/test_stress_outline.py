@@ -97,3 +97,15 @@ def test_conditions_without_outline_are_told(S):
         gf.stress_outline(gf.ensemble(S.packing, frozen=np.arange(0, 164, 4)))
     with pytest.raises(gf.InputError, match="number of angles"):
         gf.stress_outline(S, 0)
+
+
+def test_a_cancelled_outline_gives_no_stress(S, monkeypatch):
+    drawn = []
+
+    def outline(*arguments, **options):
+        drawn.append(gf.outline(*arguments, **options))
+        return drawn[0]._replace(inner=np.empty((0, 2)), converged=False)
+
+    monkeypatch.setattr("granforce.explore.stress_outline.outline", outline)
+    with pytest.raises(gf.Cancelled):
+        gf.admissible_stress(S, cancel=lambda: bool(drawn))
