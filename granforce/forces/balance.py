@@ -108,6 +108,12 @@ def left_open_in(packing: Packing) -> Mask:
     return np.any(np.isnan(packing.load), axis=1)
 
 
+def mean_load(packing: Packing) -> float:
+    """Mean size of the known loads (largest component, torques over r_max), force; 0 for none."""
+    load = np.abs(np.nan_to_num(packing.load) / [1.0, 1.0, packing.r.max()]).max(axis=1)
+    return float(load[load > 0].mean()) if load.any() else 0.0
+
+
 def rows_per_grain(contacts: Contacts, mu: float) -> int:
     """3 (two forces and a torque), or 2 if no force can turn a grain: disks without friction."""
     return 3 if mu > 0 or contacts.levers is not None else 2
@@ -119,17 +125,17 @@ def equations(
     """A (rows, unknowns), b (rows,) of the free contacts (k,), and the scale ⟨f_n⟩ of forces.
 
     Rows are those of the grains (M,), then of the stress as by `prescribed_stress`. held (N_c,):
-    frozen contacts. The scale is the packing's own mean |f_n| where nothing is prescribed.
+    frozen contacts. The scale is the packing's own mean |f_n| where nothing is prescribed, or its
+    mean load without forces.
     """
     contacts, original = packing.contacts.picked(free), packing.forces[free]
     A, b = _balance(packing, contacts, grains, held, mu)
     if stress is None:
-        scale = float(np.mean(np.abs(original[:, 0])))
+        scale = float(np.mean(np.abs(original[:, 0]))) or mean_load(packing) or 1.0
     else:
         rows, values = _conditions(packing, contacts, mu, stress)
         A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
-        b, scale = np.append(b, values), values[0]
-    scale = float(scale) or 1.0
+        b, scale = np.append(b, values), float(values[0])
     A = _without_rounding(A, len(grains) * rows_per_grain(contacts, mu), contacts)
     if held.any():
         b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)

@@ -63,7 +63,7 @@ class Ensemble:
     A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then stress
     b: Floats  # (rows,) force
     # ⟨f_n⟩ = Σ f_n ℓ / Σ ℓ, force: 2 P0 V / Σ ℓ in every network where the pressure is prescribed,
-    # otherwise the mean |f_n| of the packing's own network
+    # otherwise the mean |f_n| of the packing's own network, or its mean load without forces
     force_scale: float
     original: Floats  # (N_c, 2) the packing's own network on these contacts
     frozen: Integers  # contacts held at their original forces, as positions in packing.contacts

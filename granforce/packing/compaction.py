@@ -43,11 +43,10 @@ from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every CHECK_EVERY steps, once no grain's momentum changes by more than
-# NEARLY_BALANCED in a step, in ⟨f_n⟩.
+# NEARLY_BALANCED in a step, in ⟨f_n⟩; beyond SEVERAL disks, later by the square of their number, as
+# the many places where grains still move need many systems.
 CHECK_EVERY = 25
 NEARLY_BALANCED = 0.02
-# Beyond SEVERAL disks, later by the square of their number: the many places where grains still move
-# need many systems.
 # Longest time step, and most sweeps in it. From SETTLED_FROM on, steps of 0.1 leave wider intervals
 # than shorter ones, by 8 % at μ = 0.3, 13 % at 0.5, half at 1. Steps of 0.03 and less agree if the
 # last sweeps of a step settle, and then a quarter of the sweeps is enough.

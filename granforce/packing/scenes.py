@@ -298,16 +298,20 @@ def _column(mu: float, disks: int = 10, angle: float = 30.0) -> Sketch:
     return _resting(x, [[0, height, 0, 0], [0, 0, width, 0], [width, 0, width, height]])
 
 
-def _pressed(mu: float, disks: int, packed_mu: float, dimension: int) -> Packing:
-    """A number of disks compressed in a periodic box: the first seed with this dimension h."""
-    for seed in range(1, MOST_SEEDS):
-        try:
-            packing = pack(disks, mu=packed_mu, seed=seed)
-            if ensemble(packing).dimension == dimension:
-                return packing._replace(mu=mu, info=packing.info | {"packed_mu": packed_mu})
-        except (NotJammedError, UndecidedError):
-            continue
-    raise InputError(f"no {disks} disks of {MOST_SEEDS} seeds have h = {dimension}")
+def _pressed(disks: int, packed_mu: float, dimension: int) -> Callable[[float], Packing]:
+    """Makes disks compressed in a periodic box: the first seed with this dimension h."""
+
+    def make(mu: float) -> Packing:
+        for seed in range(1, MOST_SEEDS + 1):
+            try:
+                packing = pack(disks, mu=packed_mu, seed=seed)
+                if ensemble(packing).dimension == dimension:
+                    return packing._replace(mu=mu, info=packing.info | {"packed_mu": packed_mu})
+            except (NotJammedError, UndecidedError):
+                continue
+        raise InputError(f"no {disks} disks of {MOST_SEEDS} seeds have h = {dimension}")
+
+    return make
 
 
 def _many(mu: float) -> Packing:
@@ -323,16 +327,16 @@ SCENES = {
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
     "six": _Scene(
         "Six disks under pressure", 0.5,
-        partial(_pressed, disks=6, packed_mu=0.3, dimension=2), packed=True,
+        _pressed(disks=6, packed_mu=0.3, dimension=2), packed=True,
     ),
     "solid": _Scene(
         "Six disks, S a solid body", 0.5,
-        partial(_pressed, disks=6, packed_mu=0.3, dimension=3), packed=True,
+        _pressed(disks=6, packed_mu=0.3, dimension=3), packed=True,
     ),
     "column": _Scene("Ten disks in a column", 0.3, _column),
     "thirteen": _Scene(
         "Thirteen disks under pressure", 0.3,
-        partial(_pressed, disks=13, packed_mu=0.1, dimension=8), packed=True,
+        _pressed(disks=13, packed_mu=0.1, dimension=8), packed=True,
     ),
     "many": _Scene("Disks under pressure", 0.1, _many),
 }  # fmt: skip

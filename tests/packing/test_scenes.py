@@ -266,6 +266,7 @@ def pressed(x, wall):
     [
         (lambda: gf.scene("grove"), "choose one of groove, box"),
         (lambda: gf.scene("box", disks=3), "no option 'disks'"),
+        (lambda: gf.scene("six", disks=5), "it has no options"),
         (lambda: gf.scene("groove", angle=200), "angle must lie between 10 and 180"),
         (lambda: gf.scene("groove", -1), "friction"),
         (lambda: assembled([[0, 0], [0, 1]], [1, 1], [], np.zeros((2, 3)), 0), "two disks overlap"),
@@ -279,6 +280,16 @@ def pressed(x, wall):
 def test_what_cannot_be_a_scene_is_refused(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e12])
+def test_without_forces_the_loads_give_their_unit(unit):
+    """A sketch in newtons has the bounds of one in the weight of a disk."""
+    packing = sketched("pyramid")
+    exact = gf.intervals(gf.ensemble(packing))
+    other = gf.intervals(gf.ensemble(packing._replace(load=unit * packing.load)))
+    assert exact.converged and other.converged
+    np.testing.assert_allclose(other.high / unit, exact.high, atol=1e-7)
 
 
 def test_an_unbalanced_sketch_is_there_to_be_looked_at():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.forces.balance import left_open_in
+from granforce.forces.balance import left_open_in, mean_load
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
@@ -262,9 +262,8 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     contacts = contacts._replace(
         arm_i=r[contacts.i] + contacts.gap / 2, arm_j=r[contacts.j] + contacts.gap / 2
     )
-    force = np.abs(packing.load / [1.0, 1.0, r.max()]).max(axis=1)
     forces = np.zeros_like(packing.forces)
-    forces[:, 0] = force[force > 0].mean()  # the scale of tolerances
+    forces[:, 0] = mean_load(packing)  # the scale of tolerances
     packing = packing._replace(contacts=contacts, forces=forces)
     settled = _settled(packing)
     try:
