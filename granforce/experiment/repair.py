@@ -238,7 +238,7 @@ def _without_doubled_names(listing: Listing, account: Account) -> Listing:
     repeats = np.flatnonzero(first[which] != np.arange(len(which)))
     texts = [
         f"{listing.place(0, k)}: id {plain(listing.ids[k])} already appears in line "
-        f"{int(listing.lines[0][first[which[k]]])} already"
+        f"{int(listing.lines[0][first[which[k]]])}"
         for k in repeats
     ]
     account.note("doubled_grains", texts, listing.x[repeats])

@@ -19,6 +19,7 @@ from granforce.records import (
     positive,
     random_seed,
     real,
+    refuse_shapes,
     takes,
     whole,
 )
@@ -95,8 +96,10 @@ def synthetic_frame(
     with their direction and force; False: grains there are only flagged. pixels: per unit of
     length; newton: mean normal force. number: of the frame.
 
-    Raises InputError for values below 0 or beyond 10⁶⁰, and for a packing without forces.
+    Raises InputError for values below 0 or beyond 10⁶⁰, and for a packing without forces or with
+    bodies other than disks.
     """
+    refuse_shapes(packing, "photoelastic frames are made")
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
         if not 0 <= real(value, name) <= LARGEST_UNIT or (name == "missed" and value >= 1):
             raise InputError(

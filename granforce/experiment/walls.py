@@ -214,13 +214,15 @@ def wall_contacts(
     touching = at_wall[:, None] & (gap <= reach * r.mean())
     touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
     g, w = np.nonzero(touching)
-    m, f = np.full((len(g), 2), np.nan), np.ones(len(g))
+    m, f, taken = np.full((len(g), 2), np.nan), np.ones(len(g)), np.zeros(len(g), dtype=bool)
     for k, of in enumerate(grain):
         candidates = np.flatnonzero(g == of)
         if np.isfinite(beta[k]):  # the side to which the angle points
             best = candidates[np.argmax(ways[g[candidates], w[candidates]] @ normal[k])]
-        else:
-            best = candidates[np.argmin(gap[g[candidates], w[candidates]])]
+        else:  # the nearest side; several lines of one grain are contacts with several sides
+            some = candidates[~taken[candidates]] if not taken[candidates].all() else candidates
+            best = some[np.argmin(gap[g[some], w[some]])]
+        taken[best] = True
         m[best], f[best] = forces[k], factor[k]
     return WallContacts(
         grain=g, wall=w, normal=ways[g, w], forces=m, factor=f, names=outline.names, outline=outline

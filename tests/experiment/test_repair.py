@@ -133,6 +133,8 @@ def test_grains_and_lines_given_twice():
     again = [1, 7001, inner[0][2] + 1, inner[0][3], inner[0][4], 0]  # another name, same place
     found = read([*grains, again, inner[1]], rows)
     assert found.report["doubled_grains"] == 2 and len(found.packing.r) == len(grains)
+    named = f"id {inner[1][1]} already appears in line {grains.index(inner[1]) + 1}"
+    assert any(one.text.endswith(named) for one in found.findings)
     # What was measured on the double belongs to the grain.
     moved = [[1, 7001, *row[2:]] if row[1] == inner[0][1] else row for row in rows]
     both = read([*grains, again], moved)

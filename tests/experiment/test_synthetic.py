@@ -8,6 +8,7 @@ from granforce.experiment.pegs import read_pegs
 from granforce.experiment.remeasured import remeasured
 from granforce.experiment.synthetic import synthetic_frame
 from granforce.forces.build import ensemble
+from granforce.packing.scenes import scene
 from granforce.records import InputError
 
 
@@ -83,5 +84,7 @@ def test_what_is_wrong_is_told():
     for options in (*wrong, {"noise": 1e200}):
         with pytest.raises(InputError):
             synthetic_frame(packing, **options)
+    with pytest.raises(InputError, match="for disks only"):
+        synthetic_frame(scene("ladder"))
     with pytest.raises(InputError, match="no forces to measure"):
         synthetic_frame(packing._replace(forces=0 * packing.forces))

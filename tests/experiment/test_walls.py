@@ -114,3 +114,11 @@ def test_words_for_walls():
 def test_what_is_wrong_about_walls_is_told(options, words):
     with pytest.raises(InputError, match=words):
         read(*in_a_box(), **options)
+
+
+def test_two_lines_of_a_grain_without_angles_are_contacts_with_two_sides():
+    grains, rows = in_a_box()
+    corner = [[1, 1, wall, 0.0, force] for wall, force in ((-1, 1.0), (-2, 2.0))]
+    found = read(grains, rows + corner, walls="box")
+    at_wall = (found.packing.contacts.i == 0) & (found.packing.contacts.j >= len(grains))
+    assert found.measured[at_wall].tolist() == [[1.0, 0.0], [2.0, 0.0]]
