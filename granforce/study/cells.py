@@ -160,6 +160,9 @@ def scan_rows(store: Store) -> list[dict[str, Any]]:
         for name in set().union(*settings)
         if len({canonical(each.get(name)) for each in settings}) > 1
     )
+    own = all(entry.params["mu"] == entry.params["packing"]["mu"] for entry in entries)
+    if not own and len({entry.params["mu"] for entry in entries}) > 1:
+        differing.append("the friction of the cones")
     if differing:
         raise InputError(
             f"the walks in {store.path} differ in {', '.join(differing)}; give a store that "

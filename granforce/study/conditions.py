@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 
 from granforce.forces.knowledge import Known
-from granforce.records import InputError, choice, float_array, whole
+from granforce.records import InputError, choice, float_array, real, whole
 from granforce.study.keys import Parameters
 
 PRESCRIBED = "pressure", "stress", "none"
+# Values of unknown bounds in a row: f_n from below and above, f_t likewise.
+_UNKNOWN = -np.inf, np.inf, -np.inf, np.inf
 
 
 def conditions(
@@ -34,13 +36,11 @@ def conditions(
 
 def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
     """Rows of bounds, sorted by contact."""
-    if isinstance(known, Known):
-        contacts = np.atleast_1d(known.contacts)
-        bounds = np.stack(known.sides, axis=-1).reshape(-1, 4)
-        given: Sequence[Any] = [[c, *row] for c, row in zip(contacts, bounds.tolist(), strict=True)]
-    else:
-        given = known
+    given: Any = known
     try:
+        if isinstance(known, Known):
+            bounds = np.stack(known.sides, axis=-1).reshape(-1, 4)
+            given = np.column_stack([np.atleast_1d(known.contacts), bounds]).tolist()
         rows = [[contact, *bounds] for contact, *bounds in given]
     except (TypeError, ValueError):
         rows = [[]]
@@ -48,11 +48,24 @@ def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
         raise InputError(
             "each row of known forces must be a contact and four bounds: two on f_n, two on f_t"
         )
-    named = []
-    for contact, *bounds in rows:
-        bounds = [None if b is None or np.isinf(b) else float(b) for b in bounds]
-        named.append([whole(contact, "the number of a contact"), *bounds])
+    named = [
+        [whole(contact, "the number of a contact"), *map(_bound, bounds, _UNKNOWN)]
+        for contact, *bounds in rows
+    ]
     return sorted(named, key=lambda row: row[0])
+
+
+def _bound(given: Any, unknown: float) -> float | None:
+    """A bound as a float, or None if it is unknown."""
+    value = unknown if given is None else real(given, "a bound")
+    if value == unknown:
+        return None
+    if not np.isfinite(value):
+        raise InputError(
+            f"a bound on a known force is {value:g}; give a finite number, or where it is unknown "
+            "−inf from below and inf from above"
+        )
+    return value
 
 
 def of(parameters: Parameters) -> dict[str, Any]:

@@ -23,6 +23,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+import numpy as np
+
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
@@ -34,7 +36,9 @@ from granforce.perturb.critical_force import critical_forces
 from granforce.records import (
     InputError,
     Packing,
+    brief,
     choice,
+    friction,
     real_array,
     refuse_options,
     whole,
@@ -98,7 +102,8 @@ def scan(
     processes: in a script, which must be a file, call it under ``if __name__ == "__main__":``.
     """
     refuse_options(scan, packing, [*signature(kinds.PACKING.parameters).parameters][3:])
-    seeds, mus = whole(seeds, "seeds", 1), real_array(mu, "mu").ravel().tolist()
+    seeds, mus = whole(seeds, "seeds", 1), [friction(one) for one in real_array(mu, "mu").ravel()]
+    _check_dtypes(dtypes or {})
     if not mus:
         raise InputError("give at least one friction coefficient")
     for one in (a for a, b in pairwise(sorted(mus)) if a == b):
@@ -127,6 +132,16 @@ def scan(
         path, cells, workers=workers, scheduler=scheduler, dtypes=dtypes, progress=progress
     )
     return rows, [(kinds.typed(parameters), message) for parameters, message in failed]
+
+
+def _check_dtypes(dtypes: Mapping[str, str]) -> None:
+    """InputError unless only the states get another type, of floats."""
+    try:
+        kinds_of = {name: np.dtype(dtype).kind for name, dtype in dtypes.items()}
+    except (AttributeError, TypeError):
+        kinds_of = {"": ""}
+    if kinds_of not in ({}, {"states": "f"}):
+        raise InputError(f'dtypes may be {{"states": "float32"}}, got {brief(dtypes)}; correct it')
 
 
 def walks(

@@ -8,6 +8,7 @@ import pytest
 
 from granforce import measures
 from granforce.forces.build import ensemble
+from granforce.forces.knowledge import Known
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -15,8 +16,8 @@ from granforce.study.keys import canonical
 from granforce.study.store import open_store
 
 
-def cell(mu=0.3, seed=1, states=6, n=20, **options):
-    packing = kinds.PACKING.parameters(n, mu, seed)
+def cell(packed_mu=0.3, seed=1, states=6, n=20, **options):
+    packing = kinds.PACKING.parameters(n, packed_mu, seed)
     return kinds.WALK.parameters(packing, states, relax="nearest", **options)
 
 
@@ -53,8 +54,18 @@ def test_a_shorter_walk_that_was_rounded_or_thinned_is_not_gone_on_from(tmp_path
 
 def test_friction_is_quantised_in_names(tmp_path):
     store = open_store(tmp_path / "s")
-    study.get(store, kinds.WALK, cell(mu=0.3))
-    assert study.get(store, kinds.WALK, cell(mu=0.1 + 0.2))[1]
+    study.get(store, kinds.WALK, cell(0.3))
+    assert study.get(store, kinds.WALK, cell(0.1 + 0.2))[1]
+
+
+def test_rows_of_one_scan_have_cones_of_one_kind(tmp_path):
+    store = open_store(tmp_path / "s")
+    for mu in (0.1, 0.3):
+        study.get(store, kinds.WALK, cell(mu, mu=0.3))
+    assert [row["mu"] for row in study.scan_rows(store)] == [0.1, 0.3]
+    study.get(store, kinds.WALK, cell(0.1))
+    with pytest.raises(InputError, match="differ in the friction of the cones"):
+        study.scan_rows(store)
 
 
 def test_a_damaged_cell_is_computed_again(tmp_path):
@@ -187,13 +198,24 @@ NO_FRICTION = [-1, np.nan, np.inf, "much"]
             {"slice_": [[], [0, 1], [0, np.nan, 0, 1], "0,1,0,1"]},
         ),
         (kinds.INTERVALS.parameters, (MADE,), {"slice_": [[0.5, 0.2, 0, 1], [0, 2, 0, 1]]}),
+        (kinds.INTERVALS.parameters, (MADE,), {"known": [1, [[1]], [[-1, 0, 1, None, None]]]}),
+        (
+            kinds.INTERVALS.parameters,
+            (MADE,),
+            {"known": [[[1, low, 1, None, None]] for low in (np.nan, np.inf, "one")]},
+        ),
+        (
+            kinds.INTERVALS.parameters,
+            (MADE,),
+            {"known": [Known([1, 2], [0.0] * 3, [1.0] * 3), Known([1], [np.inf], [np.inf])]},
+        ),
         (kinds.OUTLINE.parameters, (MADE,), {"components": [[], [(0, 0)], [(0, 2), (1, 0)], [1]]}),
         (kinds.OUTLINE.parameters, (MADE,), {"tolerance": NOT_POSITIVE, "states": [{}]}),
         (kinds.PERTURBATION.parameters, (MADE,), {"random": [0, -1, 1.5, "some"]}),
         (kinds.PERTURBATION.parameters, (MADE,), {"seed": NOT_A_SEED, "random": [1]}),
         (kinds.PERTURBATION.parameters, (MADE,), {"contacts": [[], [-1], [np.nan]]}),
         (kinds.PERTURBATION.parameters, (MADE,), {"precision": NOT_POSITIVE}),
-        (kinds.PERTURBATION.parameters, (MADE,), {"rise": [*NOT_POSITIVE, 1, 2]}),
+        (kinds.PERTURBATION.parameters, (MADE,), {"rise": [*NOT_POSITIVE, 1.1, 2]}),
         (kinds.PERTURBATION.parameters, (MADE,), {"max_steps": NOT_WHOLE}),
     ],
 )

@@ -62,6 +62,21 @@ def test_an_interrupt_does_not_reach_workers_that_still_import(tmp_path, monkeyp
     assert (ran.returncode, "Traceback" in ran.stderr) == (0, False), ran.stderr
 
 
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"mu": [0.3, 0.1 + 0.2]}, "0.3 is given twice"),
+        ({"dtypes": {"states": "int8"}}, "dtypes may be"),
+        ({"dtypes": {"state": "float32"}}, "dtypes may be"),
+        ({"dtypes": "float32"}, "dtypes may be"),
+    ],
+)
+def test_what_no_scan_could_store_is_refused_before_it_begins(tmp_path, options, words):
+    with pytest.raises(InputError, match=words):
+        scan.scan(tmp_path / "s", **({"mu": 0.3, "n": 12, "states": 2, "workers": 1} | options))
+    assert not (tmp_path / "s").exists()
+
+
 def test_a_failed_cell_leaves_the_others(tmp_path):
     # Three disks do not always jam: whatever happens to them, the other cell is there.
     hopeless = cell()

@@ -9,24 +9,21 @@ import xarray as xr
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble
 from granforce.perturb.critical_force import (
-    LEAST_PRECISION,
-    MOST_PRECISION,
     MOST_STEPS,
     RISE,
     CriticalForce,
+    Protocol,
+    checked,
     critical_force,
     critical_forces,
 )
-from granforce.records import InputError, positive, random_seed, whole
+from granforce.records import InputError, random_seed, whole
 from granforce.study.cells import Kind, load, save
 from granforce.study.keys import Parameters
 from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
 from granforce.study.responses import contact_dataset, perturbation_dataset
 from granforce.study.store import Store
 from granforce.types import Integers, Progress
-
-# Parameters of how loads on a contact are raised.
-PROTOCOL = ("precision", "rise", "max_steps")
 
 
 def _perturbation_parameters(
@@ -66,16 +63,8 @@ def _perturbation_parameters(
 
 def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
     """Parameters of how loads are raised; `rise` and `max_steps` only if not the default."""
-    named = {
-        "precision": positive(precision, "precision", least=LEAST_PRECISION, most=MOST_PRECISION)
-    }
-    if rise != RISE:
-        named["rise"] = positive(rise, "rise")
-        if named["rise"] >= 1:
-            raise InputError(f"rise must be below 1, got {rise:g}")
-    if max_steps != MOST_STEPS:
-        named["max_steps"] = whole(max_steps, "max_steps", 1)
-    return named
+    given, usual = checked(Protocol(precision, rise, max_steps))._asdict(), Protocol()._asdict()
+    return {name: v for name, v in given.items() if name == "precision" or v != usual[name]}
 
 
 def _perturbation(
@@ -103,7 +92,7 @@ def _perturbed(
     progress: Progress | None,
 ) -> list[xr.Dataset]:
     """Datasets of the single contacts, in order, loaded from the store if possible."""
-    shared = ("packing", "mu", *PROTOCOL, "prescribed", "stress")
+    shared = ("packing", "mu", *Protocol._fields, "prescribed", "stress")
     common = {name: parameters[name] for name in shared if name in parameters}
     named = {c: PERTURBED_CONTACT.parameters(contact=int(c), **common) for c in chosen}
     parts = {c: load(store, PERTURBED_CONTACT, named[c]) for c in chosen}
@@ -133,7 +122,7 @@ def _perturbed(
 
 
 def _named_protocol(parameters: Parameters) -> dict[str, Any]:
-    return {name: parameters[name] for name in PROTOCOL if name in parameters}
+    return {name: parameters[name] for name in Protocol._fields if name in parameters}
 
 
 def _perturbed_contact_parameters(
