@@ -357,8 +357,7 @@ class Store(Mapping[str, xr.Dataset]):
                 for key, value in parameters.items()
             )
 
-        of_kind = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]
-        return self._read([name for name in of_kind if fits(name)])
+        return self._read([name for name in self._names(kind) if fits(name)])
 
     def size(self) -> int:
         """Bytes on disk, including temporaries of running writers."""
@@ -369,8 +368,7 @@ class Store(Mapping[str, xr.Dataset]):
 
         Raises InputError if the store cannot be written.
         """
-        all_names = self._names() if self.exists else []
-        names = [name for name in all_names if kind in (None, name.rpartition("-")[0])]
+        names = self._names(kind) if self.exists else []
         self.remove(*names)
         return len(names)
 
@@ -395,19 +393,20 @@ class Store(Mapping[str, xr.Dataset]):
                 _remove(item)
         return len(stale)
 
-    def verify(self) -> list[Verdict]:
-        """A list of `Verdict`: every entry read in full and compared with its checksum."""
+    def verify(self, kind: str | None = None) -> list[Verdict]:
+        """A list of `Verdict`: entries, or those of a kind, compared in full with checksums."""
         verdicts = []
-        for name in self._names():
+        for name in self._names(kind):
             dataset, reason = entries.checked(self.path / name)
             if dataset is not None or reason:  # otherwise it was removed meanwhile
                 verdicts.append(Verdict(name, not reason, reason))
         return verdicts
 
-    def _names(self) -> list[str]:
-        """Names of all entries, readable or not, sorted."""
+    def _names(self, kind: str | None = None) -> list[str]:
+        """Names of all entries, or those of one kind, readable or not, sorted."""
         self._refuse_missing()
-        return sorted(name for name in os.listdir(self.path) if keys.ENTRY.fullmatch(name))
+        names = sorted(name for name in os.listdir(self.path) if keys.ENTRY.fullmatch(name))
+        return [name for name in names if kind in (None, name.rpartition("-")[0])]
 
     def _refuse_missing(self) -> None:
         if not self.exists:

@@ -311,6 +311,7 @@ def test_cache_commands(run):
     assert run("cache", "verify")[0] == 0
     assert json.loads(run("cache", "clear", "--kind", "walk", "--json")[1])["removed"] == 1
     assert len(json.loads(run("cache", "list", "--json")[1])) == 1
+    assert json.loads(run("cache", "verify", "--kind", "frame", "--json")[1]) == []
     for kind in ("wlk", "", "*"):
         code, out, err = run("cache", "verify", "--kind", kind)
         assert (code, out, err.count("\n")) == (2, "", 1) and "choose one of packing, walk" in err

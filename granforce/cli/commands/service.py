@@ -24,6 +24,7 @@ from granforce.cli.parsing import LONGEST, ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study import kinds
 from granforce.study.keys import Parameters
+from granforce.study.series import FRAME
 from granforce.study.store import Entry, Store, open_store, refuse_newer
 from granforce.system.files import make_folder
 from granforce.system.plain import json_text, spaced
@@ -177,11 +178,7 @@ def cache(arguments: argparse.Namespace) -> int:
             {"path": str(store.path), "entries": len(entries), "bytes": size}, arguments.json
         )
     elif arguments.action == "verify":
-        verdicts = [
-            v._asdict()
-            for v in store.verify()
-            if arguments.kind is None or v.name.startswith(f"{arguments.kind}-")
-        ]
+        verdicts = [verdict._asdict() for verdict in store.verify(arguments.kind)]
         print_list(verdicts, ("name", "ok", "reason"), arguments.json)
         return 0 if all(verdict["ok"] for verdict in verdicts) else 1
     else:
@@ -227,7 +224,6 @@ def _contents(parameters: Parameters) -> str:
 
 def _check_kind(store: Store, kind: str) -> None:
     """InputError for a name that is neither a kind of result nor the beginning of other entries."""
-    if kind not in kinds.KINDS and not any(store.path.glob(f"{glob.escape(kind)}-*")):
-        raise InputError(
-            f"unknown kind of result {kind[:40]!r}; choose one of {', '.join(kinds.KINDS)}"
-        )
+    known = [*kinds.KINDS, FRAME.name]
+    if kind not in known and not any(store.path.glob(f"{glob.escape(kind)}-*")):
+        raise InputError(f"unknown kind of result {kind[:40]!r}; choose one of {', '.join(known)}")
