@@ -7,6 +7,7 @@ import numpy as np
 
 from granforce.bench.report import note
 from granforce.experiment.pegs import read_pegs
+from granforce.experiment.regions import REGIONS
 from granforce.experiment.remeasured import remeasured
 from granforce.experiment.synthetic import synthetic_frame
 from granforce.forces.build import ensemble
@@ -22,8 +23,6 @@ CASES = (
     *((0.2, 0.1, wrong) for wrong in (0.5, 0.8, 1.5, 3.0)),
 )
 MU, REACH, STATES = 0.3, 0.05, 100
-# Parts per side of the frame in which the stress is computed.
-_REGIONS = 3
 # Number of contacts whose measured f_n is changed by this many ⟨f_n⟩, to test their detection.
 _SPOILT, _BY = 5, 3.0
 
@@ -102,10 +101,10 @@ def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
     c = S.contacts
     x = S.packing.x[c.i] + 0.5 * c.length[:, None] * c.normal
     low, high = S.packing.x.min(axis=0), S.packing.x.max(axis=0) * (1 + 1e-9)
-    cell = np.clip((_REGIONS * (x - low) / (high - low)).astype(int), 0, _REGIONS - 1)
-    cell = cell @ [_REGIONS, 1]
+    cell = np.clip((REGIONS * (x - low) / (high - low)).astype(int), 0, REGIONS - 1)
+    cell = cell @ [REGIONS, 1]
     of, exact = (
-        np.bincount(cell, np.nan_to_num(f[:, 0]) * c.length, _REGIONS**2) for f in (forces, true)
+        np.bincount(cell, np.nan_to_num(f[:, 0]) * c.length, REGIONS**2) for f in (forces, true)
     )
     return np.abs(of - exact).mean() / exact.mean()
 

@@ -9,7 +9,6 @@ again from the resulting network with noise on every force.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,9 +17,9 @@ from granforce import notebook
 from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
-from granforce.motion.flow import Outcome, Push
+from granforce.motion.flow import Push
 from granforce.motion.inertia import make_step
-from granforce.motion.works import follow, relax
+from granforce.motion.works import relax, relax_all
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Mask
@@ -79,13 +78,11 @@ def rest(
         return Rest(False, np.nan, noise, none, _on_all(S, first.forces), why)
     rng = np.random.default_rng(random_seed(seed))
     starts = [
-        first.forces + level * rng.standard_normal(forces.shape)
+        _from(first.forces + level * rng.standard_normal(forces.shape))
         for level in noise
         for _ in range(draws)
     ]
-    ends: dict[int, Outcome] = {}
-    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__)
-    outcomes = [ends[k] for k in range(len(starts))]
+    outcomes = relax_all(step, starts)
     stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)
     distance = float(np.abs(first.forces - forces).max())
@@ -105,10 +102,6 @@ def _reason(noise: tuple[float, ...], moved: Integers, draws: int) -> str:
 
 def _from(forces: Floats) -> Push:
     return Push(forces, 0, 0.0, MOST_STEPS, flow.STEADY)
-
-
-def _one(push: Push) -> Generator[Push, Outcome, Outcome]:
-    return (yield push)
 
 
 def _on_all(S: Ensemble, forces: Floats) -> Floats:

@@ -38,13 +38,18 @@ Work = Generator[Push, Outcome, Any]
 
 def relax(step: Step, push: Push) -> Outcome:
     """The Outcome of the flow for a Push."""
+    return relax_all(step, [push])[0]
 
-    def one() -> Generator[Push, Outcome, Outcome]:
-        return (yield push)
 
-    outcomes: list[Outcome] = []
-    follow(step, [one()], lambda _, outcome: outcomes.append(outcome))
-    return outcomes[0]
+def relax_all(step: Step, pushes: Sequence[Push]) -> list[Outcome]:
+    """The Outcome of the flow for each Push, in their order."""
+    ends: dict[int, Outcome] = {}
+    follow(step, [_one(push) for push in pushes], ends.__setitem__)
+    return [ends[k] for k in range(len(pushes))]
+
+
+def _one(push: Push) -> Generator[Push, Outcome, Outcome]:
+    return (yield push)
 
 
 def follow(
