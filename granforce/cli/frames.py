@@ -12,6 +12,7 @@ from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, different, 
 from granforce.cli.tables import write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
+from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, brief_list, whole, worker_count
 from granforce.study import series
@@ -80,6 +81,7 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
         )
     print_notes(f"{snapshots.word} {number}: {message}" for number, message in failed)
     if dataset is not None:
+        refuse_idle_reverse(dataset["forces"].values, arguments.reverse)
         where: dict[str, list[str]] = {}
         for number, notes in json.loads(dataset.attrs["notes"]).items():
             for note in notes:

@@ -18,6 +18,7 @@ from packings import packed
 from granforce.cli import commands, parser, parsing
 from granforce.cli import frames as series_of_frames
 from granforce.forces.build import ensemble
+from granforce.packing.exporters import save_lammps
 from granforce.packing.importers import load_packing, read_table, save_packing
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.scenes import scene
@@ -303,6 +304,12 @@ def test_a_sign_that_changes_nothing_is_refused(tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "new.npz").exists()
     with pytest.raises(InputError, match="leave it out"):
         read_table("two.csv", "pair.csv", mu=0.3, reverse=True)
+    save_lammps(packed(20, 0.0), "grains.dump", "contacts.dump")
+    for many in ("", " --frames all --cache store --out all.zarr"):
+        line = f"import lammps grains.dump contacts.dump --mu 0 --reverse{many}"
+        assert parser.main(line.split()) == 2
+        assert "every tangential force is 0" in capsys.readouterr().err
+    assert not (tmp_path / "all.zarr").exists()
 
 
 def test_the_suffix_of_a_scan_decides_between_table_and_store(here, capsys, monkeypatch):

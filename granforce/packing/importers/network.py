@@ -16,7 +16,7 @@ from granforce.packing.closing import apart, margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
 from granforce.system.plain import counted
-from granforce.tolerances import CARRYING, NO_EQUILIBRIUM, RIGID_OVERLAP
+from granforce.tolerances import CARRYING, NO_EQUILIBRIUM, RIGID_OVERLAP, ROUNDING
 from granforce.types import Floats, Integers
 
 # Unbalance of the loads of an open set, in ⟨f_n⟩, that is attributed to digits lost in the file and
@@ -85,8 +85,9 @@ def with_edge(packing: Packing, advice: str = "") -> Packing:
 
 
 def refuse_idle_reverse(forces: Floats, reverse: bool) -> None:
-    """InputError if reversing the sign of f_t is requested and no f_t of forces (k, 2) has one."""
-    if reverse and not np.nan_to_num(forces[:, 1]).any():
+    """InputError if reversing the sign of f_t is requested and all f_t of forces (…, 2) are 0."""
+    normal, tangential = np.moveaxis(np.abs(np.nan_to_num(forces)), -1, 0)
+    if reverse and tangential.max(initial=0.0) <= ROUNDING * normal.max(initial=0.0):
         raise InputError(
             "--reverse (reverse=True) has no effect, as every tangential force is 0: leave it out"
         )
