@@ -94,7 +94,7 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
     quick: only the 100-disk files; otherwise 400 disks at μ = 0.1 as well (two minutes).
     """
     names = ["n100_mu0.1_s11", "n100_mu1_s12"] + ([] if quick else ["n400_mu0.1_s13"])
-    table: list[dict[str, Any]] = []
+    compared: list[dict[str, Any]] = []
     for name in names:
         system, data = read_reference(Path(folder) / f"{name}.npz")
         intervals(system, system.index[:1])  # compiles
@@ -109,8 +109,8 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict
         plain = rows["plain loop"]["seconds"]
         for method, row in rows.items():
             timing = {"packing": name, "method": method, "seconds": row["seconds"]}
-            table.append(timing | {"ratio": plain / row["seconds"]} | row)
-    return table
+            compared.append(timing | {"ratio": plain / row["seconds"]} | row)
+    return compared
 
 
 def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Compaction: run time against overlap, against μ and N. Kernels are compiled before."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -75,10 +75,6 @@ def compaction_growth(
     return [*rows, {"n": "fit", "mu": mu, "exponent": exponent(jammed)}]
 
 
-def _keys(jammed: Sequence[dict[str, float]]) -> Iterable[str]:
-    return jammed[0] if jammed else ()
-
-
 def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
     settings = "".join(f", {name} {value:g}" for name, value in options.items())
     note(f"compaction: N = {n}, μ = {mu:g}{settings}")
@@ -86,7 +82,7 @@ def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
     packings = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
     jammed = [one for one in packings if one]
     row = {"n": n, "mu": mu, "seeds": seeds, "failed": len(packings) - len(jammed)}
-    for key in _keys(jammed):
+    for key in jammed[0] if jammed else ():
         row[key] = float(np.mean([one[key] for one in jammed]))
     if jammed:
         row["seconds"] = float(np.median([one["seconds"] for one in jammed]))

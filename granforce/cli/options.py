@@ -114,7 +114,7 @@ def add_series(command: Parser) -> None:
     group.add_argument(
         "--csv", type=Output, metavar="FILE.csv", help="write these lines as a table"
     )
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_scheduler(group)
     add_store(group)
     for action in command._actions:
@@ -292,7 +292,7 @@ def add_walk_options(command: Parser) -> None:
         "the nearest network",
     )
     group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
 
 
 def add_source(command: Parser) -> None:
@@ -350,6 +350,10 @@ def add_states_out(command: Parser) -> None:
     command.leaves_out("without --out", lambda arguments: arguments.out is None, {"unit"})
 
 
+def add_workers(command: argparse._ActionsContainer) -> None:
+    command.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+
+
 def add_scheduler(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--scheduler",
@@ -376,7 +380,7 @@ def add_exact(command: Parser) -> None:
         help="freeze the forces on contacts outside this part of the box, given as fractions of "
         "its sides, such as 0.2,0.8,0,1",
     )
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_out(group, "the result per contact")
     add_unit(group)
     add_conditions(command, also=", and with --slice")

@@ -33,6 +33,7 @@ from granforce.cli.options import (
     add_unit,
     add_walk_options,
     add_wall_contacts,
+    add_workers,
     import_format,
     subcommand,
     walls,
@@ -114,7 +115,7 @@ def add_uniform(commands: Commands) -> None:
     group.add_argument(
         "--effective", type=float, help="target effective sample size: continue until it is reached"
     )
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_conditions(command)
     add_store(command)
     add_states_out(command)
@@ -138,7 +139,7 @@ def add_volume(commands: Commands) -> None:
     )
     group.add_argument("--volume-seed", type=int, default=0, help="seed of the draws (default 0)")
     add_ensemble_mu(group)
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_conditions(command)
     add_store(command)
 
@@ -196,7 +197,7 @@ def add_infer(commands: Commands) -> None:
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
     add_ensemble_mu(group)
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_out(group, "the result per contact", "; with --frames all frames, as one dataset (.zarr)")
     add_unit(group)
     add_conditions(command)
@@ -265,7 +266,7 @@ def add_informative(commands: Commands) -> None:
     )
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
     add_ensemble_mu(group)
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_out(group, "the result per contact")
     add_unit(group)
     add_conditions(command)
@@ -559,7 +560,7 @@ def add_stress(commands: Commands) -> None:
         "--angles", type=int, default=64, help="number of directions in the table (default 64)"
     )
     add_known(group)
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_out(group, "the largest stress for each direction")
     add_store(command)
 
@@ -595,7 +596,7 @@ def add_perturb(commands: Commands) -> None:
         default=0.01,
         help="precision of F_crit, in units of ⟨f_n⟩ (default 0.01)",
     )
-    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_workers(group)
     add_out(group, "the result per contact")
     add_unit(group)
     add_conditions(command, known=False)

@@ -391,7 +391,7 @@ def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
     solution = highs.optimal(model)
     if solution is None:
         raise UndecidedError("which grains can be balanced is undecided: no solver reached an end")
-    off = np.abs(A @ np.maximum(solution[:columns], 0.0)).reshape(-1, 1 + S.per_contact)
+    off = np.abs(A @ np.maximum(solution[:columns], 0.0)).reshape(-1, S.per_grain)
     unbalance = np.zeros(len(packing.r))
     unbalance[S.grains] = off.sum(axis=1)
     return np.where(unbalance > _BALANCED, unbalance, 0.0)

@@ -271,8 +271,8 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
     centre = x[~inner].mean(axis=0)
     away = np.hypot(*(x - centre).T)
     start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
-    fitted = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
-    cut = fitted if shape == "annulus" else fitted[[0, 1, 3]]
+    best = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
+    cut = best if shape == "annulus" else best[[0, 1, 3]]
     return _outline(shape, ",".join(repr(float(value)) for value in cut))
 
 

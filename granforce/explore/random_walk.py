@@ -189,14 +189,9 @@ def walk(
 
 def _joined(walks: Sequence[Walk]) -> Walk:
     """The walks of several chains, one after the other."""
-    return Walk(
-        states=np.concatenate([one.states for one in walks]),
-        residual=np.concatenate([one.residual for one in walks]),
-        violation=np.concatenate([one.violation for one in walks]),
-        sweeps=np.concatenate([one.sweeps for one in walks]),
-        attempts=np.concatenate([one.attempts for one in walks]),
-        counts={name: sum(one.counts[name] for one in walks) for name in walks[0].counts},
-    )
+    *arrays, counts = zip(*walks, strict=True)
+    total = {name: sum(one[name] for one in counts) for name in counts[0]}
+    return Walk._make([*map(np.concatenate, arrays), total])
 
 
 def _groups(
@@ -318,9 +313,8 @@ class _Chain:
                 "last state shows; give the same arguments"
             )
         self.counts.update(begun.counts)
-        self.walk.states[:count], self.walk.residual[:count] = begun.states, begun.residual
-        self.walk.violation[:count], self.walk.sweeps[:count] = begun.violation, begun.sweeps
-        self.walk.attempts[:count] = begun.attempts
+        for kept, given in zip(self.walk[:-1], begun[:-1], strict=True):
+            kept[:count] = given
         self.forces = begun.states[-1]
         if watch is not None:
             for k in range(len(begun.states)):
@@ -379,11 +373,4 @@ class _Chain:
     def walked(self) -> Walk:
         """The walk with its states so far."""
         count = self.counts["accepted"] + self.counts["skipped"]
-        return Walk(
-            states=self.walk.states[:count],
-            residual=self.walk.residual[:count],
-            violation=self.walk.violation[:count],
-            sweeps=self.walk.sweeps[:count],
-            attempts=self.walk.attempts[:count],
-            counts=self.counts,
-        )
+        return Walk._make([*(kept[:count] for kept in self.walk[:-1]), self.counts])

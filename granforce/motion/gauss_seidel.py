@@ -172,7 +172,7 @@ def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     r = ensemble.packing.r[grains] / longest
     row_of = np.full(len(ensemble.packing.r), len(grains))
     row_of[grains] = np.arange(len(grains))
-    size = 1 + ensemble.per_contact
+    size = ensemble.per_grain
     count = len(contacts.i)
     held = int(np.any(row_of[np.concatenate([contacts.i, contacts.j])] == len(grains)))
     velocity = np.zeros((len(grains) + held, 3))

@@ -153,15 +153,11 @@ def disk_meets(x: Floats, r: float, corners: Floats, tolerance: float) -> Meetin
     nearest = sides.one + place[:, None] * sides.along
     distance = np.hypot(*(nearest - x).T)
     edge = int(np.argmin(distance))
-    return _round(x, r, nearest[edge], 0.0, tolerance)
+    return disks_meet(x, r, nearest[edge], 0.0, tolerance)
 
 
 def disks_meet(x: Floats, r: float, y: Floats, s: float, tolerance: float) -> Meeting:
     """The Meeting of two disks of centres x, y (2,) and radii r, s."""
-    return _round(x, r, y, s, tolerance)
-
-
-def _round(x: Floats, r: float, y: Floats, s: float, tolerance: float) -> Meeting:
     distance = float(np.hypot(*(y - x)))
     gap = distance - r - s
     if abs(gap) > tolerance or distance == 0:

@@ -39,11 +39,7 @@ def walk_of(dataset: xr.Dataset) -> Walk:
     """The Walk of a dataset that contains all its states."""
     counted = ("accepted", "rejected", "unconverged", "skipped")
     return Walk(
-        states=dataset["states"].values,
-        residual=dataset["residual"].values,
-        violation=dataset["violation"].values,
-        sweeps=dataset["sweeps"].values,
-        attempts=dataset["attempts"].values,
+        **{name: dataset[name].values for name in Walk._fields if name != "counts"},
         counts={name: dataset[name].item() for name in counted},
     )
 

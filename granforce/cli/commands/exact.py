@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.cli.report_lines import FEW
+from granforce.cli.report_lines import CRITICAL, FEW
 from granforce.cli.results import (
     StoredResult,
     conditions,
@@ -37,8 +37,7 @@ from granforce.study.cells import Kind
 from granforce.system.plain import counted
 from granforce.system.terminal import print_notes, print_report, report_after
 
-# Of COUNTS, which also has the work done.
-LOADS = ("loads_at_rest", "loads_moving", "loads_undecided")
+LOADS = COUNTS[:3]  # by outcome; then comes the work done
 
 
 def listed(columns: Mapping[str, Any]) -> dict[str, list[Any]]:
@@ -72,8 +71,7 @@ def perturb(arguments: argparse.Namespace) -> None:
         "mean_limit_load": float(dataset["limit_load"].mean()),
     }
     columns = contact_labels(arguments, parameters, dataset)
-    bounds = ("limit_load", "critical_low", "critical_high")
-    columns |= forces.named({name: dataset[name].values for name in bounds})
+    columns |= forces.named({name: dataset[name].values for name in CRITICAL})
     few, (inner, outer) = listed(columns), json.loads(dataset.attrs["fit_range"])
     if not few:
         reported["critical_force_deciles"] = np.quantile(load, np.linspace(0, 1, 11))
