@@ -444,12 +444,8 @@ def add_study(commands: Commands) -> None:
     group.add_argument(
         "--perturb-packings",
         type=int,
-        help="number of packings tested with larger load steps (default 3)",
-    )
-    group.add_argument(
-        "--perturb-contacts",
-        type=int,
-        help="number of contacts pushed in each of these (default 30)",
+        help="number of these packings that are also pushed with smaller load steps, and with more "
+        "implicit steps (default 3)",
     )
     group.add_argument(
         "--sizes", type=str, help="other numbers of disks (default 100,200,800,1600)"

@@ -97,7 +97,7 @@ _CONTENTS = {
     "uniform": "uniform networks",
     "response": "critical forces and first motions",
     "response_long": "critical forces, four times as many implicit steps",
-    "perturb": "critical forces, longer load steps",
+    "response_fine": "critical forces, load steps a quarter as long",
     "sweeps_": "the paper's walk",
     "prepared_": "walks and exact intervals, packings made with other options",
     "opened": "walks and exact intervals, frictionless packings with a larger μ in the Coulomb "
@@ -678,8 +678,8 @@ def _beyond_notes(claims: Rows) -> list[str]:
     """Where the networks of each sampler leave S, in sentences."""
     beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
     return [
-        f"At μ = {listed(beyond[name].split(', '))}, networks ({_HEADS[name]}) are not judged: they "
-        "leave S by more than the length of the exact intervals.\n"
+        f"At μ = {listed(beyond[name].split(', '))}, networks ({_HEADS[name]}) are not judged: "
+        "they leave S by more than the length of the exact intervals.\n"
         for name in _used(claims)
         if beyond.get(name)
     ]

@@ -162,11 +162,7 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     yield from _by_range(_values(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
     for part, word in (
         ("response_long", "with 600 implicit steps over that with 150"),
-        (
-            "perturb",
-            "with load steps of 0.4 of the distance to the limit load over that with 0.1 (not the "
-            "same contacts)",
-        ),
+        ("response_fine", "with load steps a quarter as long over that with the usual ones"),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
             ratios = _ratios(table.part(part), usual, name)

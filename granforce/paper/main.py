@@ -24,7 +24,7 @@ from granforce.system.terminal import Bar, print_list, table
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (
     *("n", "packings", "states", "gauss_seidel_packings", "response_packings"),
-    *("response_contacts", "perturb_packings", "perturb_contacts"),
+    *("response_contacts", "perturb_packings"),
 )
 
 

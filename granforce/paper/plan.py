@@ -2,8 +2,8 @@
 
 Parts, the most valuable first: "exact" (intervals, with z, h and φ), "walk" (by nearest networks)
 and "uniform" (uniform states of S), all three in the same packings; "response" (critical forces and
-first motions of random contacts, loads raised in tenths of the way), "response_long" (some of them
-with four times the implicit steps) and "perturb" (loads raised by 0.4 of the way); "sweeps_1e-3"
+first motions of random contacts), "response_long" and "response_fine" (some of them with four times
+the implicit steps, or with load steps a quarter as long); "sweeps_1e-3"
 (walks by Gauss–Seidel sweeps alone, as in the paper, which end at that residual in ⟨f_n⟩);
 "prepared_…" (walks and, with "…_exact", intervals of packings made with other options); "opened"
 and "opened_exact" (frictionless packings, cones opened to μ) and "widest_exact" (packings made at
@@ -25,7 +25,7 @@ import xarray as xr
 
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import NEARLY_BALANCED, default_steps
-from granforce.perturb.critical_force import MOST_STEPS
+from granforce.perturb.critical_force import MOST_STEPS, RISE
 from granforce.records import InputError
 from granforce.study import kinds, scan
 from granforce.study.cells import Kind, StudyCell, load
@@ -57,8 +57,7 @@ CHAINS = LANES
 # The residual that most attempts do not reach at large μ: requested for fewer states.
 HARDEST, HARDEST_STATES = "sweeps_1e-6", 200
 LONGER_WALK = 4  # factor, to test whether η depends on the length
-# Fraction of the way from the last load at rest to the limit load.
-RISE, LONGER = 0.1, 4
+LONGER, FINER = 4, 4  # factors of the implicit steps of a load, and of the number of loads
 
 
 def variations(mu: float) -> dict[str, dict[str, Any]]:
@@ -90,8 +89,7 @@ class Plan(NamedTuple):
     residual_packings: int = 5  # of those, with sweeps to smaller residuals
     response_packings: int = 10
     response_contacts: int = 20
-    perturb_packings: int = 3
-    perturb_contacts: int = 30
+    perturb_packings: int = 3  # of those, with other steps
     prepared_packings: int = 20
     prepared_frictions: tuple[float, ...] = (0.1, 0.5, 1, 3, 10)
     opened_packings: int = 10
@@ -128,7 +126,6 @@ QUICK = Plan(
     gauss_seidel_packings=3,
     response_contacts=4,
     perturb_packings=1,
-    perturb_contacts=4,
     prepared_frictions=(1,),
     repeat_packings=1,
     frozen_from=0.01,
@@ -305,17 +302,16 @@ def _repeated(plan: Plan, seed: int) -> list[Task]:
 
 
 def _responses(plan: Plan, seed: int) -> list[Task]:
-    longer = {"max_steps": LONGER * MOST_STEPS}
     family = []
-    for part, packings, contacts, protocol in (
-        ("response", plan.response_packings, plan.response_contacts, {"rise": RISE}),
-        ("response_long", plan.perturb_packings, plan.response_contacts, {"rise": RISE, **longer}),
-        ("perturb", plan.perturb_packings, plan.perturb_contacts, {}),
+    for part, packings, protocol in (
+        ("response", plan.response_packings, {}),
+        ("response_long", plan.perturb_packings, {"max_steps": LONGER * MOST_STEPS}),
+        ("response_fine", plan.perturb_packings, {"rise": RISE / FINER}),
     ):
         for mu in plan.frictions if seed <= packings else ():
             if 0 < mu < LEAST_FOLLOWED:
                 continue
-            how: dict[str, Any] = {"random": contacts, **protocol}
+            how: dict[str, Any] = {"random": plan.response_contacts, **protocol}
             family.append(_task(part, kinds.PERTURBATION, plan.n, seed, mu, **how))
     return family
 
@@ -446,7 +442,7 @@ def _family(part: str) -> str:
     if part in SWEEPS and part != PAPERS:
         return "residuals"
     word = part.split("_")[0]
-    return {"perturb": "response", "widest": "opened"}.get(word, word)
+    return "opened" if word == "widest" else word
 
 
 def _like(task: Task) -> tuple[str, int, str, str]:

@@ -80,8 +80,8 @@ class StudyTable(NamedTuple):
         return extents
 
     def responses(self) -> list[dict[str, Any]]:
-        """Rows of the perturbation with loads raised in tenths of the way, else of the other."""
-        return self.part("response") or self.part("perturb")
+        """Rows of the critical forces and first motions of random contacts."""
+        return self.part("response")
 
     def answers(self, part: str = "walk", eta: str = "eta2") -> list[dict[str, Any]]:
         """Rows of the perturbation, each with the η of a part in the same packing."""
