@@ -164,7 +164,8 @@ def overlaid(
     for mu in sorted(groups):
         packing, contacts, normal, extent = groups[mu]
         at, normal, extent = packing.contact_points[contacts], *map(np.asarray, (normal, extent))
-        strong, loose = normal > 2 * normal.mean(), extent > extent.mean()
+        unit = np.average(normal, weights=packing.contacts.length[contacts])
+        strong, loose = normal > 2 * unit, extent > extent.mean()
         drawn = [
             style.dots(at, "contacts", style.GREY, backend, size=4),
             style.dots(at[loose], "ΔF_n > ⟨ΔF_n⟩", style.COLOURS[4], backend, "s", size=7),

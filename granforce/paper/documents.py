@@ -71,13 +71,15 @@ SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions
 TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
 HEADLINES = 5  # highlights in the README
 NAMED = (  # claims that the README names if they are contradicted
-    "η ∝ μ at small μ: packings made by contact dynamics",
+    "η ∝ μ as μ → 0: packings made by contact dynamics",
     "η3 does not depend on how networks are sampled",
     "corr(f_n, ΔF_n) vanishes at large μ",
 )
-_CLAIM_HEADS = ("", "claim, and the number that decides it", "value", "range", "n")
+_CLAIM_HEADS = ("verdict", "claim, and the number judged", "value", "range", "others")
+DAGGER = " †"
 UNBROKEN = "\u00a0…\u00a0"  # of a range, in narrow columns
-_SCARCE = (FEW, MISSING, UNMEASURED)  # verdicts for want of data
+_NOTHING = (MISSING, UNMEASURED)  # verdicts without a number
+_SCARCE = (FEW, *_NOTHING)  # verdicts for want of data
 # Findings too numerous for a table; `claims.json` contains them.
 _LONG = "departure of P("
 _HEADS = {
@@ -128,7 +130,7 @@ _VARIANTS = {
     "prepared_double_steps": "double Δt",
     "prepared_accuracy": "10 times the accuracy, 4 times the sweeps",
     "prepared_sweeps": "4 times the sweeps",
-    "prepared_late_drag": "drag a hundred times later",
+    "prepared_late_drag": "drag at 1/100 of the imbalance",
 }
 
 
@@ -335,7 +337,7 @@ def _swept(table: StudyTable) -> str:
     words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
     if not words:
         return "No walk by sweeps is part of this study.\n"
-    text = f"In this study, sweeps end at {listed(words)} ⟨f_n⟩. "
+    text = f"Sweeps end at {listed(words)} ⟨f_n⟩; verdicts use the first. "
     rows = table.part(*plans.SWEEPS)
     if len(words) > 1:
         most = [
@@ -435,8 +437,8 @@ def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
         text += f"; {same} left out, as all pairs differ by the same amount"
     if together:
         words = listed([f"{times} for *{word}*" for word, times in together.most_common()])
-        return f"{text}. After Bonferroni's correction, these remain significant: {words}.\n"
-    text += f". None of the {tests} remains significant after Bonferroni's correction"
+        return f"{text}. After Bonferroni correction, these remain significant: {words}.\n"
+    text += f". None of the {tests} remains significant after Bonferroni correction"
     if stats.binom.sf(alone.total() - 1, tests, level) > level:
         return f"{text}: so few packings show no dependence on the options.\n"
     ((word, times),) = alone.most_common(1)
@@ -466,8 +468,8 @@ def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     verdicts = {claim["statement"]: claim["verdict"] for claim in decided(claims)}
     named = [name for name in NAMED if verdicts.get(name) in OUTCOMES["contradicted"]]
     if named:
-        quoted = "; ".join(f"“{name.replace(': ', ', ')}”" for name in named)
-        chosen.append(f"The study contradicts, among others, these claims: {quoted}.")
+        words = "; ".join(name.replace(": ", ", ") for name in named)
+        chosen.append(f"Claims of the paper that the study contradicts (in our words): {words}.")
     return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
 
 
@@ -632,11 +634,15 @@ def outcome_counts(claims: Rows) -> str:
 def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
     """A figure of the paper with its caption, and each claim on it with the number that decides.
 
-    Claims of the letter are marked. Below the symbol of a verdict are those by other samplers, if
-    they differ in outcome. `claims.json` contains the numbers of all samplers.
+    Claims of the letter are marked, and verdicts that a single μ or chance may have changed.
+    `claims.json` contains the numbers of all samplers.
     """
     of_figure = [claim for claim in claims if claim["figure"] == figure]
-    lines = [_claim_line(by_sampler) for by_sampler in by_claim(of_figure).values()]
+    lines, above = [], ("", "")
+    for by_sampler in by_claim(of_figure).values():
+        claim = decisive(by_sampler)
+        lines.append(_claim_line(claim, by_sampler, above))
+        above = _main(claim), _judged_number(claim)
     name, made = f"figure{figure}", markdown_table(_CLAIM_HEADS, lines)
     if name not in SHOWN:
         return made
@@ -644,34 +650,44 @@ def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
     return f"![Figure {figure}]({FIGURES}/{name}.png)\n\n*Figure {figure}.* {caption}\n\n{made}"
 
 
-def _claim_line(by_sampler: dict[str, dict[str, Any]]) -> list[str]:
-    """A claim in the columns of _CLAIM_HEADS."""
-    claim = decisive(by_sampler)
+def _main(claim: dict[str, Any]) -> str:
+    """The statement of a claim, without its variant."""
+    return str(claim["statement"].removesuffix(claim["variant"]))
+
+
+def _judged_number(claim: dict[str, Any]) -> str:
+    return str(claim["measured"].partition(", at the deciding μ")[0])
+
+
+def _claim_line(
+    claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]], above: tuple[str, str]
+) -> list[str]:
+    """A claim in the columns of _CLAIM_HEADS, without what repeats the line above it."""
+    statement, number = _main(claim), _judged_number(claim)
     letter = f" ({PRL})" if claim["source"] == PRL else ""
-    place = f", μ = {claim['mu']:g}" if claim["mu"] is not None else ""
-    number = claim["measured"].partition(", at the deciding μ")[0]
+    words = claim["statement"] + letter
+    if statement == above[0]:
+        words = f"… {claim['variant'].lstrip(',: ')}"
+    place = f"μ = {claim['mu']:g}, " if claim["mu"] is not None else ""
+    size = f"{place}n = {claim['packings']}" if claim["packings"] else ""
+    good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
+    cells = [
+        f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{DAGGER * (', but ' in claim['why'])}",
+        words if (statement, number) == above else f"{words}<br><small>{number}</small>",
+        f"{_number(claim)}<br><small>{size}</small>",
+        good + (f"<br><small>({fair})</small>" if fair else ""),
+        "<br>".join(_by_others(claim, by_sampler)),
+    ]
+    return [cell.replace(" … ", UNBROKEN) for cell in cells]
+
+
+def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
+    """The verdicts by other samplers than a claim's, as "symbol sampler"."""
     return [
-        "<br>".join([SYMBOLS[claim["verdict"]], *_disagreeing(claim, by_sampler)]),
-        f"{claim['statement']}{letter}<br><small>{number}</small>",
-        (_number(claim) + place).replace(" … ", UNBROKEN),
-        claim["criterion"].replace("[", "(").replace("]", ")").replace(" … ", UNBROKEN),
-        str(claim["packings"] or ""),
-    ]
-
-
-def _disagreeing(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
-    """The verdicts with another outcome than a claim's, as "symbol sampler".
-
-    A verdict for want of data is no outcome.
-    """
-    outcome = {verdict: word for word, verdicts in OUTCOMES.items() for verdict in verdicts}
-    differ = [
-        (SYMBOLS[other["verdict"]], _BRIEF.get(name, _HEADS[name]))
+        f"{SYMBOLS[other['verdict']]}\u00a0{_BRIEF[name]}"
         for name, other in by_sampler.items()
-        if other["verdict"] not in _SCARCE
-        and outcome[other["verdict"]] != outcome[claim["verdict"]]
+        if name in _BRIEF and name != claim["sampler"] and other["verdict"] not in _NOTHING
     ]
-    return [f"{symbol}\u00a0{name}" for symbol, name in differ]
 
 
 def _beyond_notes(claims: Rows) -> list[str]:

@@ -223,7 +223,7 @@ def _coverage(of: _Numbers) -> Highlight:
     quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
     return Highlight(
         f"At intermediate friction, {of.table.plan['states']} networks show only part of the "
-        f"intervals: their η3 divided by the exact η3 is {quoted}.",
+        f"intervals: their η3 divided by the exact η3 is, averaged over these μ, {quoted}.",
         "samplers",
         "exact-intervals",
     )
@@ -309,11 +309,21 @@ def _critical(of: _Numbers) -> Highlight:
     )
     return Highlight(
         f"{first}: the mean critical force is {_quoted(middle)} of the mean limit load at "
-        f"intermediate and {_quoted(large)} at large μ; at small μ, it is {_quoted(small)}."
-        f"{_within_precision(of)}",
+        f"intermediate μ ({_from_to(of)}) and {_quoted(large)} at large μ; at small μ, it is "
+        f"{_quoted(small)}.{_within_precision(of)}",
         "figure2_limit",
         "local-perturbation",
     )
+
+
+def _from_to(of: _Numbers) -> str:
+    """F_crit over the limit load at both ends of intermediate μ."""
+    forces, loads = (
+        statistics.grouped(of.table.responses(), name) for name in ("critical_force", "limit_load")
+    )
+    ends = [mu for mu in sorted(forces) if MIDDLE[0] <= mu <= MIDDLE[1]]
+    ratios = [f"{forces[mu].mean() / loads[mu].mean():.2f} at {mu:g}" for mu in (ends[0], ends[-1])]
+    return " to ".join(ratios)
 
 
 def _within_precision(of: _Numbers) -> str:
@@ -326,7 +336,10 @@ def _within_precision(of: _Numbers) -> str:
     precision = Protocol().precision
     if not apart or np.mean(apart) > precision:
         return ""
-    return f" There, they may be equal, as F_crit may be up to {precision:g} ⟨f_n⟩ too small."
+    return (
+        f" There, the difference is within the error of F_crit, up to {precision:g} ⟨f_n⟩, so the "
+        "two may be equal."
+    )
 
 
 def _stability(of: _Numbers) -> Highlight:
@@ -353,7 +366,8 @@ def _stability(of: _Numbers) -> Highlight:
         f"{first}: over all μ > 0, its rank correlation is {texts}{rest}.",
         "figure2",
         "local-perturbation",
-        f"We count the claim that F_crit rises with η as reproduced if it is {judged}.",
+        "We call the claim that F_crit rises with η reproduced if the rank correlation is "
+        f"{judged}.",
     )
 
 

@@ -107,7 +107,7 @@ def weak_first(mu, rng):
         (claims.maximum, "η2(μ) is not monotonic", {"eta2": lambda mu: 1 / (mu + 1e-4)}),
         (
             claims.small_friction,
-            "η ∝ μ at small μ: packings made by contact dynamics",
+            "η ∝ μ as μ → 0: packings made by contact dynamics",
             {"eta2": lambda mu: mu**2},
         ),
         (
@@ -160,7 +160,7 @@ def weak_first(mu, rng):
         ),
         (
             claims.tails,
-            "tail of P(ΔF_n) at small μ, beyond the median: exponential",
+            "the tail of P(ΔF_n) at small μ is exponential, beyond the median",
             {"extent": lambda mu, r: r.weibull(2, CONTACTS)},
         ),
         (

@@ -403,7 +403,8 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     assert text.endswith("<!-- end -->\nafter\n")
     assert "\nold\n" not in text
     for claim in told:
-        assert claim["statement"].replace("|", "\\|") in text
+        words = claim["variant"].lstrip(",: ") or claim["statement"]
+        assert words.replace("|", "\\|") in text
     documents.renew([path], table, told, found)
     assert page.read_text() == text
     page.write_text(blocks.format("everything"))
@@ -516,12 +517,36 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     assert "1 left out" in summary and "remain significant: 1 for *far*." in summary
 
 
+def table_of(text):
+    """The cells of a table in Markdown."""
+    lines = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line] for line in lines]
+
+
+def test_a_variant_of_a_claim_shows_only_what_differs():
+    one = {"source": "PRE", "criterion": "≥ 1 [≥ 0.5]", "sampler": "", "figure": 4, "packings": 3}
+    one |= {"value": 2.0, "low": 1.5, "high": 2.5, "mu": 0.1, "why": "", "measured": "b"}
+    first = {"statement": "it falls, beyond the median", "variant": ", beyond the median"}
+    second = {"statement": "it falls, beyond the decile", "variant": ", beyond the decile"}
+    second |= {"why": "reproduced, but undecided without μ = 0.1"}
+    judged = [
+        one | first | {"verdict": verdicts.REPRODUCED},
+        one | second | {"verdict": verdicts.UNDECIDED},
+    ]
+    empty = tables.StudyTable({}, [], {}, [], {}, {})
+    above, below = table_of(documents.claim_table(empty, judged, 4))[2:]
+    assert above[1] == "it falls, beyond the median<br><small>b</small>"
+    assert below[1].replace("\u00a0", " ") == "… beyond the decile"
+    assert below[0] == "? undecided †" and "†" not in above[0]
+    assert above[2].endswith("<small>μ = 0.1, n = 3</small>") and "(≥ 0.5)" in above[3]
+
+
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     def claim(statement, sampler, verdict, value=1.0):
         words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
         words |= {"sampler": sampler, "verdict": verdict, "measured": "x", "why": ""}
         numbers = {"value": value, "low": value, "high": value, "mu": None, "packings": 3}
-        return words | numbers | {"figure": 3}
+        return words | numbers | {"figure": 3, "variant": ""}
 
     judged = [
         claim("a", "gauss_seidel", verdicts.REPRODUCED),
@@ -534,30 +559,26 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         claim("c", "uniform", verdicts.MISSING, float("nan")),
         claim("d", "", verdicts.CONTRADICTED) | {"source": "PRL"},
     ]
-    stronger = [
-        claim("e", "exact", verdicts.STRONGLY),
-        claim("e", "uniform", verdicts.CONTRADICTED),
-    ]
     empty = tables.StudyTable({}, [], {}, [], {}, {})
-    assert "| ✗✗ | e<br>" in documents.claim_table(empty, stronger, 3)  # contradicted by both
-    text = documents.claim_table(empty, judged, 3)
-    rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
-    rows = [[cell.strip() for cell in row] for row in rows]
-    assert rows[0] == ["", "claim, and the number that decides it", "value", "range", "n"]
-    marks = [
-        ["✓<br>✗\u00a0exact", "a"],
-        ["…<br>✓\u00a0exact", "b"],
-        ["✗✗<br>✓\u00a0nearest", "c"],  # want of data is no outcome
-        ["✗", "d (PRL)"],
+    rows = table_of(documents.claim_table(empty, judged, 3))
+    assert rows[0] == ["verdict", "claim, and the number judged", "value", "range", "others"]
+    verdicts_shown = [
+        "✓ reproduced",
+        "… too few data",
+        "✗✗ strongly contradicted",
+        "✗ contradicted",
     ]
-    assert [[row[0], row[1].removesuffix("<br><small>x</small>")] for row in rows[2:]] == marks
-    lines = [line.split("|") for line in documents.outcome_counts(judged).splitlines()]
-    assert [cell.strip() for cell in lines[-1][1:-1]] == ["all", "2", "1", "1"]
-    assert "(#figure-3-networks-of-one-packing)" in lines[4][1]
-    assert [cell.strip() for cell in lines[4][2:-1]] == ["2", "1", "1"]
+    assert [row[0] for row in rows[2:]] == verdicts_shown
+    assert [row[1].partition("<br>")[0] for row in rows[2:]] == ["a", "b", "c", "d (PRL)"]
+    assert [row[4] for row in rows[2:]] == [
+        *("✗\u00a0exact", "✓\u00a0exact", "✓\u00a0nearest", "")  # uniform has no number
+    ]
+    lines = table_of(documents.outcome_counts(judged))
+    assert lines[-1] == ["all", "2", "1", "1"]
+    assert "(#figure-3-networks-of-one-packing)" in lines[4][0] and lines[4][1:] == ["2", "1", "1"]
     assert "tests 4 claims" in outcomes.score(judged)
-    assert "1 are reproduced, 2 contradicted and 1 open" in outcomes.score(judged)
-    assert "The networks of the paper's own walk decide 2 of them;" in outcomes.score(judged)
+    assert "1 are reproduced, 2 contradicted (1 strongly) and 1 open" in outcomes.score(judged)
+    assert "2 of them are judged with the paper's own random walk" in outcomes.score(judged)
     lines = [
         line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
     ]

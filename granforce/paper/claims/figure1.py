@@ -106,7 +106,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
         few = {} if left else {mu: groups[mu] for mu in groups if low <= mu <= high}
         span = f", μ = {min(few):g} … {max(few):g}" if few else ""
         claim = over_all(
-            f"η ∝ μ at small μ: {word}",
+            f"η ∝ μ as μ → 0: {word}",
             f"slope of log {label} against log μ{span}",
             slope,
             few,
@@ -114,6 +114,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
             fair=(0.7, 1.3),
             source=PRL,
         )
+        claim = claim._replace(variant=f": {word}")
         yield claim._replace(verdict=UNMEASURED) if left else claim
 
 
@@ -153,7 +154,7 @@ def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ]
     yield at_each(
         "η3 does not depend on how networks are sampled",
-        f"η3 over exact η3 of the same packing, μ ≥ {LEAST_DYNAMIC:g}",
+        f"η3 of the networks over that of the exact intervals, μ ≥ {LEAST_DYNAMIC:g}",
         items(rows, "part_seen"),
         good=(0.9, 1.1),
         fair=(0.75, 1.25),
@@ -192,7 +193,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ratios = [row | {"ratio": row[name] / other[name]} for row, other in longer]
         yield at_each(
             f"{label} does not depend on the length of the walk",
-            f"{label} of a walk several times as long over that of the usual walk",
+            f"{label} of a walk several times as long over that of 1000 networks",
             items(ratios, "ratio"),
             good=(0.95, 1.05),
             fair=(0.9, 1.1),
@@ -275,4 +276,4 @@ def size(table: StudyTable, sampler: str) -> Iterator[Claim]:
             groups,
             good=(-0.1, 0.1),
             fair=(-0.3, 0.3),
-        )
+        )._replace(variant=f" (μ = {mu:g})")

@@ -31,22 +31,23 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """P(ΔF_n) falls monotonically at small and large μ and has a peak in between."""
     everywhere = sampled(table, sampler)
     scaled = each(everywhere, lambda values: values / values.mean())
-    for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "its mean in each packing")):
-        for word, span, has_peak in (
-            ("small", SMALL, False),
-            ("intermediate", MIDDLE, True),
-            ("large", LARGE, False),
-        ):
+    for word, span, has_peak in (
+        ("small", SMALL, False),
+        ("intermediate", MIDDLE, True),
+        ("large", LARGE, False),
+    ):
+        shape_of = "has a peak" if has_peak else "falls monotonically"
+        for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "its mean in each packing")):
+            variant = f" (ΔF_n in units of {unit})"
             yield at_each(
-                f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'} "
-                f"(ΔF_n in units of {unit})",
+                f"P(ΔF_n) at {word} μ {shape_of}{variant}",
                 "departure from a falling density",
                 within(groups, span),
                 good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
                 fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
                 interval=departure,
                 possible=FRACTION,
-            )
+            )._replace(variant=variant)
 
 
 def departure(values: Sequence[Floats], level: float) -> tuple[float, float, float]:
@@ -65,21 +66,22 @@ def departure(values: Sequence[Floats], level: float) -> tuple[float, float, flo
 def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The tail of P(ΔF_n) at each μ, beyond several quantiles."""
     everywhere = sampled(table, sampler)
-    for quantile, beyond in TAILS:
-        for word, span, how, good, fair in (
-            ("small", SMALL, "exponential", (0.85, 1.15), (0.7, 1.3)),
-            ("intermediate", MIDDLE, "falls faster than exponentially", (1, np.inf), None),
-            ("large", LARGE, "falls slower than exponentially", (-np.inf, 1), None),
-        ):
+    for word, span, how, good, fair in (
+        ("small", SMALL, "is exponential", (0.85, 1.15), (0.7, 1.3)),
+        ("intermediate", MIDDLE, "falls faster than an exponential", (1, np.inf), None),
+        ("large", LARGE, "falls more slowly than an exponential", (-np.inf, 1), None),
+    ):
+        for quantile, beyond in TAILS:
+            variant = f", beyond the {beyond}"
             yield at_each(
-                f"tail of P(ΔF_n) at {word} μ, beyond the {beyond}: {how}",
-                f"b of exp(−(λ ΔF_n)^b) beyond the {beyond}",
+                f"the tail of P(ΔF_n) at {word} μ {how}{variant}",
+                "b of exp(−(λ ΔF_n)^b)",
                 within(everywhere, span),
                 good=good,
                 fair=fair,
                 interval=_exponents(quantile),
                 possible=POSITIVE,
-            )
+            )._replace(variant=variant)
 
 
 def _exponents(quantile: float) -> Callable[[Any, float], Any]:

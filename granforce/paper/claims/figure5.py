@@ -29,7 +29,7 @@ def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Gro
     judged = may_be_judged(table, sampler)
     for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
         if judged(row) and row["mu"] > 0 and len(extent):
-            value = measure(normal > 2 * normal.mean(), extent > extent.mean())
+            value = measure(normal > 2.0, extent > extent.mean())
             if np.isfinite(value):
                 marked.setdefault(row["mu"], []).append((row["n"], value))
     return dict(sorted(marked.items()))
@@ -103,41 +103,41 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """In a frozen boundary indeterminacy is everywhere at small μ, and in clusters at large μ."""
-    for part in ("frozen", "frozen_large"):
-        rows = [row for row in table.part(part) if row.get("contacts")]
-        word = f"N = {rows[0]['n']}" if rows else "N = 400" if part == "frozen" else "N = 1600"
-        for claim, measured, what, span, good, fair in (
-            (
-                f"at μ ≤ {FROZEN_SMALL:g} contacts are undetermined everywhere",
-                "undetermined fraction of the contacts inside",
-                "undetermined_part",
-                (0, FROZEN_SMALL),
-                (0.75, np.inf),
-                (0.5, np.inf),
-            ),
-            (
-                f"at μ ≥ {BARELY_RIGID:g} most contacts are determined",
-                "determined fraction of the contacts inside",
-                lambda row: 1 - row["undetermined_part"],
-                (BARELY_RIGID, np.inf),
-                (0.5, np.inf),
-                (0.25, np.inf),
-            ),
-            (
-                f"at μ ≥ {BARELY_RIGID:g} the undetermined ones form small clusters",
-                "fraction of the contacts inside that are in the largest cluster",
-                lambda row: row["largest_cluster"] / row["contacts"],
-                (BARELY_RIGID, np.inf),
-                (-np.inf, 0.25),
-                (-np.inf, 0.5),
-            ),
-        ):
+    for claim, measured, what, span, good, fair in (
+        (
+            f"at μ ≤ {FROZEN_SMALL:g} contacts are undetermined everywhere",
+            "undetermined fraction of the contacts inside",
+            "undetermined_part",
+            (0, FROZEN_SMALL),
+            (0.75, np.inf),
+            (0.5, np.inf),
+        ),
+        (
+            f"at μ ≥ {BARELY_RIGID:g} most contacts are determined",
+            "determined fraction of the contacts inside",
+            lambda row: 1 - row["undetermined_part"],
+            (BARELY_RIGID, np.inf),
+            (0.5, np.inf),
+            (0.25, np.inf),
+        ),
+        (
+            f"at μ ≥ {BARELY_RIGID:g} undetermined contacts form small clusters",
+            "fraction of the contacts inside that are in the largest cluster",
+            lambda row: row["largest_cluster"] / row["contacts"],
+            (BARELY_RIGID, np.inf),
+            (-np.inf, 0.25),
+            (-np.inf, 0.5),
+        ),
+    ):
+        for part, usual in (("frozen", 400), ("frozen_large", 1600)):
+            rows = [row for row in table.part(part) if row.get("contacts")]
+            variant = f" (N = {rows[0]['n'] if rows else usual})"
             yield at_each(
-                f"with frozen boundary forces, {claim} ({word})",
+                f"with frozen boundary forces, {claim}{variant}",
                 f"{measured}, {span_text(span)}",
                 within(items(rows, what), span),
                 good=good,
                 fair=fair,
                 source=PRL,
                 possible=FRACTION,
-            )
+            )._replace(variant=variant)

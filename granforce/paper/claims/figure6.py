@@ -54,7 +54,7 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
             within(scores, span),
             good=limits,
             fair=wider,
-        )
+        )._replace(variant=", against chance")
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",

@@ -65,11 +65,13 @@ def counted(claims: Rows) -> dict[str, int]:
 def score(claims: Rows) -> str:
     """How many claims have which outcome, in sentences."""
     count = counted(claims)
+    strongly = sum(claim["verdict"] == STRONGLY for claim in decided(claims))
     by_walk = sum(claim["sampler"] == PAPERS for claim in decided(claims))
     return (
         f"The study that ships with granforce tests {sum(count.values())} claims of the paper and "
         "of an earlier letter (PRL 94, 178001), with variants counted separately: "
-        f"{count['reproduced']} are reproduced, {count['contradicted']} contradicted and "
-        f"{count['open']} open (undecided or too few data). The networks of the paper's own walk "
-        f"decide {by_walk} of them; exact intervals or the packings alone decide the others."
+        f"{count['reproduced']} are reproduced, {count['contradicted']} contradicted "
+        f"({strongly} strongly) and {count['open']} open (undecided or too few data). {by_walk} of "
+        "them are judged with the paper's own random walk, the others with exact intervals, the "
+        "packings or their response to a push."
     )

@@ -50,6 +50,7 @@ class Claim(NamedTuple):
     mu: float | None = None  # where the number is from, if it is judged at each μ
     packings: int = 0  # at that μ, or the fewest at any
     figure: int = 0  # of the paper, to which the claim belongs; 0 for findings
+    variant: str = ""  # end of the statement that distinguishes it from others of the same claim
 
 
 PRE, PRL = "PRE", "PRL"
