@@ -26,6 +26,7 @@ Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; emp
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
+HELD = "scale of the free forces"  # while lines obey held ones
 LARGE = 4.0  # ⟨f_n⟩, limit of the widths shown: few forces are larger
 COMING = "(being computed)"  # then lines have no colour of the scale
 LEGEND = """
@@ -131,7 +132,7 @@ class PackingView:
             "exact": exact,
             "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
             "measured": measured(state, replay),
-            "most": full_extent(replay, exact, looks.full),
+            "most": full_colour(state),
             "between": None if looks.between is None else list(looks.between),
         }
         if self._shown is not replay:
@@ -250,11 +251,17 @@ def normal_extent(replay: Replay, exact: Bounds) -> Any:
     return replay.high[:, 0] - replay.low[:, 0]
 
 
-def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> float:
-    """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested."""
-    if chosen is not None:
-        return chosen
-    extent = normal_extent(replay, exact)
+def full_colour(state: AppState) -> float:
+    """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested.
+
+    It is that of the free forces also while some are held, so that colours show what holding does.
+    """
+    full = state.looks.full
+    return _saturation(state.shown, state.free) if full is None else float(full)
+
+
+def _saturation(replay: Replay, exact: xr.Dataset | None) -> float:
+    extent = normal_extent(replay, exact_intervals(exact, replay))
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
@@ -263,13 +270,12 @@ def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     looks = state.looks
     full = looks.full or FULL_CHANGE
     change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
-    most = full_extent(state.shown, exact_intervals(state.drawn, state.shown), looks.full)
     return {
         "mobilised": MOBILISED,
         "extent": (
             "0",
             list(palettes(looks.dark)["extent"][::8]),
-            _full(state, most, _bounds(state)),
+            _full(state, full_colour(state)),
         ),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
@@ -286,9 +292,13 @@ def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
 
 def _bounds(state: AppState) -> str:
     """The kind of the intervals that lines show, in words."""
-    if not exact_intervals(state.drawn, state.shown):
-        return "seen"
-    return state.bounds if state.obeys_held else "exact"
+    kind = _kind(state)
+    return state.bounds if kind == "exact" and state.obeys_held else kind
+
+
+def _kind(state: AppState) -> str:
+    """The same without held forces: shorter, for the legend, which has to keep its lines."""
+    return "exact" if exact_intervals(state.drawn, state.shown) else "seen"
 
 
 def colours(pulled: str) -> dict[str, str]:
@@ -296,11 +306,13 @@ def colours(pulled: str) -> dict[str, str]:
     return COLOURS | ({"change": f"change by the {pulled}"} if pulled else {})
 
 
-def _full(state: AppState, most: float, bounds: str) -> str:
+def _full(state: AppState, most: float) -> str:
     """The ΔF_n of full colour, of which bounds, and whether it differs between packings."""
     if most:
-        this = "" if state.looks.full else ", this packing"
-        return f"≥ {most:.2f} ⟨fₙ⟩ ({bounds}{this})"
+        held = state.drawn is not state.free
+        kind = _kind(state)
+        origin = HELD if held else f"{kind}, this packing"
+        return f"≥ {most:.2f} ⟨fₙ⟩ ({kind if state.looks.full else origin})"
     if state.shown.summary["dimension"]:
         return COMING
     return "0: every force is determined"
@@ -348,7 +360,7 @@ def legend(state: AppState, pulled: str = "") -> str:
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
         colour=_chosen(state, "colour", colours(pulled)),
-        wide_bounds=f" ({_bounds(state)})" if looks.thickness == "extent" else "",
+        wide_bounds=f" ({_kind(state)})" if looks.thickness == "extent" else "",
         bar=bar,
         saturation=SATURATION,
         full="" if looks.full is None else f"{looks.full:g}",

@@ -128,12 +128,15 @@ class AppState(param.Parameterized):
         return self.shown is not self.replay
 
     @property
+    def free(self) -> Any:
+        """The exact intervals of the Replay on screen, without held forces; or None."""
+        return None if self.growing else self.exact
+
+    @property
     def possible(self) -> Any:
         """The exact intervals of the Replay on screen, given the known forces; or None."""
-        if self.growing:
-            return None
         narrowed = self.knowledge.narrowed
-        return self.exact if narrowed is None else narrowed.after
+        return self.free if narrowed is None or self.growing else narrowed.after
 
     @property
     def bounds(self) -> str:
@@ -148,7 +151,7 @@ class AppState(param.Parameterized):
     @property
     def drawn(self) -> Any:
         """The exact intervals that lines show: `possible`, or those without the held forces."""
-        return self.possible if self.obeys_held or self.growing else self.exact
+        return self.possible if self.obeys_held else self.free
 
     def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue again; show what was just computed."""

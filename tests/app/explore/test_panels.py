@@ -861,7 +861,7 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     state.looks.thickness = "extent"  # its name stays; the scale says which intervals
     assert "⟨fₙ⟩ (seen)" in player.legend
     wait_for(state)
-    assert "⟨fₙ⟩ (exact given the held forces)" in player.legend
+    assert "⟨fₙ⟩ (exact)" in player.legend
     state.knowledge.release(3)
     assert "⟨fₙ⟩ (exact)" in player.legend and ">interval ΔFₙ</option>" in player.legend
     player.colour = "known"  # chosen in the legend
