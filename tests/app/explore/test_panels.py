@@ -1014,7 +1014,7 @@ def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
     wait_for(state)
     page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
     assert "interval, exact given the held forces" in page and "interval, seen" not in page
-    assert "⟨fₙ⟩ (exact given the held forces" in page
+    assert "⟨fₙ⟩ (scale of the free forces)" in page
 
 
 def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):
