@@ -12,6 +12,7 @@ import xarray as xr
 
 from granforce.measures.sampling import FEWEST, MIXED
 
+from ..results.library import Shown
 from ..results.replays import Replay, worded
 from ..results.selection import SOLVERS, Selection
 from ..state.app_state import AppState
@@ -91,6 +92,29 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
         ),
         Quantity("volume", "ln V", "volume of S", exact=values),
     ]  # fmt: skip
+
+
+def changes(*compared: Shown) -> str:
+    """μ, η, z, φ and h as HTML; those of several packings as "old → new"."""
+    exact = all(shown.exact is not None for shown in compared)
+    columns = [_compared(shown, exact) for shown in compared]
+    values = {name: " → ".join(one[name] for one in columns) for name in columns[0]}
+    return ", ".join(f"<span>{name} {value}</span>" for name, value in values.items())
+
+
+def _compared(shown: Shown, exact: bool) -> dict[str, str]:
+    """exact: whether η3 is that of S, not of the networks."""
+    summary, phi = shown.replay.summary, shown.replay.summary["packing_fraction"]
+    eta3 = shown.exact["eta3"].item() if exact and shown.exact is not None else summary["eta3"]
+    return {
+        "μ": f"{shown.cell.mu:g}",
+        "η₁": short(summary["eta1"]),
+        "η₂": short(summary["eta2"]),
+        f"0.15 η₃ ({'exact' if exact else 'seen'})": short(0.15 * eta3),
+        "z": f"{summary['coordination']:.3f}",
+        "φ": "–" if math.isnan(phi) else f"{phi:.4f}",
+        "h": str(summary["dimension"]),
+    }
 
 
 def sampling(state: AppState) -> Sampling | None:

@@ -311,11 +311,19 @@ def _full(state: AppState, most: float) -> str:
     if most:
         held = state.drawn is not state.free
         kind = _kind(state)
-        origin = HELD if held else f"{kind}, this packing"
+        origin = HELD if held else f"{kind}{_of_packing(state)}"
         return f"≥ {most:.2f} ⟨fₙ⟩ ({kind if state.looks.full else origin})"
     if state.shown.summary["dimension"]:
         return COMING
     return "0: every force is determined"
+
+
+def _of_packing(state: AppState) -> str:
+    """That the scale is of this packing; after a change of μ, the scale before it."""
+    was = state.before
+    if was is None or state.growing or (was.exact is None) != (state.exact is None):
+        return ", this packing"
+    return f"; {_saturation(was.replay, was.exact):.2f} at μ = {was.cell.mu:g}"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:

@@ -48,6 +48,7 @@ class AppState(param.Parameterized):
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
+    before = param.Parameter(doc="the Shown before the last change if only μ changed, or None")
     source = param.String(doc="where the states on screen come from, in words")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
@@ -288,6 +289,7 @@ class AppState(param.Parameterized):
             self.param.update(
                 selection=cell.selection,
                 missing=False,
+                before=self._before(cell),
                 cell=cell,
                 replay=replay,
                 shown=replay,
@@ -298,6 +300,13 @@ class AppState(param.Parameterized):
                 plane=self.plane if self.replay is replay else None,
             )
             self._look(fresh | fitting(view or {}, replay))
+
+    def _before(self, cell: Cell) -> Shown | None:
+        """The states on screen if those of a cell differ only by μ."""
+        now = self.cell
+        if now is None or cell.series != now.series:
+            return None
+        return self.before if cell.mu == now.mu else Shown(now, self.replay, self.exact)
 
     def _source(self, cell: Cell | None = None) -> str:
         """The source of a cell's states, by default of the cell on screen."""
