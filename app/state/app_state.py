@@ -27,8 +27,8 @@ from .view_settings import Looks
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed automatically
 # Parameters of Looks that change by playing or zooming, not by the visitor's choice of view: going
-# back does not restore the previous frame, zoom or theme.
-PASSING = ("frame", "paused", "opened", "zoom", "dark")
+# back does not restore the previous frame or zoom.
+PASSING = ("frame", "paused", "opened", "zoom")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -99,14 +99,8 @@ class AppState(param.Parameterized):
             selection, texts = None, {}
             self.work.message = str(error)
         view = read_view(texts, self._viewed)
-        self.looks.dark = view.get("dark", self.looks.dark)  # before anything is visible
-        self._look_up(
-            selection, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
-        )
-
-    def _as_new(self) -> View:
-        """The view of a new page, except for the theme: what a link omits."""
-        return {name: self._viewed[name].default for name in VIEW if name != "dark"}
+        new = {name: self._viewed[name].default for name in VIEW}  # what a link omits
+        self._look_up(selection, new | view, counted="states" in parse_qs(query.lstrip("?")))
 
     @property
     def _unseen(self) -> View:
