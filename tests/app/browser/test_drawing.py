@@ -8,6 +8,18 @@ import pytest
 from app.browser.bundle import APP
 
 
+def test_the_time_to_keep_all_networks_is_an_upper_limit(run):
+    words = run(
+        "packing/player_bar",
+        """({ PlayerBar }) => {
+            const bar = new PlayerBar({}, () => {}), walk = { seconds: 47, states: 1000 }
+            bar.showTrack({ last: 1, stride: 20, walk }, true)
+            return bar.keep.textContent
+        }""",
+    )
+    assert words == "Keep all (up to 47 s)"
+
+
 def test_every_script_is_a_module_by_itself(run):
     """As they are written, not as they are joined: `module` makes no module of what is none."""
     names = [str(path.relative_to(APP).with_suffix("")) for path in APP.glob("**/*.js")]
