@@ -8,6 +8,16 @@ import pytest
 from app.browser.bundle import APP
 
 
+def test_a_scene_of_the_other_page_says_where_it_opens(run):
+    options = run(
+        "browser/scene_options",
+        """({ sceneOptions }) => sceneOptions(
+            [["groove", "One disk", "Learn"], ["many", "Many disks", "Explore"]], "Explore")""",
+    )
+    assert 'value="many">Many disks</option>' in options
+    assert 'value="groove">One disk → Learn</option>' in options
+
+
 def test_the_time_to_keep_all_networks_is_an_upper_limit(run):
     words = run(
         "packing/player_bar",
