@@ -19,7 +19,7 @@ from .player import Player, frames
 
 # In both directions.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "paused", "opened")
+SHARED += ("stretch", "paused", "opened", "pulled")
 APPEARANCE = sorted(set(Appearance.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty if unknown
@@ -84,7 +84,6 @@ class PackingView:
         self._shown = None
         for name in ("between", "zoom"):
             self.player.param.watch(self._go, name)
-        self.player.param.watch(self._explain, "pulled")
         looks.param.watch(self._follow, APPEARANCE)
         state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
@@ -100,7 +99,7 @@ class PackingView:
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain,
-            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference"],
+            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference", "pulled"],
         )
         looks.param.watch(self._turn, "tab")
         state.param.watch(self._explain, ["shown", "exact", "loads", "measured"])
@@ -178,11 +177,10 @@ class PackingView:
         self.player.displacement = flat
 
     def _explain(self, *events: Any) -> None:
-        pulled = self.player.pulled or ("pull" if self.state.hand.pulls else "")
         if self.state.work.moving:
             self.player.legend = jamming(self.state)
             return
-        self.player.legend = legend(self.state, pulled) + (THRUST if self.player.thrust else "")
+        self.player.legend = legend(self.state) + (THRUST if self.player.thrust else "")
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
@@ -301,8 +299,9 @@ def _kind(state: AppState) -> str:
     return "exact" if exact_intervals(state.drawn, state.shown) else "seen"
 
 
-def colours(pulled: str) -> dict[str, str]:
-    """The labels of COLOURS; pulled: "pull" or "push" if that led to the network on screen."""
+def colours(state: AppState) -> dict[str, str]:
+    """The labels of COLOURS, which name a pull or push that led to the network on screen."""
+    pulled = state.looks.pulled or ("pull" if state.hand.pulls else "")
     return COLOURS | ({"change": f"change by the {pulled}"} if pulled else {})
 
 
@@ -341,7 +340,7 @@ def jamming(state: AppState) -> str:
     return JAMMING.format(colour=MOBILISATION.format(bar=bar) if coloured else "")
 
 
-def legend(state: AppState, pulled: str = "") -> str:
+def legend(state: AppState) -> str:
     """The present meaning of width and colour, as HTML."""
     looks, replay = state.looks, state.shown
     if replay is None:
@@ -367,7 +366,7 @@ def legend(state: AppState, pulled: str = "") -> str:
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=_chosen(state, "colour", colours(pulled)),
+        colour=_chosen(state, "colour", colours(state)),
         wide_bounds=f" ({_kind(state)})" if looks.thickness == "extent" else "",
         bar=bar,
         saturation=SATURATION,
