@@ -30,7 +30,6 @@ class Quantity(NamedTuple):
     words: str
     seen: str = ""  # over the states, with its standard error if available
     exact: str = ""  # over all of S, or of the packing
-    note: str = ""  # a remark, such as that it grows with the number of states
 
 
 class Sampling(NamedTuple):
@@ -55,15 +54,14 @@ def measures(state: AppState) -> list[Quantity]:
         return []
     summary, worth, possible = replay.summary, replay.sampling, state.possible
     extent = float((replay.high - replay.low)[:, 0].mean()) if len(replay.low) else math.nan
-    grows = "grows with the number of networks"
     return [
         Quantity("eta1", "η₁", "spread", with_error(summary["eta1"], worth.eta1_error)),
         Quantity("eta2", "η₂", "distance", with_error(summary["eta2"], worth.eta2_error)),
         Quantity(
             "eta3", "0.15 η₃", "intervals", short(0.15 * summary["eta3"]),
-            "" if possible is None else short(0.15 * possible["eta3"].item()), grows,
+            "" if possible is None else short(0.15 * possible["eta3"].item()),
         ),
-        Quantity("extent", "ΔFₙ", "mean", short(extent), _mean_extent(possible), grows),
+        Quantity("extent", "ΔFₙ", "mean", short(extent), _mean_extent(possible)),
     ]  # fmt: skip
 
 
@@ -86,10 +84,7 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     return [
         Quantity("z", "z", each, exact=f"{summary['coordination']:.3f}"),
         Quantity("phi", "φ", "packing fraction", exact="–" if math.isnan(phi) else f"{phi:.4f}"),
-        Quantity(
-            "h", "h", "free dimensions", exact=free,
-            note="forces minus independent equations",
-        ),
+        Quantity("h", "h", "free dimensions", exact=free),
         Quantity("volume", "ln V", "volume of S", exact=values),
     ]  # fmt: skip
 

@@ -15,10 +15,7 @@ from .lesson import Lesson
 from .model.lesson_data import Packings
 from .workbench.workbench import Workbench
 
-KEYS = [
-    ["arrows", "move the marker, or the dot"],
-    ["Tab", "move from the plot to the buttons"],
-]
+KEYS = [["arrows", "move the marker, or the dot"], ["Tab", "move from the plot to the buttons"]]
 
 
 def learn_page(document: Document, query: str) -> Any:

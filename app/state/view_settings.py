@@ -44,11 +44,7 @@ SORTS = {
 }
 DRAWN = {"all": "all", "some": "a few"}
 # Options of single tabs.
-PUSHES = {
-    "one": "one contact",
-    "all": "every contact",
-    "store": "against indeterminacy (Figure 2)",
-}
+PUSHES = {"one": "one contact", "all": "every contact", "store": "against indeterminacy (Figure 2)"}
 PLANES = {
     "pair": "the normal forces of two contacts",
     "principal": "the plane in which networks differ most",
