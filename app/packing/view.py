@@ -265,37 +265,29 @@ def _saturation(replay: Replay, exact: xr.Dataset | None) -> float:
 
 def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
-    looks = state.looks
+    looks, scales = state.looks, palettes(state.looks.dark)
     full = looks.full or FULL_CHANGE
     change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
     return {
         "mobilised": MOBILISED,
-        "extent": (
-            "0",
-            list(palettes(looks.dark)["extent"][::8]),
-            _full(state, full_colour(state)),
-        ),
-        "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
+        "extent": ("0", list(scales["extent"][::8]), _full(state, full_colour(state))),
+        "load": ("0", list(scales["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
-        "known": ("0", list(palettes(looks.dark)["known"][::8]), "all of the interval"),
+        "known": ("0", list(scales["known"][::8]), "all of the interval"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
 
 
 def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
     """Labels {name: words} for captions; those of intervals say whether they are exact."""
-    return labels | {"extent": f"{labels['extent']}, {_bounds(state)}"}
-
-
-def _bounds(state: AppState) -> str:
-    """The kind of the intervals that lines show, in words."""
     kind = _kind(state)
-    return state.bounds if kind == "exact" and state.obeys_held else kind
+    bounds = state.bounds if kind == "exact" and state.obeys_held else kind
+    return labels | {"extent": f"{labels['extent']}, {bounds}"}
 
 
 def _kind(state: AppState) -> str:
-    """The same without held forces: shorter, for the legend, which has to keep its lines."""
+    """The kind of the intervals that lines show; held forces are omitted to keep legends short."""
     return "exact" if exact_intervals(state.drawn, state.shown) else "seen"
 
 
