@@ -125,10 +125,7 @@ class Pool:
 
 # For all users together: more threads would only slow each other down.
 computing = Pool(
-    LIMITS.computations,
-    "granforce-compute",
-    extra=LIMITS.computations,
-    seconds=LIMITS.seconds,
+    LIMITS.computations, "granforce-compute", extra=LIMITS.computations, seconds=LIMITS.seconds
 )
 # Reading stores must not wait for a computation to end.
 reading = Pool(2, "granforce-read")

@@ -2,7 +2,8 @@
 
 /** HTML for titles [[name, title, door]]; here: the door of this page, "Explore" or "Learn". */
 export function sceneOptions(titles, here) {
-  const options = (given) => given.map(([name, title]) => `<option value="${name}">${title}</option>`).join("")
+  const options = (given, where = "") => given.map(([name, title]) => `<option value="${name}">${title}${where}</option>`).join("")
   const elsewhere = titles.filter(([, , door]) => door !== here)
-  return `${options(titles.filter(([, , door]) => door === here))}<optgroup label="opens in ${elsewhere[0][2]}">${options(elsewhere)}</optgroup>`
+  const there = elsewhere[0][2]
+  return `${options(titles.filter(([, , door]) => door === here))}<optgroup label="opens in ${there}">${options(elsewhere, ` → ${there}`)}</optgroup>`
 }

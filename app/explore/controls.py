@@ -120,10 +120,7 @@ class Controls:
         state.looks.keep_open(self.opens, "made")
 
     def _number(self, label: str, start: int, end: float, step: int = 1) -> NumberField:
-        def refuse(line: str) -> None:
-            self.work.message = line
-
-        return NumberField(refuse, label=label, start=start, end=end, step=step, **FIELD)
+        return NumberField(self.work.say, label=label, start=start, end=end, step=step, **FIELD)
 
     def _connect(self) -> None:
         state = self.state

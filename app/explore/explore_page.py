@@ -119,6 +119,7 @@ def explore_page(document: Document, query: str) -> Any:
     wake = visit.turns(document)
     state = AppState(visit.library(), wake, query, visit.visitor(document))
     looks, work = state.looks, state.work
+    looks.dark = visit.dark(query)
     work.message = work.message or " ".join(state.library.notes)
     packing = PackingView(state)
     Stream(state, packing.player, document)

@@ -12,6 +12,7 @@ import xarray as xr
 
 from granforce.measures.sampling import FEWEST, MIXED
 
+from ..results.library import Shown
 from ..results.replays import Replay, worded
 from ..results.selection import SOLVERS, Selection
 from ..state.app_state import AppState
@@ -29,7 +30,6 @@ class Quantity(NamedTuple):
     words: str
     seen: str = ""  # over the states, with its standard error if available
     exact: str = ""  # over all of S, or of the packing
-    note: str = ""  # a remark, such as that it grows with the number of states
 
 
 class Sampling(NamedTuple):
@@ -54,15 +54,14 @@ def measures(state: AppState) -> list[Quantity]:
         return []
     summary, worth, possible = replay.summary, replay.sampling, state.possible
     extent = float((replay.high - replay.low)[:, 0].mean()) if len(replay.low) else math.nan
-    grows = "grows with the number of networks"
     return [
         Quantity("eta1", "η₁", "spread", with_error(summary["eta1"], worth.eta1_error)),
         Quantity("eta2", "η₂", "distance", with_error(summary["eta2"], worth.eta2_error)),
         Quantity(
             "eta3", "0.15 η₃", "intervals", short(0.15 * summary["eta3"]),
-            "" if possible is None else short(0.15 * possible["eta3"].item()), grows,
+            "" if possible is None else short(0.15 * possible["eta3"].item()),
         ),
-        Quantity("extent", "ΔFₙ", "mean", short(extent), _mean_extent(possible), grows),
+        Quantity("extent", "ΔFₙ", "mean", short(extent), _mean_extent(possible)),
     ]  # fmt: skip
 
 
@@ -85,12 +84,32 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     return [
         Quantity("z", "z", each, exact=f"{summary['coordination']:.3f}"),
         Quantity("phi", "φ", "packing fraction", exact="–" if math.isnan(phi) else f"{phi:.4f}"),
-        Quantity(
-            "h", "h", "free dimensions", exact=free,
-            note="forces minus independent equations",
-        ),
+        Quantity("h", "h", "free dimensions", exact=free),
         Quantity("volume", "ln V", "volume of S", exact=values),
     ]  # fmt: skip
+
+
+def changes(*compared: Shown) -> str:
+    """μ, η, z, φ and h as HTML; those of several packings as "old → new"."""
+    exact = all(shown.exact is not None for shown in compared)
+    columns = [_compared(shown, exact) for shown in compared]
+    values = {name: " → ".join(one[name] for one in columns) for name in columns[0]}
+    return ", ".join(f"<span>{name} {value}</span>" for name, value in values.items())
+
+
+def _compared(shown: Shown, exact: bool) -> dict[str, str]:
+    """exact: whether η3 is that of S, not of the networks."""
+    summary, phi = shown.replay.summary, shown.replay.summary["packing_fraction"]
+    eta3 = shown.exact["eta3"].item() if exact and shown.exact is not None else summary["eta3"]
+    return {
+        "μ": f"{shown.cell.mu:g}",
+        "η₁": short(summary["eta1"]),
+        "η₂": short(summary["eta2"]),
+        f"0.15 η₃ ({'exact' if exact else 'seen'})": short(0.15 * eta3),
+        "z": f"{summary['coordination']:.3f}",
+        "φ": "–" if math.isnan(phi) else f"{phi:.4f}",
+        "h": str(summary["dimension"]),
+    }
 
 
 def sampling(state: AppState) -> Sampling | None:

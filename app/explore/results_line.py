@@ -10,7 +10,7 @@ import xarray as xr
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..results import compute
-from ..results.library import Cell
+from ..results.library import Cell, Shown
 from ..results.progress_feed import Summary
 from ..results.replays import worded
 from ..state.app_state import AppState
@@ -91,11 +91,14 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     values = [_named(one, one.exact or (MEASURE if offered else "–")) for one in packing]
     doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
+    now, was = Shown(state.cell, state.replay, state.exact), state.before
+    change = "" if was is None else f'<p class="was">{result_values.changes(was, now)}</p>'
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
     return (
         _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [values])
         + doubt
+        + change
         + left
     )
 
@@ -103,12 +106,13 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
 def coming(state: AppState) -> str:
     """The tables while the requested states are being computed."""
     measures, packing = result_values.measures(state), result_values.packing(state)
+    was = Shown(state.cell, state.replay, state.exact)
     found = [_named(one, one.exact if state.growing and one.exact else "–") for one in packing]
     rows = [[words, *_dashes(measures)] for words in ("seen: being computed", "exact")]
     return (
         _table(["How undetermined", *_titles(measures)], rows)
         + _table(_titles(packing), [found])
-        + '<p class="left">The numbers of the new packing follow.</p>'
+        + f'<p class="was">Before: {result_values.changes(was)}</p>'
     )
 
 

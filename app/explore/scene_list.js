@@ -1,5 +1,4 @@
-// The list of scenes: choosing one opens its page, in the same theme, and with the friction if it
-// was chosen.
+// The list of scenes: choosing one opens its page, with the friction if it was chosen.
 
 import { sceneOptions } from "../browser/scene_options.js"
 
@@ -16,7 +15,6 @@ export function render({ model }) {
   show()
   list.addEventListener("change", (event) => {
     const here = new URLSearchParams(window.location.search), there = new URLSearchParams({ scene: event.target.value })
-    if (here.get("dark")) there.set("dark", here.get("dark"))
     if (here.has("mu") && Number(here.get("mu")) !== model.usual) there.set("mu", here.get("mu"))
     window.location.assign(`?${there}`)
   })

@@ -57,8 +57,8 @@ export function render({ model, view }) {
 }
 
 function invitation() {
-  const paragraph = createElement("p", { className: "new" }), dark = new URLSearchParams(location.search).get("dark") === "1"
-  const link = createElement("a", { href: `${location.pathname}?learn${dark ? "&dark=1" : ""}`, textContent: "Learn" })
+  const paragraph = createElement("p", { className: "new" })
+  const link = createElement("a", { href: "?learn", textContent: "Learn" })
   const close = button("×", () => { remember(NEW); paragraph.remove() }, { ariaLabel: "Close permanently" })
   paragraph.append("New to this? ", link, " starts with one disk", close)
   return paragraph

@@ -15,10 +15,7 @@ from .lesson import Lesson
 from .model.lesson_data import Packings
 from .workbench.workbench import Workbench
 
-KEYS = [
-    ["arrows", "move the marker, or the dot"],
-    ["Tab", "move from the plot to the buttons"],
-]
+KEYS = [["arrows", "move the marker, or the dot"], ["Tab", "move from the plot to the buttons"]]
 
 
 def learn_page(document: Document, query: str) -> Any:
@@ -26,16 +23,16 @@ def learn_page(document: Document, query: str) -> Any:
     request = scene_links.request_of(query)
     wake, visitor = visit.turns(document), visit.visitor(document)
     given = parse_qs(query.lstrip("?"), keep_blank_values=True)
-    alone = given.get("embed") == ["1"]
-    header = None if alone else Header(door="learn", dark=request.dark, keys=KEYS)
+    alone, dark = given.get("embed") == ["1"], visit.dark(query)
+    header = None if alone else Header(door="learn", dark=dark, keys=KEYS)
     if "learn" in given:
         packings = pn.state.as_cached("packings of the lesson", partial(Packings, visit.library()))
-        view: Any = Lesson(packings, wake, visitor, dark=request.dark, alone=alone)
+        view: Any = Lesson(packings, wake, visitor, dark=dark, alone=alone)
         visit.at_end(view.close)
     else:
         task, saving = (Task(computing, wake, visitor) for _ in range(2))
-        view = Workbench(request, task, saving, dark=request.dark)
+        view = Workbench(request, task, saving, dark=dark)
         visit.at_end(task.close, saving.close)
     if header is not None:
         header.link(view, dark="dark")
-    return framed(header, [view], dark=request.dark)
+    return framed(header, [view], dark=dark)

@@ -17,7 +17,7 @@ NAMED = 4  # known forces in a caption
 
 def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
     """The caption of a picture: background, colour bar, scale and words; moving: of a movie."""
-    looks, pulled = state.looks, "pull" if state.hand.pulls else ""
+    looks = state.looks
     low, stops, high = colour_bar(state)
     contrast = "#f2f5f9" if looks.dark else "#18191d"
     return {
@@ -26,7 +26,7 @@ def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {quantities(state, WIDTHS)[looks.thickness]}; "
-            f"colour: {quantities(state, colours(pulled))[looks.colour]}.",
+            f"colour: {quantities(state, colours(state))[looks.colour]}.",
             origin(state.cell),
             *([] if moving else [f"{network(state)}."]),
             *known_words(state),
@@ -40,12 +40,21 @@ def network(state: AppState) -> str:
     """The network on screen, in words, and whether it has the held forces."""
     number, known = _number(state), state.knowledge.known
     words = f"network {number} of {state.replay.summary['states']}" if number else PACKED
-    if state.hand.held is not None:
+    if _pushed(state):
+        words += ", under a push"
+    elif state.hand.held is not None:
         return f"Pulled by hand from the {words}" + (", with the held forces" if known else "")
     return f"{words.capitalize()}, which ignores the held forces" if known else words.capitalize()
 
 
+def _pushed(state: AppState) -> bool:
+    """Whether the network on screen is the one as packed, under a push."""
+    return state.looks.pulled == "push"
+
+
 def _number(state: AppState) -> int:
+    if _pushed(state):
+        return 0
     frame = min(state.looks.frame, len(state.replay.number) - 1)
     return int(state.replay.number[frame])
 
@@ -67,6 +76,7 @@ def known_words(state: AppState, most: int = NAMED) -> Iterator[str]:
 def shown_stem(state: AppState) -> str:
     """A file name without suffix that also names the network on screen."""
     pulled = "_pulled" if state.hand.held is not None else ""
+    pulled = "_pushed" if _pushed(state) else pulled
     return f"{stem(state.cell.selection)}_network{_number(state)}{pulled}"
 
 

@@ -76,7 +76,7 @@ class Player {
 
   drawThrust(context) {
     const { replay, scene, pushed } = this // networks under a push are outside S
-    if (replay && !scene.frozen && !pushed.held) drawThrust(context, scene, this.thrust, replay.mixed)
+    if (replay && !scene.frozen && !pushed.load) drawThrust(context, scene, this.thrust, replay.mixed)
   }
 
   /** Whether the tab for pushing a contact is open: playing would distract. */
@@ -88,7 +88,9 @@ class Player {
   /** Apply the open tab's settings to the packing. */
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
-    if (!this.pushable) this.pushed.leave()
+    if (this.pushes && this.playing) this.play(false)
+    if (this.pushable) this.pushed.begin()
+    else this.pushed.leave()
   }
 
   /** Whether force space is in view, where the point is what can be dragged first. */
@@ -106,10 +108,10 @@ class Player {
     this.playback.halt()
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
+    this.hand.pulled = null
     this.hand.settle()
     this.tellHeld("")
     this.pushed.end()
-    this.tellTab()
     scene.mixed = this.replay.mixed
     this.dress()
     this.select()
@@ -123,6 +125,7 @@ class Player {
     scene.repaint()
     this.live.glide(view)
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
+    this.tellTab()
     this.playback.newest = walk.room > 0 || (this.playback.newest && place !== null)
     if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
     else if (!shown) this.playFirst()
@@ -366,7 +369,6 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
-      tab: loaded(() => { if (this.pushes && this.playing && this.playback.resting === null) this.toggle() }),
       legend: () => buttons.tellLegend(model.legend),
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
       requested: () => this.showRequested(),
@@ -385,7 +387,9 @@ class Player {
       reduction: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
       frame: loaded((replay) => {
-        if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
+        if (this.playing || replay.swinging || model.frame === replay.frame) return
+        this.pushed.leave()
+        this.show(model.frame, false)
       }),
       palettes: loaded(() => { this.dress(); scene.changed(); this.again() }),
       thrust: loaded(() => { this.thrust = plain(model.thrust); scene.drawMarks() }),
@@ -412,11 +416,12 @@ export function render({ model, view }) {
   const looks = ["most", "colour", "thickness", "full", "stretch", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
   model.on("tab", () => player.showRequested())
-  model.on(["tab", "wide", "pushing"], () => {
+  const renew = () => { player.again(); player.mark() }
+  model.on("wide", renew)
+  model.on(["tab", "pushing"], () => {
     if (!player.replay || player.live.moves) return
     player.tellTab()
-    player.again()
-    player.mark()
+    renew()
   })
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)

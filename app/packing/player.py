@@ -45,9 +45,6 @@ class Player(Scripted, Appearance):
     keepable = param.Boolean(doc="whether more networks of the walk could be stored")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
-    pulled = param.String(
-        doc='"pull" or "push", which led to the network on screen; set by the page'
-    )
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)

@@ -98,7 +98,8 @@ export class PlayerBar {
     this.missed = null
     this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)
-    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (about ${duration(replay.walk.seconds)})` : "Keep all"
+    // Many machines are faster than the one that took the walk.
+    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (up to ${duration(replay.walk.seconds)})` : "Keep all"
     this.showRate()
   }
 

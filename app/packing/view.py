@@ -19,13 +19,14 @@ from .player import Player, frames
 
 # In both directions.
 SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "paused", "opened")
+SHARED += ("stretch", "paused", "opened", "pulled")
 APPEARANCE = sorted(set(Appearance.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty if unknown
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
+HELD = "scale of the free forces"  # while lines obey held ones
 LARGE = 4.0  # ⟨f_n⟩, limit of the widths shown: few forces are larger
 COMING = "(being computed)"  # then lines have no colour of the scale
 LEGEND = """
@@ -83,7 +84,6 @@ class PackingView:
         self._shown = None
         for name in ("between", "zoom"):
             self.player.param.watch(self._go, name)
-        self.player.param.watch(self._explain, "pulled")
         looks.param.watch(self._follow, APPEARANCE)
         state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
@@ -99,7 +99,7 @@ class PackingView:
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain,
-            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference"],
+            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference", "pulled"],
         )
         looks.param.watch(self._turn, "tab")
         state.param.watch(self._explain, ["shown", "exact", "loads", "measured"])
@@ -131,7 +131,7 @@ class PackingView:
             "exact": exact,
             "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
             "measured": measured(state, replay),
-            "most": full_extent(replay, exact, looks.full),
+            "most": full_colour(state),
             "between": None if looks.between is None else list(looks.between),
         }
         if self._shown is not replay:
@@ -177,11 +177,10 @@ class PackingView:
         self.player.displacement = flat
 
     def _explain(self, *events: Any) -> None:
-        pulled = self.player.pulled or ("pull" if self.state.hand.pulls else "")
         if self.state.work.moving:
             self.player.legend = jamming(self.state)
             return
-        self.player.legend = legend(self.state, pulled) + (THRUST if self.player.thrust else "")
+        self.player.legend = legend(self.state) + (THRUST if self.player.thrust else "")
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
@@ -250,60 +249,72 @@ def normal_extent(replay: Replay, exact: Bounds) -> Any:
     return replay.high[:, 0] - replay.low[:, 0]
 
 
-def full_extent(replay: Replay, exact: Bounds, chosen: float | None = None) -> float:
-    """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested."""
-    if chosen is not None:
-        return chosen
-    extent = normal_extent(replay, exact)
+def full_colour(state: AppState) -> float:
+    """ΔF_n in ⟨f_n⟩ for full colour, unless another value was requested.
+
+    It is that of the free forces also while some are held, so that colours show what holding does.
+    """
+    full = state.looks.full
+    return _saturation(state.shown, state.free) if full is None else float(full)
+
+
+def _saturation(replay: Replay, exact: xr.Dataset | None) -> float:
+    extent = normal_extent(replay, exact_intervals(exact, replay))
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
 def colour_bar(state: AppState) -> tuple[str, list[str], str]:
     """The ends of the colour scale in words, and its colours: (low, [stops], high)."""
-    looks = state.looks
+    looks, scales = state.looks, palettes(state.looks.dark)
     full = looks.full or FULL_CHANGE
     change = f"≤ −{full:.3g}", DIVERGING, f"≥ +{full:.3g} ⟨fₙ⟩"
-    most = full_extent(state.shown, exact_intervals(state.drawn, state.shown), looks.full)
     return {
         "mobilised": MOBILISED,
-        "extent": (
-            "0",
-            list(palettes(looks.dark)["extent"][::8]),
-            _full(state, most, _bounds(state)),
-        ),
-        "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
+        "extent": ("0", list(scales["extent"][::8]), _full(state, full_colour(state))),
+        "load": ("0", list(scales["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"≥ {FULL_DEVIATION:g} σ less", DIVERGING, f"≥ {FULL_DEVIATION:g} σ more"),
-        "known": ("0", list(palettes(looks.dark)["known"][::8]), "all of the interval"),
+        "known": ("0", list(scales["known"][::8]), "all of the interval"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[looks.colour]
 
 
 def quantities(state: AppState, labels: dict[str, str]) -> dict[str, str]:
     """Labels {name: words} for captions; those of intervals say whether they are exact."""
-    return labels | {"extent": f"{labels['extent']}, {_bounds(state)}"}
+    kind = _kind(state)
+    bounds = state.bounds if kind == "exact" and state.obeys_held else kind
+    return labels | {"extent": f"{labels['extent']}, {bounds}"}
 
 
-def _bounds(state: AppState) -> str:
-    """The kind of the intervals that lines show, in words."""
-    if not exact_intervals(state.drawn, state.shown):
-        return "seen"
-    return state.bounds if state.obeys_held else "exact"
+def _kind(state: AppState) -> str:
+    """The kind of the intervals that lines show; held forces are omitted to keep legends short."""
+    return "exact" if exact_intervals(state.drawn, state.shown) else "seen"
 
 
-def colours(pulled: str) -> dict[str, str]:
-    """The labels of COLOURS; pulled: "pull" or "push" if that led to the network on screen."""
+def colours(state: AppState) -> dict[str, str]:
+    """The labels of COLOURS, which name a pull or push that led to the network on screen."""
+    pulled = state.looks.pulled or ("pull" if state.hand.pulls else "")
     return COLOURS | ({"change": f"change by the {pulled}"} if pulled else {})
 
 
-def _full(state: AppState, most: float, bounds: str) -> str:
+def _full(state: AppState, most: float) -> str:
     """The ΔF_n of full colour, of which bounds, and whether it differs between packings."""
     if most:
-        this = "" if state.looks.full else ", this packing"
-        return f"≥ {most:.2f} ⟨fₙ⟩ ({bounds}{this})"
+        held = state.drawn is not state.free
+        kind = _kind(state)
+        origin = HELD if held else f"{kind}{_of_packing(state)}"
+        return f"≥ {most:.2f} ⟨fₙ⟩ ({kind if state.looks.full else origin})"
     if state.shown.summary["dimension"]:
         return COMING
     return "0: every force is determined"
+
+
+def _of_packing(state: AppState) -> str:
+    """That the scale is of this packing; after a change of μ, the scale before it."""
+    was = state.before
+    if was is None or state.growing or (was.exact is None) != (state.exact is None):
+        return ", this packing"
+    return f"; {_saturation(was.replay, was.exact):.2f} at μ = {was.cell.mu:g}"
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:
@@ -321,7 +332,7 @@ def jamming(state: AppState) -> str:
     return JAMMING.format(colour=MOBILISATION.format(bar=bar) if coloured else "")
 
 
-def legend(state: AppState, pulled: str = "") -> str:
+def legend(state: AppState) -> str:
     """The present meaning of width and colour, as HTML."""
     looks, replay = state.looks, state.shown
     if replay is None:
@@ -347,8 +358,8 @@ def legend(state: AppState, pulled: str = "") -> str:
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=_chosen(state, "colour", colours(pulled)),
-        wide_bounds=f" ({_bounds(state)})" if looks.thickness == "extent" else "",
+        colour=_chosen(state, "colour", colours(state)),
+        wide_bounds=f" ({_kind(state)})" if looks.thickness == "extent" else "",
         bar=bar,
         saturation=SATURATION,
         full="" if looks.full is None else f"{looks.full:g}",

@@ -67,7 +67,7 @@ def _row(store: Store, name: str, selection: Selection) -> Row:
     return row
 
 
-def groups(rows: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
+def groups(rows: Iterable[Row], mu: float) -> dict[float, list[Floats]]:
     """{μ: extents of its packings} for this μ and some others, spread over all available ones.
 
     Packings with determined forces are left out.
@@ -77,7 +77,7 @@ def groups(rows: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[floa
         if row["extent"].max(initial=0) > UNDETERMINED:
             by_mu.setdefault(row["mu"], []).append(row["extent"])
     others = sorted(value for value in by_mu if value != mu)
-    most -= mu in by_mu
-    pick = np.unique(np.linspace(0, len(others) - 1, min(most, len(others))).round().astype(int))
+    most = min(MOST_CURVES - (mu in by_mu), len(others))
+    pick = np.unique(np.linspace(0, len(others) - 1, most).round().astype(int))
     chosen = sorted({others[k] for k in pick} | ({mu} & set(by_mu)))
     return {value: by_mu[value] for value in chosen}

@@ -135,10 +135,7 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
         )
     if plane.kind == STRESS:
         return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
-    return (
-        "the direction in which networks differ most, in ⟨fₙ⟩",
-        "the second such direction",
-    )
+    return ("the direction in which networks differ most, in ⟨fₙ⟩", "the second such direction")
 
 
 def name(plane: Plane) -> str:

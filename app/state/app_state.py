@@ -27,8 +27,8 @@ from .view_settings import Looks
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed automatically
 # Parameters of Looks that change by playing or zooming, not by the visitor's choice of view: going
-# back does not restore the previous frame, zoom or theme.
-PASSING = ("frame", "paused", "opened", "zoom", "dark")
+# back does not restore the previous frame or zoom.
+PASSING = ("frame", "paused", "opened", "zoom")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -48,6 +48,7 @@ class AppState(param.Parameterized):
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
+    before = param.Parameter(doc="the Shown before the last change if only μ changed, or None")
     source = param.String(doc="where the states on screen come from, in words")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
@@ -98,14 +99,8 @@ class AppState(param.Parameterized):
             selection, texts = None, {}
             self.work.message = str(error)
         view = read_view(texts, self._viewed)
-        self.looks.dark = view.get("dark", self.looks.dark)  # before anything is visible
-        self._look_up(
-            selection, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
-        )
-
-    def _as_new(self) -> View:
-        """The view of a new page, except for the theme: what a link omits."""
-        return {name: self._viewed[name].default for name in VIEW if name != "dark"}
+        new = {name: self._viewed[name].default for name in VIEW}  # what a link omits
+        self._look_up(selection, new | view, counted="states" in parse_qs(query.lstrip("?")))
 
     @property
     def _unseen(self) -> View:
@@ -128,12 +123,15 @@ class AppState(param.Parameterized):
         return self.shown is not self.replay
 
     @property
+    def free(self) -> Any:
+        """The exact intervals of the Replay on screen, without held forces; or None."""
+        return None if self.growing else self.exact
+
+    @property
     def possible(self) -> Any:
         """The exact intervals of the Replay on screen, given the known forces; or None."""
-        if self.growing:
-            return None
         narrowed = self.knowledge.narrowed
-        return self.exact if narrowed is None else narrowed.after
+        return self.free if narrowed is None or self.growing else narrowed.after
 
     @property
     def bounds(self) -> str:
@@ -148,7 +146,7 @@ class AppState(param.Parameterized):
     @property
     def drawn(self) -> Any:
         """The exact intervals that lines show: `possible`, or those without the held forces."""
-        return self.possible if self.obeys_held or self.growing else self.exact
+        return self.possible if self.obeys_held else self.free
 
     def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue again; show what was just computed."""
@@ -285,6 +283,7 @@ class AppState(param.Parameterized):
             self.param.update(
                 selection=cell.selection,
                 missing=False,
+                before=self._before(cell),
                 cell=cell,
                 replay=replay,
                 shown=replay,
@@ -295,6 +294,13 @@ class AppState(param.Parameterized):
                 plane=self.plane if self.replay is replay else None,
             )
             self._look(fresh | fitting(view or {}, replay))
+
+    def _before(self, cell: Cell) -> Shown | None:
+        """The states on screen if those of a cell differ only by μ."""
+        now = self.cell
+        if now is None or cell.series != now.series:
+            return None
+        return self.before if cell.mu == now.mu else Shown(now, self.replay, self.exact)
 
     def _source(self, cell: Cell | None = None) -> str:
         """The source of a cell's states, by default of the cell on screen."""

@@ -92,7 +92,6 @@ VIEW: dict[str, Stored] = {
     "scale": Stored(str),
     "pushing": Stored(str),
     "axes": Stored(str),
-    "dark": Stored(_flag, int),
 }  # fmt: skip
 OF_A_REPLAY = tuple(name for name, stored in VIEW.items() if stored.numbered)
 

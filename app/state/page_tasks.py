@@ -89,9 +89,13 @@ class Work(param.Parameterized):
         for task in self.tasks:
             task.close()
 
+    def say(self, line: str) -> None:
+        """Report a problem."""
+        self.message = line
+
     def _tell(self, event: Any) -> None:
         if event.new:
-            self.message = event.new
+            self.say(event.new)
 
     def _count(self, event: Any) -> None:
         self.busy = any(task.running for task in self.tasks)

@@ -81,9 +81,7 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
 
     def work(job: Job) -> Pushed:
         params = kinds.PERTURBATION.parameters(
-            cell.selection.packing,
-            mu=cell.selection.mu,
-            contacts=[int(replay.backbone[contact])],
+            cell.selection.packing, mu=cell.selection.mu, contacts=[int(replay.backbone[contact])]
         )
         stage = "contact dynamics under a growing load"
         dataset = load_or_compute(  # of one contact, whose part done is not known

@@ -19,7 +19,6 @@ class Request(NamedTuple):
 
     scene: str  # one of LARGE for the page of large packings
     mu: float | None
-    dark: bool
     built: str  # a visitor's scene, as text
     query: str  # for the page of large packings
 
@@ -42,8 +41,7 @@ def request_of(query: str) -> Request:
     if "scene" in given and name not in LARGE[1:]:
         others = [pair for pair in pairs if pair[0] != "scene"]
         query = f"?{urlencode(others)}" if others else ""
-    dark = given.get("dark") == "1"
-    return Request(name, mu, dark, given.get("built", "")[:LONGEST], query)
+    return Request(name, mu, given.get("built", "")[:LONGEST], query)
 
 
 def titles() -> list[list[str]]:

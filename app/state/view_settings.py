@@ -44,11 +44,7 @@ SORTS = {
 }
 DRAWN = {"all": "all", "some": "a few"}
 # Options of single tabs.
-PUSHES = {
-    "one": "one contact",
-    "all": "every contact",
-    "store": "against indeterminacy (Figure 2)",
-}
+PUSHES = {"one": "one contact", "all": "every contact", "store": "against indeterminacy (Figure 2)"}
 PLANES = {
     "pair": "the normal forces of two contacts",
     "principal": "the plane in which networks differ most",
@@ -67,6 +63,7 @@ class Appearance(param.Parameterized):
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
     paused = param.Boolean(doc="whether the player rests")
     opened = param.List(default=[], item_type=str, doc="names of the panels that are open")
+    pulled = param.String(doc='"pull" or "push" if that led to the network on screen')
     frame = param.Integer(default=0, doc="row of `replay` on screen; updated while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")

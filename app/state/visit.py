@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from urllib.parse import parse_qsl
 
 import panel as pn
 from bokeh.document import Document
@@ -27,6 +28,12 @@ def library() -> Library:
 def _open_library() -> Library:
     gc_pauses.settle()
     return Library()
+
+
+def dark(query: str) -> bool:
+    """Whether the visitor chose the dark theme; without a choice that of the link, for frames."""
+    given = dict(parse_qsl(query.lstrip("?")))
+    return pn.state.cookies.get("dark", given.get("dark")) == "1"
 
 
 def at_end(*closes: Callable[[], object]) -> None:

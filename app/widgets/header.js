@@ -7,22 +7,17 @@ import { lastView } from "../browser/local_storage.js"
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
 // Entry pages: name, title, and query; that of Explore is its last view, in which a packing of the visitor's own
 // is named by its content.
-const DOORS = [["explore", "Explore", lastView], ["learn", "Learn", () => "learn"]]
+const DOORS = [["explore", "Explore", lastView], ["learn", "Learn", () => "?learn"]]
+const YEAR_S = 365 * 24 * 3600
 
 export function render({ model }) {
   const root = document.createElement("div"), header = root.appendChild(document.createElement("header"))
   const nav = createElement("nav", { ariaLabel: "granforce" }), tools = createElement("div", { className: "tools" })
   header.append(createElement("b", { textContent: "granforce" }), nav, tools)
 
-  /** The address of an entry page, in the theme of this page. */
-  const address = (query) => {
-    const parameters = [query.replace(/^\?|&?\bdark=[01]/g, ""), model.dark ? "dark=1" : ""].filter(Boolean).join("&")
-    return window.location.pathname + (parameters && `?${parameters}`)
-  }
-
   function show() {
     nav.replaceChildren(...DOORS.map(([door, textContent, query]) => {
-      const link = createElement("a", { textContent, href: address(query()) })
+      const link = createElement("a", { textContent, href: window.location.pathname + query() })
       if (door === model.door) link.ariaCurrent = "page"
       return link
     }))
@@ -30,7 +25,10 @@ export function render({ model }) {
   }
 
   const link = copyButton("Copy link", () => window.location.href)
-  const theme = button("", () => { model.dark = !model.dark }, { innerHTML: HALF })
+  const theme = button("", () => {
+    model.dark = !model.dark
+    document.cookie = `dark=${model.dark ? 1 : 0}; max-age=${YEAR_S}; samesite=lax` // see visit.dark
+  }, { innerHTML: HALF })
   const help = helpOf(model, root)
   const helpButton = button("?", () => help.showModal(), { ariaLabel: "Help and keys", title: "Help and keys (?)" })
   tools.append(link, helpButton, theme)

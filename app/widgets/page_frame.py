@@ -37,11 +37,7 @@ THEME = {
 
 
 def framed(
-    header: Header | None,
-    main: list[Any],
-    *,
-    dark: bool,
-    styles: dict[str, Any] | None = None,
+    header: Header | None, main: list[Any], *, dark: bool, styles: dict[str, Any] | None = None
 ) -> pmui.Page:
     """A page with this header above `main`, in the header's theme.
 

@@ -48,7 +48,7 @@ from app.results.selection import (
     select,
     selected,
 )
-from app.state import app_state, comparison, page_tasks, scene_links
+from app.state import app_state, comparison, page_tasks, scene_links, visit
 from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, read_view, spelled
@@ -298,7 +298,7 @@ def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(query, visited
 
 def test_the_view_travels_with_the_link(state, visited):
     seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
-    state.looks.param.update(**seen, stretch=2.0, dark=True)
+    state.looks.param.update(**seen, stretch=2.0)
     again = visited(state.link())
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
@@ -391,10 +391,13 @@ def test_views_that_make_no_sense_are_left_out(names, visited):
     assert (state.hand.pulls, state.knowledge.known, looks.pair) == ([], [], None)
 
 
-def test_a_page_by_night_is_dark_before_its_states_are_there(library):
-    state = AppState(library, query="mu=0.3&n=30&states=4&dark=1")
-    assert state.replay is None and state.looks.dark
-    state.work.close()
+def test_the_theme_is_the_visitors_own_and_only_otherwise_that_of_a_link(state, monkeypatch):
+    state.looks.dark = True
+    assert "dark" not in state.link()
+    for chosen, given, dark in [(None, "0", False), (None, "1", True), ("1", "0", True)]:
+        cookies = {"dark": chosen} if chosen else {}
+        monkeypatch.setattr(type(visit.pn.state), "cookies", cookies)
+        assert visit.dark(f"?mu=0.1&dark={given}") == dark
 
 
 @pytest.mark.parametrize("packed", [None, 0.0])

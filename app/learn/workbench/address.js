@@ -17,17 +17,16 @@ export class Address {
   stop() { window.removeEventListener("popstate", this.listener) }
 
   /** Update the address to the present scene. */
-  write({ scene: { name, built }, mu }, dark) {
+  write({ scene: { name, built }, mu }) {
     if (this.returning) return
     const scene = new URLSearchParams(window.location.search).get("scene"), step = scene && scene !== name
-    window.history[step ? "pushState" : "replaceState"](null, "", `?${this.query({ scene: name, mu: String(Number(mu.toPrecision(6))), built }, dark)}`)
+    window.history[step ? "pushState" : "replaceState"](null, "", `?${this.query({ scene: name, mu: String(Number(mu.toPrecision(6))), built })}`)
   }
 
-  query(given, dark) {
-    const named = Object.entries({ ...given, dark: dark ? "1" : "" }).filter(([, value]) => value !== "" && value !== undefined)
-    return new URLSearchParams(named)
+  query(given) {
+    return new URLSearchParams(Object.entries(given).filter(([, value]) => value !== "" && value !== undefined))
   }
 
-  /** Leave for another page, in the same theme, with the friction if it was chosen by the visitor. */
-  leave(scene, mu, dark) { window.location.assign(`?${this.query({ scene, mu: mu === null ? "" : String(Number(mu.toPrecision(6))) }, dark)}`) }
+  /** Leave for another page, with the friction if it was chosen by the visitor. */
+  leave(scene, mu) { window.location.assign(`?${this.query({ scene, mu: mu === null ? "" : String(Number(mu.toPrecision(6))) })}`) }
 }

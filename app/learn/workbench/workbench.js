@@ -58,7 +58,7 @@ class Workbench {
       this.walk.pause()
     })
     model.on("scene", () => this.show())
-    model.on("dark", () => { this.dress(); this.soon(); if (this.hand) this.address.write(this.hand, model.dark) })
+    model.on("dark", () => { this.dress(); this.soon() })
     model.on("msg:custom", (news) => this.arrived(news))
   }
 
@@ -139,7 +139,7 @@ class Workbench {
     this.root.classList.toggle("building", buildable)
     this.root.classList.toggle("tall", tall(scene))
     this.address.returning = false
-    if (before && !(buildable && before.name === "own")) this.address.write(this.hand, this.model.dark)
+    if (before && !(buildable && before.name === "own")) this.address.write(this.hand)
     this.showMu()
     this.say(before ? "" : this.model.note)
     this.rest()
@@ -204,7 +204,7 @@ class Workbench {
 
   rested() {
     const { hand, space } = this, { body } = hand, fails = body.empty && !body.scene.idle
-    this.address.write(hand, this.model.dark) // first, because a request fails without a server
+    this.address.write(hand) // first, because a request fails without a server
     if (!body.empty && this.filled && !space.dots.length && body.bounded) { space.fill(); this.soon() }
     if (fails && !hand.enough) { hand.enough = body.enough(MOST_MU); this.changed() }
     if (fails) this.find("fall")
@@ -372,7 +372,7 @@ class Workbench {
     const { model, view, chosenMu, hand: { mu } } = this
     if (model.large.includes(scene)) {
       clearTimeout(this.resting)
-      return this.address.leave(scene, chosenMu ? mu : null, model.dark)
+      return this.address.leave(scene, chosenMu ? mu : null)
     }
     if (!this.banner.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)

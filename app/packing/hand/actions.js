@@ -16,7 +16,7 @@ export function actions(player) {
     more: loaded(() => player.hand.nudge(1)),
     hold: loaded((replay) => player.hold(replay)),
     pull: loaded(() => player.hand.pullTo(player.buttons.force)),
-    undo: loaded((replay) => { if (replay.held) player.hand.tell({ undo: true }) }),
+    undo: loaded((replay) => { if (replay.held && !player.pushed.held) player.hand.tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
     play: loaded(() => {
       player.hand.free()
@@ -33,7 +33,10 @@ export function actions(player) {
       model.reference = replay.frame
       model.beside = null
     }),
-    between: loaded((replay) => player.between(replay)),
+    between: loaded((replay) => {
+      player.hand.free()
+      player.between(replay)
+    }),
     split: loaded(() => { model.split = !model.split }),
     keep: (number) => model.send_msg({ keep: number }),
     tab: (number) => model.send_msg({ tab: number }),

@@ -27,6 +27,7 @@ export class Grab {
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
     this.moved = this.flung = false // whether it moved, and whether it was released before its rail arrived
+    this.pulled = null // the network after all pulls, as the server has it
     this.aim = null // contact and value of a pull whose network has not arrived
     this.lingers = 0
     this.frames = 0
@@ -59,6 +60,7 @@ export class Grab {
     const { player } = this
     if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
     player.playback.newest = false
+    player.pushed.leave()
     if (player.playing) player.play(false)
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()
@@ -159,13 +161,22 @@ export class Grab {
     if (this.active) this.player.plots.move(false)
     this.contact = null
     this.spot.drop()
+    this.player.pushed.leave()
     if (!this.replay?.held) return
     this.tell({ free: true })
-    this.player.pushed.end()
     this.forget()
   }
 
+  /** Show what the server has: a state, or the network after the pulls. */
+  restore() {
+    const { player, replay } = this
+    replay.held = null
+    player.show(replay.swinging ? replay.position : player.model.frame, false)
+    this.keep(this.pulled)
+  }
+
   forget() {
+    this.pulled = null
     if (this.replay) this.replay.held = null
     this.player.pushed.end()
     this.settle()
@@ -187,8 +198,9 @@ export class Grab {
     this.aim = null
     if (rail !== undefined) this.ride(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))
-    const pushed = !held && this.player.pushed.held // meanwhile it was no longer pulled
-    if (held !== undefined && !this.active && !pushed) this.keep(held && plain(held))
+    if (held === undefined || this.active) return
+    if (this.player.pushed.held) this.pulled = held && plain(held) // shown after the push
+    else this.keep(held && plain(held))
   }
 
   ride(rail) {
@@ -218,6 +230,7 @@ export class Grab {
     if (!replay) return
     if (!held) return this.forget()
     if (held.normal.length !== replay.walk.contacts) return
+    this.pulled = held
     const from = replay.frame * replay.walk.contacts
     this.before ??= replay.walk.normal.slice(from, from + replay.walk.contacts)
     replay.held = held
@@ -240,7 +253,7 @@ export class Grab {
   show(held) {
     const { replay, player } = this
     replay.held = held
-    player.tellHeld(held.place === "pushed" ? "push" : "pull")
+    player.tellHeld(held.place ? "push" : "pull")
     if (this.pendingFrame) return
     this.pendingFrame = requestAnimationFrame(() => {
       this.pendingFrame = 0

@@ -2,6 +2,7 @@
 // interpolated between networks from the server. Between two of them the straight line balances the
 // load in between (S under all loads is convex too). At the last of them, disks start to move.
 
+import { FORCES } from "../replay/live.js"
 import { networkAt } from "../replay/replay.js"
 
 export class Pushed {
@@ -10,40 +11,55 @@ export class Pushed {
     this.end()
   }
 
-  /** Stop pushing: the network of before is shown again, without its pulls. */
+  /** Another network is on screen. */
   end() {
     this.load = this.part = 0
     this.moves = false // whether disks start to move
-    const { player } = this, held = this.held
-    this.held = null
-    player.sway?.take(null)
-    if (!held || player.replay?.held !== held) return
-    player.hand.forget()
-    player.show(player.model.frame, false)
+    this.held = null // the pushed network, while it is on screen
+    this.player.sway?.take(null)
   }
 
-  /** Stop pushing; pulls are shown again. */
+  /** Show the network as packed, with which every push begins. */
+  begin() { if (this.possible && !this.held) this.show() }
+
+  /** Stop pushing: the network of before is shown again, with its pulls. */
   leave() {
-    const pushed = this.held
+    const { held, player } = this
     this.end()
-    if (pushed) this.player.hand.tell({ anew: true })
+    if (held && player.replay?.held === held) player.hand.restore()
+  }
+
+  get possible() {
+    const { player } = this
+    return player.pushable && !player.live.moves && !player.grows
   }
 
   /** path: networks under loads up to the largest one with equilibrium; part: fraction of the longest arrow. */
   take(path, load, part) {
-    const { player } = this, { replay, scene } = player
-    if (!player.pushable || player.live.moves || player.grows) return
-    if (load > 0 && player.playing) player.play(false)
+    const { player } = this, known = path.values?.length > 0 && path.normal.length === path.values.length * player.replay?.walk.contacts
+    if (!this.possible) return
     Object.assign(this, { load, part, moves: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
     this.tellMotion()
-    if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
-      if (this.held) this.leave()
-      return scene.style && scene.drawMarks()
-    }
+    if (load > 0 && known) this.show({ ...networkAt(path, load), place: "pushed" })
+    else if (load > 0 || this.held) this.show()
+    else if (player.scene.style) player.scene.drawMarks()
+  }
+
+  /** Show a network, by default the one as packed; for the server, the network of before is still on screen. */
+  show(network = this.packed) {
+    const { player } = this, { replay } = player
+    if (player.playing) player.play(false)
     if (!this.held) player.say("") // about a pull
-    if (replay.position) player.show(0, false) // meanwhile, for the server, the network of before is on screen
-    player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
-    player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
+    replay.held = this.held = network
+    if (replay.position && !replay.swinging) player.show(0, false)
+    player.look.before = this.packed.normal
+    player.hand.show(network)
+  }
+
+  get packed() {
+    const { walk } = this.player.replay // whose arrays are Bokeh's, which have no subarrays
+    const [normal, tangential] = FORCES.map((name) => walk[name].slice(0, walk.contacts))
+    return { normal, tangential, residual: walk.residual[0], place: walk.origin }
   }
 
   /** Disks move only under a sufficient push. */

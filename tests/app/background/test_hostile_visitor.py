@@ -98,7 +98,7 @@ SELECTION = (
 )  # fmt: skip
 VIEW = (
     "tab", "contact", "frame", "reference", "between", "colour", "thickness", "sort",
-    "scale", "dark",
+    "scale",
 )  # fmt: skip
 
 

@@ -8,6 +8,28 @@ import pytest
 from app.browser.bundle import APP
 
 
+def test_a_scene_of_the_other_page_says_where_it_opens(run):
+    options = run(
+        "browser/scene_options",
+        """({ sceneOptions }) => sceneOptions(
+            [["groove", "One disk", "Learn"], ["many", "Many disks", "Explore"]], "Explore")""",
+    )
+    assert 'value="many">Many disks</option>' in options
+    assert 'value="groove">One disk → Learn</option>' in options
+
+
+def test_the_time_to_keep_all_networks_is_an_upper_limit(run):
+    words = run(
+        "packing/player_bar",
+        """({ PlayerBar }) => {
+            const bar = new PlayerBar({}, () => {}), walk = { seconds: 47, states: 1000 }
+            bar.showTrack({ last: 1, stride: 20, walk }, true)
+            return bar.keep.textContent
+        }""",
+    )
+    assert words == "Keep all (up to 47 s)"
+
+
 def test_every_script_is_a_module_by_itself(run):
     """As they are written, not as they are joined: `module` makes no module of what is none."""
     names = [str(path.relative_to(APP).with_suffix("")) for path in APP.glob("**/*.js")]
@@ -606,30 +628,43 @@ def test_the_caption_of_a_picture_fits_and_its_line_is_as_wide_as_it_says(run):
 
 
 def test_a_pull_is_back_after_a_push(run):
-    """The network of before, at its place on the track, as nobody had pushed."""
-    shown, told = run(
-        "packing/hand/push_animation",
-        """({ Pushed }) => {
-            const shown = [], told = [], nothing = () => {}
-            const walk = { contacts: 1, normal: new Float32Array([1, 2]) }
-            const player = {
-                pushable: true, live: {}, model: { frame: 1 }, look: {}, say: nothing,
-                scene: { drawMarks: nothing, style: null }, sway: { take: nothing },
-                replay: { walk, held: { normal: [3] }, position: 1 },
-                show: (to, tell = true) => { shown.push([to, tell]); player.replay.position = to },
-                hand: {
-                    show: (held) => { player.replay.held = held },
-                    forget: () => { player.replay.held = null },
-                    tell: (message) => told.push(message),
-                },
+    """The network of before, without asking the server, also if it changed during the push."""
+    said, held, shown, told = run(
+        "packing/hand/push_animation packing/hand/drag_force",
+        """({ Pushed, Grab }) => {
+            const shown = [], told = [], said = [], held = [], nothing = () => {}
+            const walk = {
+                contacts: 1, normal: new Float32Array([1, 2]), tangential: new Float32Array(2),
+                residual: [0, 0], origin: "as packed", backbone: [0],
             }
-            const pushed = new Pushed(player)
+            const replay = { walk, position: 1, frame: 1, held: null }
+            const player = {
+                replay, pushable: true, live: {}, model: { frame: 1 }, look: {}, say: nothing,
+                scene: { drawMarks: nothing, style: null }, sway: { take: nothing },
+                show: (to, tell = true) => { shown.push([to, tell]); replay.position = to },
+                again: nothing, tellHeld: (cause) => said.push(cause), repaintHeld: nothing,
+            }
+            const hand = player.hand = new Grab(player, (message) => told.push(message))
+            const pushed = player.pushed = new Pushed(player)
+            const pulled = (fn) => ({ normal: [fn], tangential: [0], residual: 0, pull: [0, fn] })
             const path = { values: [0, 1], normal: [1, 2], tangential: [0, 0], residual: [0, 0] }
+            const look = () => held.push([replay.held.normal[0], replay.held.place ?? "pulled"])
+            hand.hear({ held: pulled(3) })
+            look()
+            pushed.begin()
+            look()
             pushed.take(path, 0.5, 0.5)
+            look()
+            hand.hear({ held: pulled(4) })
+            look()
             pushed.leave()
+            look()
             pushed.leave()
-            return [shown, told]
+            return [said, held, shown, told]
         }""",
     )
+    pushed = [1.5, "pushed"]
+    assert held == [[3, "pulled"], [1, "as packed"], pushed, pushed, [4, "pulled"]]
+    assert said == ["pull", "push", "push", "pull"]
     assert shown == [[0, False], [1, False]]  # the server never hears of another network
-    assert told == [{"anew": True}]
+    assert told == [{"hand": {"anew": True}}]

@@ -861,7 +861,7 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     state.looks.thickness = "extent"  # its name stays; the scale says which intervals
     assert "⟨fₙ⟩ (seen)" in player.legend
     wait_for(state)
-    assert "⟨fₙ⟩ (exact given the held forces)" in player.legend
+    assert "⟨fₙ⟩ (exact)" in player.legend
     state.knowledge.release(3)
     assert "⟨fₙ⟩ (exact)" in player.legend and ">interval ΔFₙ</option>" in player.legend
     player.colour = "known"  # chosen in the legend
@@ -1014,7 +1014,7 @@ def test_a_page_as_a_file_says_that_its_bounds_obey_held_forces(state):
     wait_for(state)
     page = export_view.Snapshot(state).html(Job(lambda job: None)).content.decode()
     assert "interval, exact given the held forces" in page and "interval, seen" not in page
-    assert "⟨fₙ⟩ (exact given the held forces" in page
+    assert "⟨fₙ⟩ (scale of the free forces)" in page
 
 
 def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):

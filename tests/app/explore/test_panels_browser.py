@@ -161,8 +161,8 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
     until(page, "scene.offset !== null")
     slider.evaluate("e => { e.value = 0; e.dispatchEvent(new Event('input')) }")
     until(page, "scene.offset === null")
-    until(page, "scene.hand.player.replay.held === null")
     page.locator(".state").get_by_text("as packed").wait_for()
+    assert scene(page, "Array.from(scene.mixed.normal)") == packed
     slider.evaluate("e => { e.value = e.step; e.dispatchEvent(new Event('input')) }")
     until(page, "scene.hand.player.pushed.held !== null")
     page.get_by_role("tab", name="Intervals").click()

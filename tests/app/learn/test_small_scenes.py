@@ -34,7 +34,6 @@ def test_links_name_a_scene(query, scene, mu):
     asked = scene_links.request_of(query)
     assert (asked.scene, asked.mu) == (scene, mu)
     assert "scene" not in asked.query
-    assert not asked.dark and scene_links.request_of(f"{query or '?scene=groove'}&dark=1").dark
 
 
 def test_every_scene_of_the_library_is_on_the_list():

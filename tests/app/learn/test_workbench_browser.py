@@ -228,12 +228,15 @@ def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):
 
 
 def test_400_disks_take_the_theme_and_the_friction_along(look):
-    page = look("?scene=groove&dark=1")
+    page = look("?scene=groove")
+    page.get_by_role("button", name="Dark theme").click()
     page.get_by_role("textbox", name="μ").fill("1")
     page.get_by_role("textbox", name="μ").press("Enter")
     choose(page, "many")
     painted(page)
-    searched(page, "mu=1&", "dark=1")
+    searched(page, "mu=1&")
+    page.get_by_role("button", name="Light theme").wait_for()
+    assert "dark" not in page.url
 
 
 def test_a_scene_outlives_its_server(opening, shipped, tmp_path):

@@ -191,5 +191,8 @@ def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     table = contacts(replay, None, state.looks.frame, state.hand.held)
     assert table["f_n [mean]"][4] == pytest.approx(value)
     assert network(state) == "Pulled by hand from the network as packed"
+    state.looks.pulled = "push"  # as the page reports while it shows one
+    assert network(state) == "Network as packed, under a push"
+    state.looks.pulled = "pull"
     page.hear(undo=True)
     assert state.hand.held is None and network(state) == "Network as packed"

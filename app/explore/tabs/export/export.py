@@ -145,11 +145,7 @@ class View:
 
     def panel(self) -> pn.Column:
         """Buttons with explanations."""
-        return pn.Column(
-            self.buttons,
-            note(HELP),
-            sizing_mode="stretch_width",
-        )
+        return pn.Column(self.buttons, note(HELP), sizing_mode="stretch_width")
 
     def _asked(self, key: str) -> None:
         state, kind = self.state, KINDS[key]

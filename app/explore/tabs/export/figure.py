@@ -24,9 +24,6 @@ def panel(state: AppState, tab: str) -> Any:
     tab: the tab's title, which the files name.
     """
 
-    def refuse(line: str) -> None:
-        state.work.message = line
-
     def make(kind: str) -> None:
         if state.replay is not None:
             name = f"{shown_stem(state)}_{tab}.{kind}"
@@ -34,7 +31,7 @@ def panel(state: AppState, tab: str) -> Any:
 
     buttons = Handover(make, files=FILES, margin=(4, 10, -8, 10))
     width = NumberField(
-        refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
+        state.work.say, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
         margin=(0, 10, 4, 10),
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")

@@ -42,11 +42,7 @@ def contacts(
     if held is not None:
         normal, tangential = held.forces.T
     first = np.unique(replay.links.contact, return_index=True)[1]
-    columns = {
-        "contact": replay.backbone,
-        "i": replay.links.i[first],
-        "j": replay.links.j[first],
-    }
+    columns = {"contact": replay.backbone, "i": replay.links.i[first], "j": replay.links.j[first]}
     known = [] if knowledge is None else [one.contact for one in knowledge.known]
     if known:
         columns["known"] = np.isin(np.arange(len(replay.backbone)), known).astype(int)

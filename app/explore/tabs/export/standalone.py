@@ -17,7 +17,7 @@ from bokeh.resources import Resources
 from ....background.jobs import Job
 from ....browser.bundle import Scripted, module
 from ....packing.player import Player, frames
-from ....packing.view import THRUST, exact_intervals, full_extent, legend
+from ....packing.view import THRUST, exact_intervals, full_colour, legend
 from ....results import planes
 from ....results.library import Cell, Library
 from ....results.replays import Replay, evenly
@@ -97,15 +97,13 @@ def html(
     given = {name: Player.param[name].default for name in names}
     given |= {name: view[name] for name in same}
     given |= shown
+    rest = still.at_rest(library, replay, exact, view, loads=given["loads"], narrowed=narrowed)
     given |= {
         "walk": frames(thinned_replay),
         "exact": intervals,
-        "most": full_extent(replay, intervals, view["full"]),
+        "most": full_colour(rest),
         "palettes": palettes(False),
-        "legend": legend(
-            still.at_rest(library, replay, exact, view, loads=given["loads"], narrowed=narrowed)
-        )
-        + (THRUST if given["thrust"] else ""),
+        "legend": legend(rest) + (THRUST if given["thrust"] else ""),
         "source": source,
         "frame": frame,
         "between": between,

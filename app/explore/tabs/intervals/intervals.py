@@ -53,11 +53,7 @@ class View(TabView):
         self.drawn = question("Contacts", DRAWN, self.looks, "drawn", **SMALL)
         self.sorts = question("Sort bars", SORTS, self.looks, "sort", **SMALL | {"width": 208})
         self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
-        self.choices = [
-            self.drawn,
-            self.sorts,
-            self.units,
-        ]
+        self.choices = [self.drawn, self.sorts, self.units]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.lead, self.details = note("Opening the packing …"), note()
         self.exact.on_click(lambda event: state.compute_exact())
