@@ -13,7 +13,7 @@ from granforce.motion.inertia import make_step
 from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
-from granforce.perturb.critical_force import critical_force, critical_forces, response
+from granforce.perturb.critical_force import RISE, critical_force, critical_forces, response
 from granforce.records import Cancelled, InputError, UndecidedError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -67,9 +67,20 @@ def test_loads_rise_by_the_part_of_the_way_that_is_asked_for():
 
 def test_sliding_lets_grains_set_off_below_the_limit_load():
     S = ensemble(reference("n100_mu1_s12"))
-    contacts = S.index[[0, 48]]
+    contacts = S.index[[53, 113]]
     pairs = zip(contacts, limit_loads(S, contacts), strict=True)
     assert all(critical_force(S, c, limit_load=load).low < 0.6 * load for c, load in pairs)
+
+
+def test_the_usual_load_steps_are_short_enough():
+    """A quarter of the step hardly changes F_crit, where steps twenty times as long halve it."""
+    S = ensemble(packed(100, 10.0, 24))
+    (coarse, usual, fine) = (
+        np.array([one.low for one in critical_forces(S, [14, 34], rise=rise)])
+        for rise in (0.4, RISE, RISE / 4)
+    )
+    assert np.abs(usual - fine).max() < 0.03 * S.force_scale
+    assert (coarse < 0.5 * usual).any()
 
 
 def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
@@ -153,7 +164,8 @@ def test_motion_obeys_momentum_balance_and_coulombs_law():
     unbalance = S.A @ S.to_vector(loaded) - S.b / S.force_scale
     assert np.abs(unbalance - mass * U).max() <= ROUNDING * np.abs(unbalance).max()
     w_n, w_t = (S.A.T @ U).reshape(-1, 2).T
-    w_n, w_t = (w / np.abs(w_n).max() for w in (w_n, w_t))
+    fastest = max(np.abs(w_n).max(), np.abs(w_t).max())
+    w_n, w_t = w_n / fastest, w_t / fastest
     small = 10 * flow.STEADY
     assert w_n.min() >= -small
     assert np.abs(w_n[f[:, 0] > 0]).max() <= small
