@@ -120,9 +120,9 @@ def pack(
 ) -> Packing:
     """A jammed packing of n disks with friction coefficient μ in a doubly periodic box.
 
-    radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii; the same
-    seed in other units of length gives another packing unless the factor is a power of two, as
-    rounding decides which contacts form.
+    radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii; in
+    other units of length, the same seed gives another packing unless the factor is a power of two,
+    as rounding decides which contacts form.
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
     farther than 0.02. accuracy: largest violation of the laws of Signorini and Coulomb after a
