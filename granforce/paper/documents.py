@@ -75,8 +75,7 @@ NAMED = (  # claims that the README names if they are contradicted
     "η3 does not depend on how networks are sampled",
     "corr(f_n, ΔF_n) vanishes at large μ",
 )
-_CLAIM_HEADS = ("verdict", "claim, and the number judged", "value", "range", "others")
-DAGGER = " †"
+_CLAIM_HEADS = ("claim, and the number judged", "verdict", "value", "range", "others")
 UNBROKEN = "\u00a0…\u00a0"  # of a range, in narrow columns
 _NOTHING = (MISSING, UNMEASURED)  # verdicts without a number
 _SCARCE = (FEW, *_NOTHING)  # verdicts for want of data
@@ -468,8 +467,11 @@ def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     verdicts = {claim["statement"]: claim["verdict"] for claim in decided(claims)}
     named = [name for name in NAMED if verdicts.get(name) in OUTCOMES["contradicted"]]
     if named:
-        words = "; ".join(name.replace(": ", ", ") for name in named)
-        chosen.append(f"Claims of the paper that the study contradicts (in our words): {words}.")
+        sources = {claim["statement"]: claim["source"] for claim in decided(claims)}
+        words = "; ".join(
+            name.replace(": ", ", ") + " (the letter)" * (sources[name] == PRL) for name in named
+        )
+        chosen.append(f"Among the claims that the study contradicts are (in our words): {words}.")
     return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
 
 
@@ -667,18 +669,24 @@ def _claim_line(
     letter = f" ({PRL})" if claim["source"] == PRL else ""
     words = claim["statement"] + letter
     if statement == above[0]:
-        words = f"… {claim['variant'].lstrip(',: ')}"
+        words = f"↳ {claim['variant'].lstrip(',: ')}"
     place = f"μ = {claim['mu']:g}, " if claim["mu"] is not None else ""
     size = f"{place}n = {claim['packings']}" if claim["packings"] else ""
     good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
     cells = [
-        f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{DAGGER * (', but ' in claim['why'])}",
         words if (statement, number) == above else f"{words}<br><small>{number}</small>",
+        f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{_lowered(claim)}",
         f"{_number(claim)}<br><small>{size}</small>",
         good + (f"<br><small>({fair})</small>" if fair else ""),
         "<br>".join(_by_others(claim, by_sampler)),
     ]
     return [cell.replace(" … ", UNBROKEN) for cell in cells]
+
+
+def _lowered(claim: dict[str, Any]) -> str:
+    """The verdict that the interval alone would give, if it was lowered, as " (symbol†)"."""
+    before, lowered, _ = claim["why"].partition(", but ")
+    return f" ({SYMBOLS[before]}†)" if lowered else ""
 
 
 def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:

@@ -302,8 +302,7 @@ def _critical(of: _Numbers) -> Highlight:
         raise KeyError(claim)
     far = middle["high"] < small["low"] and large["high"] < small["low"]
     first = (
-        "At intermediate and large friction, a packing moves well before the push reaches its "
-        "limit load"
+        "At intermediate and large friction, a packing moves before the push reaches its limit load"
         if far
         else "At intermediate friction, a packing moves before the push reaches its limit load"
     )

@@ -535,9 +535,9 @@ def test_a_variant_of_a_claim_shows_only_what_differs():
     ]
     empty = tables.StudyTable({}, [], {}, [], {}, {})
     above, below = table_of(documents.claim_table(empty, judged, 4))[2:]
-    assert above[1] == "it falls, beyond the median<br><small>b</small>"
-    assert below[1].replace("\u00a0", " ") == "… beyond the decile"
-    assert below[0] == "? undecided †" and "†" not in above[0]
+    assert above[0] == "it falls, beyond the median<br><small>b</small>"
+    assert below[0] == "↳ beyond the decile"
+    assert below[1] == "? undecided (✓†)" and "†" not in above[1]
     assert above[2].endswith("<small>μ = 0.1, n = 3</small>") and "(≥ 0.5)" in above[3]
 
 
@@ -561,15 +561,15 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     ]
     empty = tables.StudyTable({}, [], {}, [], {}, {})
     rows = table_of(documents.claim_table(empty, judged, 3))
-    assert rows[0] == ["verdict", "claim, and the number judged", "value", "range", "others"]
+    assert rows[0] == ["claim, and the number judged", "verdict", "value", "range", "others"]
     verdicts_shown = [
         "✓ reproduced",
         "… too few data",
         "✗✗ strongly contradicted",
         "✗ contradicted",
     ]
-    assert [row[0] for row in rows[2:]] == verdicts_shown
-    assert [row[1].partition("<br>")[0] for row in rows[2:]] == ["a", "b", "c", "d (PRL)"]
+    assert [row[1] for row in rows[2:]] == verdicts_shown
+    assert [row[0].partition("<br>")[0] for row in rows[2:]] == ["a", "b", "c", "d (PRL)"]
     assert [row[4] for row in rows[2:]] == [
         *("✗\u00a0exact", "✓\u00a0exact", "✓\u00a0nearest", "")  # uniform has no number
     ]
