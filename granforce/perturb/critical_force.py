@@ -53,7 +53,7 @@ from granforce.types import Cancel, Floats, Integers, Mask
 # Fraction of the way from the last load at rest to the limit load of the next load. A large step
 # makes contacts slide that would not on the way, above all at large μ: of 20 contacts in each of
 # two packings (N = 400, μ = 10), F_crit is 0.15 ⟨f_n⟩ smaller on average with 0.4 than with 0.005,
-# 0.04 with 0.1, 0.014 with 0.05 and 0.002 with 0.02, which takes half the time of 0.005.
+# 0.04 with 0.1, 0.014 with 0.05 and 0.002 with 0.02, which takes 0.6 of the time of 0.005.
 RISE = 0.02
 # Implicit steps after which the search for an equilibrium ends.
 MOST_STEPS = 150
