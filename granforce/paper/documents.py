@@ -90,7 +90,7 @@ _HEADS = {
     "exact": "exact",
     "": "packings alone",
 }
-_BRIEF = {"nearest": "nearest", "uniform": "uniform", "exact": "exact"}  # samplers, in claim tables
+_OTHERS = ("nearest", "uniform", "exact")  # samplers beside the one that decides a claim
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
     "exact": "exact intervals",
@@ -692,9 +692,9 @@ def _lowered(claim: dict[str, Any]) -> str:
 def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
     """The verdicts by other samplers than a claim's, as "symbol sampler"."""
     return [
-        f"{SYMBOLS[other['verdict']]}\u00a0{_BRIEF[name]}"
+        f"{SYMBOLS[other['verdict']]}\u00a0{name}"
         for name, other in by_sampler.items()
-        if name in _BRIEF and name != claim["sampler"] and other["verdict"] not in _NOTHING
+        if name in _OTHERS and name != claim["sampler"] and other["verdict"] not in _NOTHING
     ]
 
 
