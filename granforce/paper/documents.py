@@ -675,7 +675,7 @@ def _claim_line(
     good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
     cells = [
         words if (statement, number) == above else f"{words}<br><small>{number}</small>",
-        f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{_lowered(claim)}",
+        f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}{_lowered(claim)}",
         f"{_number(claim)}<br><small>{size}</small>",
         good + (f"<br><small>({fair})</small>" if fair else ""),
         "<br>".join(_by_others(claim, by_sampler)),

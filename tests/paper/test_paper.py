@@ -537,7 +537,7 @@ def test_a_variant_of_a_claim_shows_only_what_differs():
     above, below = table_of(documents.claim_table(empty, judged, 4))[2:]
     assert above[0] == "it falls, beyond the median<br><small>b</small>"
     assert below[0] == "↳ beyond the decile"
-    assert below[1] == "? undecided (✓†)" and "†" not in above[1]
+    assert below[1] == "?\u00a0undecided (✓†)" and "†" not in above[1]
     assert above[2].endswith("<small>μ = 0.1, n = 3</small>") and "(≥ 0.5)" in above[3]
 
 
@@ -568,7 +568,7 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         "✗✗ strongly contradicted",
         "✗ contradicted",
     ]
-    assert [row[1] for row in rows[2:]] == verdicts_shown
+    assert [row[1].replace("\u00a0", " ") for row in rows[2:]] == verdicts_shown
     assert [row[0].partition("<br>")[0] for row in rows[2:]] == ["a", "b", "c", "d (PRL)"]
     assert [row[4] for row in rows[2:]] == [
         *("✗\u00a0exact", "✓\u00a0exact", "✓\u00a0nearest", "")  # uniform has no number
