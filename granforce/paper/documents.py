@@ -42,9 +42,11 @@ from granforce.paper.claims.outcomes import (
     counted,
     decided,
     decisive,
+    judged_number,
+    ranges,
     score,
 )
-from granforce.paper.claims.verdicts import FEW, MISSING, PRL, UNMEASURED
+from granforce.paper.claims.verdicts import FEW, LOWERED, MISSING, PRL, UNMEASURED
 from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import (
     NOTHING,
@@ -644,7 +646,7 @@ def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
     for by_sampler in by_claim(of_figure).values():
         claim = decisive(by_sampler)
         lines.append(_claim_line(claim, by_sampler, above))
-        above = _main(claim), _judged_number(claim)
+        above = _main(claim), judged_number(claim)
     name, made = f"figure{figure}", markdown_table(_CLAIM_HEADS, lines)
     if name not in SHOWN:
         return made
@@ -657,22 +659,18 @@ def _main(claim: dict[str, Any]) -> str:
     return str(claim["statement"].removesuffix(claim["variant"]))
 
 
-def _judged_number(claim: dict[str, Any]) -> str:
-    return str(claim["measured"].partition(", at the deciding μ")[0])
-
-
 def _claim_line(
     claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]], above: tuple[str, str]
 ) -> list[str]:
     """A claim in the columns of _CLAIM_HEADS, without what repeats the line above it."""
-    statement, number = _main(claim), _judged_number(claim)
+    statement, number = _main(claim), judged_number(claim)
     letter = f" ({PRL})" if claim["source"] == PRL else ""
     words = claim["statement"] + letter
     if statement == above[0]:
         words = f"↳ {claim['variant'].lstrip(',: ')}"
     place = f"μ = {claim['mu']:g}, " if claim["mu"] is not None else ""
     size = f"{place}n = {claim['packings']}" if claim["packings"] else ""
-    good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
+    good, fair = ranges(claim)
     cells = [
         words if (statement, number) == above else f"{words}<br><small>{number}</small>",
         f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}{_lowered(claim)}",
@@ -685,7 +683,7 @@ def _claim_line(
 
 def _lowered(claim: dict[str, Any]) -> str:
     """The verdict that the interval alone would give, if it was lowered, as " (symbol†)"."""
-    before, lowered, _ = claim["why"].partition(", but ")
+    before, lowered, _ = claim["why"].partition(LOWERED)
     return f" ({SYMBOLS[before]}†)" if lowered else ""
 
 

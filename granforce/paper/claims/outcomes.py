@@ -4,6 +4,7 @@ from typing import Any
 
 from granforce.paper.claims.verdicts import (
     CONTRADICTED,
+    DECIDING,
     FEW,
     MISSING,
     REPRODUCED,
@@ -16,7 +17,7 @@ from granforce.types import Rows
 PAPERS = "gauss_seidel"  # the sampler of the paper
 # Whose verdict is the verdict on the claim: the first of these that a claim has and that was
 # measured. No other sampler replaces the paper's, even where its verdict is open.
-DECIDING = (PAPERS, "exact", "")
+FIRST = (PAPERS, "exact", "")
 # Verdict → its symbol in tables.
 SYMBOLS = {
     REPRODUCED: "✓",
@@ -45,10 +46,21 @@ def by_claim(claims: Rows) -> dict[tuple[str, str, str], dict[str, dict[str, Any
 
 
 def decisive(by_sampler: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The claim by the sampler whose verdict counts; see DECIDING."""
-    candidates = [by_sampler[name] for name in (*DECIDING, *by_sampler) if name in by_sampler]
+    """The claim by the sampler whose verdict counts; see FIRST."""
+    candidates = [by_sampler[name] for name in (*FIRST, *by_sampler) if name in by_sampler]
     measured = [claim for claim in candidates if claim["verdict"] != UNMEASURED]
     return (measured or candidates)[0]
+
+
+def judged_number(claim: dict[str, Any]) -> str:
+    """The number by which a claim is judged, in words, without the μ that decides."""
+    return str(claim["measured"].partition(DECIDING)[0])
+
+
+def ranges(claim: dict[str, Any]) -> tuple[str, str]:
+    """The range that supports a claim, and the wider one; empty if there is none."""
+    good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
+    return good, fair
 
 
 def decided(claims: Rows) -> list[dict[str, Any]]:

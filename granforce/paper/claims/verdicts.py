@@ -27,6 +27,8 @@ UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
 NEAR_PEAK = 2.0  # in μ: means within this factor of the largest determine the maximum
+LOWERED = ", but "  # in a reason, between the verdict of the interval and why it was lowered
+DECIDING = ", at the deciding μ"  # ends the number of a claim that is judged at each μ
 MOST_NAMED = 3  # μ that are listed singly if omitting any of them changes a verdict
 # Intervals of positive numbers that span more than this factor, and of bounded ones that span more
 # than this part of the possible values, are too few data.
@@ -143,7 +145,7 @@ def over_all(
         # A number that is certainly outside the good range does not become undecided.
         outside = {verdict, *turned.values()} <= {CONTRADICTED, STRONGLY}
         before, verdict = verdict, CONTRADICTED if outside else UNDECIDED
-        why = why if verdict == before else f"{before}, but {why}"
+        why = why if verdict == before else f"{before}{LOWERED}{why}"
     return claim._replace(verdict=verdict, why=why)
 
 
@@ -234,7 +236,7 @@ def at_each(
     verdict, why = _together(verdicts)
     deciding = [mu for mu in verdicts if verdicts[mu] == verdict] or list(verdicts)
     place = max(deciding, key=lambda mu: _beyond(estimates[mu][0], ranges.good))
-    where = f"{measured}, at the deciding μ ({place:g})" if len(estimates) > 1 else measured
+    where = f"{measured}{DECIDING} ({place:g})" if len(estimates) > 1 else measured
     value, low, high = estimates[place]
     return claim._replace(
         measured=where,

@@ -67,18 +67,17 @@ def _counted(claims: Rows) -> str:
 
 def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number that a claim is judged by, and its ranges, in words."""
-    criterion = next(iter(by_sampler.values()))["criterion"]
-    good, wider, fair = criterion.removesuffix("]").partition(" [")
-    ranges = f"{outcomes.SYMBOLS[REPRODUCED]} if {good}"
-    if wider:
-        ranges += f", {outcomes.SYMBOLS[STRONGLY]} unless {fair}"
-    return f"{_measured(by_sampler)}; {ranges.replace(' … ', UNBROKEN)}"
+    good, fair = outcomes.ranges(next(iter(by_sampler.values())))
+    words = f"{outcomes.SYMBOLS[REPRODUCED]} if {good}"
+    if fair:
+        words += f", {outcomes.SYMBOLS[STRONGLY]} unless {fair}"
+    return f"{_measured(by_sampler)}; {words.replace(' … ', UNBROKEN)}"
 
 
 def _measured(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number of a claim in words, with what is different about it for some samplers."""
     words = {
-        name: claim["measured"].partition(", at the deciding μ")[0]
+        name: outcomes.judged_number(claim)
         for name, claim in by_sampler.items()
         if np.isfinite(claim["value"])
     } or {"": next(iter(by_sampler.values()))["measured"]}
