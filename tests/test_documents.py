@@ -19,9 +19,11 @@ from packings import packed
 
 import granforce
 from granforce.bench import PARTS, solvers, states
+from granforce.bench import documents as benchmarks
 from granforce.cli.parser import main
 from granforce.cli.words import make_parser
-from granforce.paper import benchmarks, claims, documents, filled, highlights, tables
+from granforce.paper import claims, documents, highlights, tables
+from granforce.system import markdown
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
@@ -326,7 +328,7 @@ def test_the_claims_are_those_of_the_shipped_study(study):
 
 def test_the_page_on_accuracy_is_what_the_shipped_benchmark_gives(tmp_path):
     page, copied = text("granforce/docs/pages/accuracy.md"), tmp_path / "copy.md"
-    copied.write_text(filled.mark(benchmarks.KIND).sub(r"\1\3", page))
+    copied.write_text(markdown.mark(benchmarks.KIND).sub(r"\1\3", page))
     line = ["bench", "--table", str(ROOT / "data/bench.json"), "--documents", str(copied)]
     assert main(line) == 0
     assert copied.read_text() == page and page.count("\n| ---") >= 8
@@ -371,7 +373,7 @@ def test_tables_of_the_benchmark_show_where_granforce_is_slower(tmp_path):
 @pytest.mark.parametrize("document", RESULTS)
 def test_results_have_no_typed_numbers(document):
     """Outside of generated parts no measured number is given: none with a ± or an interval."""
-    typed = filled.mark(documents.KIND).sub("", text(document))
+    typed = markdown.mark(documents.KIND).sub("", text(document))
     assert not re.findall(r"\d\S* ±|\d+\.\d+ \(|\b(?!95)\d+ %|\d+\.\d+ …", typed)
 
 

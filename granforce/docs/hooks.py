@@ -16,7 +16,7 @@ from mkdocs.structure.pages import Page
 import granforce
 from granforce import glossary
 from granforce.cli.words import make_parser
-from granforce.paper.formatting import markdown_table
+from granforce.system.markdown import table
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "examples.md"
@@ -141,4 +141,4 @@ def symbols() -> str:
     """The glossary as a table."""
     terms = sorted(glossary.TERMS.values(), key=lambda term: not term.symbol)
     rows = [[term.symbol, term.word, term.sentence] for term in terms]
-    return "# Symbols\n\n" + markdown_table(["symbol", "name", "meaning"], rows)
+    return "# Symbols\n\n" + table(["symbol", "name", "meaning"], rows)

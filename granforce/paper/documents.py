@@ -23,7 +23,6 @@ import numpy as np
 from scipy import stats
 
 from granforce.measures import statistics
-from granforce.paper import filled
 from granforce.paper import plan as plans
 from granforce.paper.claims import OUTSIDE, TOPICS
 from granforce.paper.claims.figure1 import skipped
@@ -50,16 +49,14 @@ from granforce.paper.claims.verdicts import FEW, LOWERED, MISSING, PRL, UNMEASUR
 from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import (
     NOTHING,
-    RAISED,
     between,
     listed,
-    markdown_table,
-    typeset,
     with_error,
 )
 from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
+from granforce.system import markdown
 from granforce.types import Rows
 
 KIND = "study"
@@ -161,9 +158,9 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     def text_of(path: Path, name: str) -> str:
         if name not in known:
             raise InputError(f"{path}: unknown table {name!r}; choose one of {', '.join(known)}")
-        return typeset(known[name]())
+        return markdown.typeset(known[name]())
 
-    filled.renew(paths, KIND, text_of)
+    markdown.renew(paths, KIND, text_of)
 
 
 def measures(table: StudyTable) -> str:
@@ -235,7 +232,7 @@ def _counted(heads: list[str], lines: list[list[str]]) -> str:
             heads[k] += f" (n = {marks.pop()})"
             for line in lines:
                 line[k] = _FEWER.sub("", line[k])
-    return markdown_table(heads, lines)
+    return markdown.table(heads, lines)
 
 
 def others(table: StudyTable) -> str:
@@ -316,7 +313,7 @@ def sweeps(table: StudyTable) -> str:
             columns.append((f"η2, {_power(plans.SWEEPS[part])}", _eta2_over_nearest(table, part)))
     frictions = sorted({row["mu"] for row in table.part(*swept)})
     lines = [[f"{mu:g}", *(cells.get(mu, "") for _, cells in columns)] for mu in frictions]
-    return f"{_swept(table)}\n{markdown_table(['μ', *(head for head, _ in columns)], lines)}"
+    return f"{_swept(table)}\n{markdown.table(['μ', *(head for head, _ in columns)], lines)}"
 
 
 def _sweeps_of(table: StudyTable, part: str) -> dict[float, str]:
@@ -362,7 +359,7 @@ def _swept(table: StudyTable) -> str:
 
 
 def _power(residual: float) -> str:
-    return f"10{str(round(np.log10(residual))).translate(RAISED)}"
+    return f"10{str(round(np.log10(residual))).translate(markdown.RAISED)}"
 
 
 def _excess(excess: float, length: float) -> str:
@@ -402,7 +399,7 @@ def preparation(table: StudyTable) -> str:
             differences += [(_word(variant), one) for one in apart.values() if one is not None]
             cells = [one.text if one else "" for one in apart.values()]
             lines.append([_word(variant), *cells])
-        text += f"**{quantity}**\n\n{markdown_table(heads, lines)}\n"
+        text += f"**{quantity}**\n\n{markdown.table(heads, lines)}\n"
     return text + _tested(differences) if differences else text
 
 
@@ -521,8 +518,8 @@ def _topic(findings: Rows) -> str:
             others.append([statement, number])
     words = [word for word, _ in RANGES]
     lines = [[name, *(numbers.get(word, "") for word in words)] for name, numbers in ranged.items()]
-    first = markdown_table(["quantity", *(f"{word} μ" for word in words)], lines) if lines else ""
-    second = markdown_table(["quantity", "value"], others) if others else ""
+    first = markdown.table(["quantity", *(f"{word} μ" for word in words)], lines) if lines else ""
+    second = markdown.table(["quantity", "value"], others) if others else ""
     return "\n".join(part for part in (first, second) if part)
 
 
@@ -547,7 +544,7 @@ def counts(table: StudyTable) -> str:
         disks = _span([n for _, n, *_ in seeds])
         frictions = len({place[2:] for place in seeds})
         lines.append([content, disks, str(frictions), _span(list(map(len, seeds.values())))])
-    return markdown_table(("content", "disks", "values of μ", "packings at each"), lines)
+    return markdown.table(("content", "disks", "values of μ", "packings at each"), lines)
 
 
 def _content(part: str) -> str:
@@ -621,7 +618,7 @@ def verdict_counts(claims: Rows) -> str:
         if any(word in verdicts for verdicts in columns)
     ]
     lines.append(["all", *(str(len(verdicts)) for verdicts in columns)])
-    return markdown_table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
+    return markdown.table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
 
 
 def outcome_counts(claims: Rows) -> str:
@@ -632,7 +629,7 @@ def outcome_counts(claims: Rows) -> str:
         anchor = f"figure-{figure}-{topic.lower().replace(' ', '-')}"
         lines.append([f"[Figure {figure}: {topic.lower()}](#{anchor})", *map(str, count.values())])
     lines.append(["all", *map(str, counted(claims).values())])
-    return "\n".join([markdown_table(["claims", *OUTCOMES], lines), *_beyond_notes(claims)])
+    return "\n".join([markdown.table(["claims", *OUTCOMES], lines), *_beyond_notes(claims)])
 
 
 def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
@@ -647,7 +644,7 @@ def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
         claim = decisive(by_sampler)
         lines.append(_claim_line(claim, by_sampler, above))
         above = _main(claim), judged_number(claim)
-    name, made = f"figure{figure}", markdown_table(_CLAIM_HEADS, lines)
+    name, made = f"figure{figure}", markdown.table(_CLAIM_HEADS, lines)
     if name not in SHOWN:
         return made
     caption = CAPTIONS[name].format(walk=_HEADS[paper_sampler(table)])

@@ -1,15 +1,14 @@
-"""Numbers with their errors, and tables, as text."""
+"""Numbers with their errors as text."""
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
+from granforce.system.markdown import RAISED
 from granforce.types import Floats
 
 NOTHING = 1e-9  # η below this is rounding
 _MOST_DIGITS = 6  # after the point; smaller values are written with a power of ten
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def short(value: float) -> str:
@@ -66,25 +65,3 @@ def with_error(values: Floats) -> str:
     digits = max(0, power + digits)
     scaled = f"({mean / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})"
     return f"{scaled}·10{str(power).translate(RAISED)}"
-
-
-def typeset(text: str) -> str:
-    """Text with true minus signs, and powers of ten instead of 1e-05."""
-    text = _POWER.sub(_raised, text)
-    return _MINUS.sub("−", text)
-
-
-_POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([+-]\d+)")
-_MINUS = re.compile(r"(?<![\w|])-(?=\d)")
-
-
-def _raised(found: re.Match[str]) -> str:
-    digits, power = found[1], f"10{str(int(found[2])).translate(RAISED)}"
-    return power if digits == "1" else f"{digits}·{power}"
-
-
-def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown with escaped cells."""
-    rows = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from granforce.packing.compaction import number_of_disks
-from granforce.paper import claims, documents, drawings, filled, findings, tables
+from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, friction, positive, whole, worker_count
 from granforce.study import scan
 from granforce.study.cells import StudyCell
 from granforce.study.store import open_store
+from granforce.system import markdown
 from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
 from granforce.system.plain import json_text
@@ -42,7 +43,7 @@ def main(arguments: argparse.Namespace) -> int:
     worker_count(arguments.workers, "--workers")
     if arguments.minutes is not None:
         positive(arguments.minutes, "--minutes")
-    renewed = filled.named(arguments.documents, documents.KIND)
+    renewed = markdown.named(arguments.documents, documents.KIND)
     if arguments.status:
         return status(arguments)
     _check_apart(arguments)

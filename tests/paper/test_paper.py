@@ -17,13 +17,14 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
-from granforce.paper import claims, documents, drawings, filled, findings, formatting, tables
+from granforce.paper import claims, documents, drawings, findings, formatting, tables
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, outcomes, verdicts
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import load
 from granforce.study.store import open_store
+from granforce.system import markdown
 
 TINY = plans.Plan(
     n=20,
@@ -396,7 +397,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
         "certificates",
     )
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
-    (path,) = filled.named(str(page), documents.KIND)
+    (path,) = markdown.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
     text = page.read_text()
     assert text.startswith("before\n<!-- study: measures -->\n| μ | packings |")

@@ -143,18 +143,18 @@ def completion(arguments: argparse.Namespace) -> None:
 
 def bench(arguments: argparse.Namespace) -> None:
     """Measure and print a report, or read one; write its figures, and its tables into documents."""
-    from granforce.bench import draw, main
-    from granforce.paper import benchmarks, filled
+    from granforce.bench import documents, draw, main
+    from granforce.system import markdown
 
-    documents = filled.named(arguments.documents, benchmarks.KIND)
+    renewed = markdown.named(arguments.documents, documents.KIND)
     if arguments.table is None:
         results = main(arguments.out, arguments.quick, arguments.json)
     else:
-        results = benchmarks.load(arguments.table)
+        results = documents.load(arguments.table)
         if arguments.out is not None and not draw(make_folder(arguments.out), results):
             raise InputError(f"{arguments.table}: none of its parts has a figure; omit --out")
-    if documents:
-        benchmarks.renew(documents, results)
+    if renewed:
+        documents.renew(renewed, results)
 
 
 def cache(arguments: argparse.Namespace) -> int:

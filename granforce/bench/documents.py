@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from granforce.paper import filled
-from granforce.paper.formatting import markdown_table, typeset
 from granforce.records import InputError, brief
+from granforce.system import markdown
 from granforce.system.files import content_of
 from granforce.types import Rows
 
@@ -164,10 +163,10 @@ def renew(paths: Sequence[Path], results: Mapping[str, Any]) -> None:
     """Write the tables into files with marks."""
     sizes = {"sizes": "small (--quick)"} if results.get("quick") else {}
     shown = {**results, "environment": sizes | results.get("environment", {})}
-    filled.renew(
+    markdown.renew(
         paths,
         KIND,
-        lambda path, part: typeset(
+        lambda path, part: markdown.typeset(
             _TEXTS[part](results) if part in _TEXTS else _table(part, shown.get(part))
         ),
     )
@@ -184,7 +183,7 @@ def _summary(results: Mapping[str, Any]) -> str:
             errors = [row[error] for row in rows if row.get(error) is not None]
             ends = dict.fromkeys(factors[end] for end in (min(factors), max(factors)))
             lines.append([task, baseline, " to ".join(ends), _cell(max(errors)) if errors else ""])
-    return markdown_table(["task", "baseline", "times faster", "largest error, ⟨f_n⟩"], lines)
+    return markdown.table(["task", "baseline", "times faster", "largest error, ⟨f_n⟩"], lines)
 
 
 def _extent(results: Mapping[str, Any]) -> str:
@@ -205,7 +204,7 @@ def _table(part: str, rows: Any) -> str:
     if isinstance(rows, dict):  # the environment
         libraries = {name: version for name, version in rows["libraries"].items() if version}
         values = {name: value for name, value in rows.items() if name != "libraries"} | libraries
-        return markdown_table(["", "value"], [[name, str(value)] for name, value in values.items()])
+        return markdown.table(["", "value"], [[name, str(value)] for name, value in values.items()])
     if part in NEEDED:
         rows = [row for row in rows if row.get(NEEDED[part]) is not None]
     if part == "compaction_growth":  # the exponent of the fit is below the times, as in `growth`
@@ -251,7 +250,7 @@ def _columns(part: str, rows: Rows, names: Sequence[str]) -> str:
         if name not in HIDDEN and any(row.get(name) not in (None, "") for row in rows)
     ]
     heads = [_head(part, name) for name in names]
-    return markdown_table(heads, [[_shown(row, name) for name in names] for row in rows])
+    return markdown.table(heads, [[_shown(row, name) for name in names] for row in rows])
 
 
 def _head(part: str, name: str) -> str:

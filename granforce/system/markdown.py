@@ -1,4 +1,4 @@
-"""Generated text in documents, between <!-- KIND: NAME --> and <!-- end -->."""
+"""Tables in Markdown, and generated text between <!-- KIND: NAME --> and <!-- end -->."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -6,6 +6,8 @@ from pathlib import Path
 
 from granforce.records import InputError
 from granforce.system.files import written
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def mark(kind: str) -> re.Pattern[str]:
@@ -32,3 +34,25 @@ def renew(paths: Sequence[Path], kind: str, text_of: Callable[[Path, str], str])
         text = renewed(path)
         with written(path) as file:
             file.write(text.encode())
+
+
+def typeset(text: str) -> str:
+    """Text with true minus signs, and powers of ten instead of 1e-05."""
+    text = _POWER.sub(_raised, text)
+    return _MINUS.sub("−", text)
+
+
+_POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([+-]\d+)")
+_MINUS = re.compile(r"(?<![\w|])-(?=\d)")
+
+
+def _raised(found: re.Match[str]) -> str:
+    digits, power = found[1], f"10{str(int(found[2])).translate(RAISED)}"
+    return power if digits == "1" else f"{digits}·{power}"
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown with escaped cells."""
+    rows = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
