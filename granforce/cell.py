@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from granforce.fields import record
 from granforce.types import Floats, Integers
 
 
+@record
 class Cell(NamedTuple):
     """The periodic cell, spanned by a = (L_x, 0) and b = (tilt, L_y); tilt is LAMMPS' ``xy``."""
 
-    box: Floats  # (2,) L_x, L_y, length; inf in an open direction
-    tilt: float  # x component of b, length; 0 if a direction is open
+    box: Annotated[Floats, "(2,) L_x, L_y, length; inf in an open direction"]
+    tilt: Annotated[float, "x component of b, length; 0 if a direction is open"]
 
     @property
     def vectors(self) -> Floats:

@@ -5,21 +5,15 @@ Plain arrays and numbers in, text out: every package may use this; it needs no p
 
 from __future__ import annotations
 
-import itertools
-import linecache
-import re
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from granforce.cell import Cell
 from granforce.glossary import TERMS
 from granforce.types import Floats
-
-T = TypeVar("T")
 
 SIDE = 420  # of the picture, pixels
 LINE = 16  # height of a line of text below it, pixels
@@ -30,66 +24,6 @@ WIDE = 4.0
 WIDTHS = 12  # classes of width; contacts of one width and colour are one path
 # Mobilisation f_t/(μ f_n) from −1 to 1 in classes of equal size: blue, grey, orange.
 COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
-
-
-def brief(record: type[T]) -> type[T]:
-    """A decorator: the repr of a record (named tuple or dataclass) fits into a line or two.
-
-    Its docstring, which `help` shows first, lists the comments on its fields (shapes, units).
-    """
-    record.__repr__ = _short  # type: ignore[method-assign]
-    comments = _comments(record)
-    fields = getattr(record, "_fields", None)
-    for name in comments.keys() & set(fields or ()):
-        getattr(record, name).__doc__ = comments[name]
-    if fields is not None:  # some may be inherited
-        comments = {name: getattr(record, name).__doc__ for name in fields}
-    described = (f"    {name}: {comments[name]}" for name in fields or record.__annotations__)
-    record.__doc__ = "\n".join([(record.__doc__ or "").rstrip(), "", *described])
-    return record
-
-
-_FIELD = re.compile(r"    (\w+): ([^#]*?)(?: = [^#]*)?(?:  # (.*))?\n")
-
-
-def _comments(record: type) -> dict[str, str]:
-    """The comments above and beside the fields of a class in its source; without any, the type."""
-    lines = iter(linecache.getlines(str(sys.modules[record.__module__].__file__)))
-    head = f"class {record.__name__}(", f"class {record.__name__}:"
-    comments: dict[str, str] = {}
-    above: list[str] = []
-    for _ in itertools.dropwhile(lambda line: not line.startswith(head), lines):
-        break
-    for line in itertools.takewhile(lambda line: line.startswith(("    ", "\n")), lines):
-        if line.startswith("    # "):
-            above.append(line.strip("# \n"))
-            continue
-        if field := _FIELD.fullmatch(line):
-            name, kind, comment = field.groups()
-            comments[name] = " ".join([*above, comment] if comment else above) or kind.strip()
-        above = []
-    return comments
-
-
-def _short(record: Any) -> str:
-    """A record in a line: arrays by their shape, records and tables by their type."""
-    fields = getattr(record, "_fields", None) or [
-        name for name in record.__dataclass_fields__ if not name.startswith("_")
-    ]
-    parts = []
-    for name in fields:
-        value = getattr(record, name)
-        if isinstance(value, np.ndarray):
-            parts.append(f"{name}{list(value.shape)}")
-        elif value is None or isinstance(value, (bool, str)):
-            parts.append(
-                f"{name}={str(value)[:40]!r}" if isinstance(value, str) else f"{name}={value}"
-            )
-        elif isinstance(value, (int, float, np.number)):
-            parts.append(f"{name}={value:.6g}")
-        else:
-            parts.append(f"{name}: {type(value).__name__}")
-    return f"{type(record).__name__}({', '.join(parts)})"
 
 
 def table(title: str, lines: Mapping[str, Any]) -> str:
@@ -119,9 +53,6 @@ def _text(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return f"{value:.4g}"
     return str(value)
-
-
-brief(Cell)  # whose file lies below this one
 
 
 class Picture(NamedTuple):

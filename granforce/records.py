@@ -11,13 +11,15 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
+from typing import Annotated, Any, NamedTuple, ParamSpec, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
 from granforce.cell import Cell
+from granforce.fields import record
+from granforce.quantities import FORCE, Field, quantity
 from granforce.tolerances import (
     LARGEST_FRICTION,
     LARGEST_TILT,
@@ -79,21 +81,23 @@ class Cancelled(Exception):
     """The work was cancelled on request; the current unit of work is lost."""
 
 
-@notebook.brief
+@record
 class Contacts(NamedTuple):
-    """Geometry of N_c contacts."""
+    """Geometry of N_c contacts: at x_i + a_i n + b_i t, which is also x_j − a_j n + b_j t."""
 
-    i: Integers  # (N_c,) first grain
-    j: Integers  # (N_c,) second grain
-    normal: Floats  # (N_c, 2) unit vector n from i to j
-    length: Floats  # (N_c,) centre distance ℓ
-    gap: Floats  # (N_c,) ℓ − r_i − r_j, negative if grains overlap
-    arm_i: Floats  # (N_c,) lever arm a_i from the centre of i to the contact point
-    arm_j: Floats  # (N_c,) lever arm a_j
-    # (N_c, 2) b_i, b_j: the contact point lies at x_i + a_i n + b_i t and at x_j − a_j n + b_j t.
-    # None: 0 everywhere, as for disks.
-    levers: Floats | None = None
-    friction_ratio: Floats | None = None  # (N_c,) friction over the packing's μ; None: 1 everywhere
+    i: Annotated[Integers, quantity("contact_i", label="")]
+    j: Annotated[Integers, quantity("contact_j", label="")]
+    normal: Annotated[Floats, quantity("normal", label="")]
+    length: Annotated[Floats, quantity("length", label="")]
+    gap: Annotated[Floats, quantity("gap", label="", note="negative if grains overlap")]
+    arm_i: Annotated[Floats, quantity("arm_i", label="", note="a_i")]
+    arm_j: Annotated[Floats, quantity("arm_j", label="", note="a_j")]
+    levers: Annotated[Floats | None, quantity("levers", label="", note="b; None: 0 everywhere")] = (
+        None
+    )
+    friction_ratio: Annotated[
+        Floats | None, quantity("friction_ratio", label="", note="None: 1 everywhere")
+    ] = None
 
     def picked(self, rows: Integers | Mask) -> Contacts:
         """The contacts of these rows: a mask (N_c,), or positions (k,)."""
@@ -124,36 +128,37 @@ class Contacts(NamedTuple):
         return np.zeros((len(self.i), 2)) if self.levers is None else self.levers
 
 
-@notebook.brief
+@record
 class Shapes(NamedTuple):
     """Shapes and inertia of N bodies: convex polygons, and disks."""
 
-    corners: Floats  # (K, 2) corners of all polygons, anticlockwise, body by body, length
-    sides: Integers  # (N,) corners of each body; 0 for a disk
-    mass: Floats  # (N,)
-    inertia: Floats  # (N,) moment of inertia about the centre of mass
+    corners: Annotated[Floats, quantity("corners", label="", note="anticlockwise")]
+    sides: Annotated[Integers, quantity("sides", label="")]
+    mass: Annotated[Floats, quantity("mass", label="")]
+    inertia: Annotated[Floats, quantity("inertia", label="", note="about the centre of mass")]
 
     def polygons(self) -> list[Floats]:
         """The corners (k, 2) of each body; empty for a disk."""
         return np.split(self.corners, np.cumsum(self.sides)[:-1])
 
 
-@notebook.brief
+@record
 class Packing(NamedTuple):
     """N disks, or bodies of other shapes, their contacts, and one force network on them."""
 
-    x: Floats  # (N, 2) centres, length
-    r: Floats  # (N,) radii, of polygons those of their farthest corner, length
-    box: Floats  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
-    contacts: Contacts
-    forces: Floats  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
-    mu: float  # friction coefficient μ, the largest if `contacts.friction_ratio` is given
-    pressure: float  # P0, force per length; nan if no pressure is prescribed
-    load: Floats  # (N, 3) external force and torque on each grain; NaN: its balance is left open
-    info: dict[str, Any]  # origin: seed, steps, skipped work, … (plain values)
-    tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 if a direction is open
-    # of bodies other than disks; x are then centres of mass, and r circumscribed radii of polygons
-    shapes: Shapes | None = None
+    x: Annotated[Floats, quantity("x", label="centre")]
+    r: Annotated[Floats, quantity("r", label="radius", note="of polygons to the farthest corner")]
+    box: Annotated[Floats, quantity("box", label="")]
+    contacts: Annotated[Contacts, "geometry of the contacts"]
+    forces: Annotated[Floats, quantity("forces")]
+    mu: Annotated[float, quantity("mu", note="the largest if `contacts.friction_ratio` is given")]
+    pressure: Annotated[float, quantity("pressure")]
+    load: Annotated[Floats, quantity("load", note="NaN: the balance of the grain is left open")]
+    info: Annotated[dict[str, Any], "origin: seed, steps, skipped work, … (plain values)"]
+    tilt: Annotated[float, quantity("tilt", note="0 if a direction is open")] = 0.0
+    shapes: Annotated[Shapes | None, "of bodies other than disks; x are then centres of mass"] = (
+        None
+    )
 
     @property
     def cell(self) -> Cell:
@@ -219,16 +224,16 @@ class Packing(NamedTuple):
         )
 
 
-@notebook.brief
+@record
 class Relaxation(NamedTuple):
     """The result of a relaxation solver."""
 
-    forces: Floats  # (N_c, 2)
-    iterations: int  # sweeps or iterations used
-    residual: float  # unbalance in ⟨f_n⟩, by Ensemble.residual
-    violation: float  # cone violation in ⟨f_n⟩, by Ensemble.violation
-    converged: bool  # the solver's own iteration ended (at rest or in steady motion)
-    seconds: float  # wall time
+    forces: Annotated[Floats, Field("contact component", FORCE, "the network")]
+    iterations: Annotated[int, "sweeps or iterations used"]
+    residual: Annotated[float, quantity("residual", "")]
+    violation: Annotated[float, quantity("violation", "")]
+    converged: Annotated[bool, "the solver's own iteration ended (at rest or in steady motion)"]
+    seconds: Annotated[float, quantity("seconds")]
 
 
 # The call that makes an argument of a function.

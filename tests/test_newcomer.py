@@ -652,8 +652,8 @@ def test_help_explains_the_fields_of_records_with_their_units():
         for name in record._fields:
             assert not getattr(record, name).__doc__.startswith("Alias"), (record, name)
     told = pydoc.render_doc(gf.Intervals, renderer=pydoc.plaintext)
-    assert "(k, 2) least value, force; −inf without a limit; NaN: cancelled" in told
-    assert told.index("low: (k, 2) least value") < told.index("Method resolution order")
+    low = "low: (contact, component) smallest value, force; −inf without a limit; NaN: cancelled"
+    assert low in told and told.index(low) < told.index("Method resolution order")
     above = pydoc.render_doc(gf.Packing, renderer=pydoc.plaintext)
     assert "of bodies other than disks; x are then centres of mass" in above
     assert "backbone, as positions in packing.x" in pydoc.render_doc(gf.Ensemble)

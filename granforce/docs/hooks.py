@@ -16,6 +16,8 @@ from mkdocs.structure.pages import Page
 import granforce
 from granforce import glossary
 from granforce.cli.words import make_parser
+from granforce.fields import fields
+from granforce.quantities import Field
 from granforce.system.markdown import table
 
 HERE = Path(__file__).parent
@@ -116,9 +118,23 @@ def library() -> str:
 
 
 def entry(path: str, name: str, shown: dict[str, str]) -> str:
-    """The entry of a public name, with its example."""
+    """The entry of a public name, with the fields of a record, and its example."""
     heading = f"::: granforce.{path}\n    options:\n      heading_level: 3\n"
-    return heading + shown.pop(f"gf.{name}", "")
+    return heading + field_table(getattr(granforce, name, None)) + shown.pop(f"gf.{name}", "")
+
+
+def field_table(record: Any) -> str:
+    """The declared fields of a record as a table; empty for other objects."""
+    declared = fields(record) if isinstance(record, type) else {}
+    rows = [[f"`{name}`", *described(field)] for name, field in declared.items()]
+    heads = ["field", "dimensions", "unit", "meaning"]
+    return f"\n{table(heads, rows)}\n" if rows else ""
+
+
+def described(field: Field) -> list[str]:
+    """Dimensions, unit and meaning of a field, for a table."""
+    meaning = "; ".join(part for part in (field.meaning, field.note) if part)
+    return [", ".join(field.dims.split()), field.unit, meaning]
 
 
 def examples() -> dict[str, str]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
 from granforce.explore.intervals import Bounds, Key, SmallestForces, solved
+from granforce.fields import record
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import checked, likeliest, spread_of
 from granforce.numerics.certified_values import Solver
+from granforce.quantities import Field, quantity
 from granforce.records import positive, takes
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
@@ -26,15 +28,17 @@ _BEYOND = 1.1
 _AT_ONCE = 64
 
 
-@notebook.brief
+@record
 class Carrying(NamedTuple):
     """The least f_n of k contacts over all networks that agree with a measurement."""
 
-    contacts: Integers  # (k,) their numbers in the packing
-    least: Floats  # (k,) certified lower bound of f_n, force
-    carries: Mask  # (k,) bool: least is above 0, so they certainly carry force
-    widened: int  # measured components with widened bounds, as no network agreed
-    counts: dict[str, int]  # programs solved, and skipped because f_n = 0 in some network
+    contacts: Annotated[Integers, quantity("backbone")]
+    least: Annotated[Floats, quantity("least_normal", label="f_n_least", note="certified")]
+    carries: Annotated[Mask, Field("contact", "", "least is above 0: they certainly carry force")]
+    widened: Annotated[int, "measured components with widened bounds, as no network agreed"]
+    counts: Annotated[
+        dict[str, int], "programs solved, and skipped because f_n = 0 in some network"
+    ]
 
     def _repr_html_(self) -> str:
         """The result as displayed in notebooks."""

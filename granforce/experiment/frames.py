@@ -6,10 +6,10 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from granforce import notebook
 from granforce.experiment.pegs import open_frames
+from granforce.fields import record
 from granforce.records import InputError
 from granforce.system.files import expanded
 
@@ -19,13 +19,13 @@ _TEXT = (".txt", ".csv", ".dat")
 _PACKED = (".gz", ".bz2", ".xz", ".zst")
 
 
-@notebook.brief
+@record
 class Frame(NamedTuple):
     """One frame: its files, and its number in them."""
 
-    positions: str
-    adjacency: str | None  # None for a *_solved.mat
-    number: float
+    positions: Annotated[str, "file of positions"]
+    adjacency: Annotated[str | None, "file of contacts; None for a *_solved.mat"]
+    number: Annotated[float, "of the frame in its files"]
 
 
 def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +23,10 @@ from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import Likeliest, checked, likeliest, spread_of
+from granforce.quantities import quantity
 from granforce.records import random_seed, takes, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
@@ -45,39 +47,40 @@ _DROPPED = 20
 Kind = TypeVar("Kind", bound="Inference")
 
 
-@notebook.brief
+@record
 class Draws(NamedTuple):
     """States of S drawn with the weight exp(−χ²/2), by chain, with diagnostics."""
 
-    states: Floats  # (chains, k, N_c, 2) admissible networks, force
-    residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
-    violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
-    mixing: Mixing  # R̂, bulk and tail effective sample size of each component
-    reached: bool  # all in S, and R̂ ≤ 1.1
-    counts: dict[str, Any]  # turns, rejected paths, dropped states, held coordinates
-    setup_seconds: float  # wall time for computing the walls
-    sampling_seconds: float  # wall time of the draws, including dropped ones
-
+    states: Annotated[Floats, "(chains, k, N_c, 2) admissible networks, force"]
+    residual: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.residual"]
+    violation: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.violation"]
+    mixing: Annotated[Mixing, "R̂, bulk and tail effective sample size of each component"]
+    reached: Annotated[bool, quantity("reached", note="all in S, and R̂ ≤ 1.1")]
+    counts: Annotated[dict[str, Any], "turns, rejected paths, dropped states, held coordinates"]
+    setup_seconds: Annotated[float, quantity("setup_seconds")]
+    sampling_seconds: Annotated[float, quantity("sampling_seconds", note="of dropped states, too")]
     effective = uniform.UniformSample.effective  # type: ignore[misc]
     flat = uniform.UniformSample.flat  # type: ignore[misc]
     chain = uniform.UniformSample.chain  # type: ignore[misc]
 
 
-@notebook.brief
+@record
 class Inference(NamedTuple):
-    """The most likely network given a measurement, and its uncertainty."""
+    """The most likely network given a measurement, and its uncertainty.
 
-    forces: Floats  # (N_c, 2) the admissible network with the least χ², force
-    chi_square: float  # its Σ ((f − m)/σ)²
-    # degrees of freedom: measured components less the directions in which the network can follow
-    # the measurement; fewer than S has dimensions if forces lie on their cones, as at f_n = 0
-    freedom: int
-    deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN if not measured
-    suspects: Integers  # (s,) contacts, as numbers in the packing, beyond 3 σ, largest first
-    residual: float  # in ⟨f_n⟩, by Ensemble.residual
-    violation: float  # in ⟨f_n⟩, by Ensemble.violation
-    draws: Draws | None  # None if none were requested
-    seconds: float  # wall time, including draws
+    Degrees of freedom are the measured components less the directions in which the network can
+    follow the measurement, fewer than S has dimensions if forces lie on their cones, as at f_n = 0.
+    """
+
+    forces: Annotated[Floats, quantity("inferred", label="forces")]
+    chi_square: Annotated[float, quantity("chi_square", note="Σ ((f − m)/σ)²")]
+    freedom: Annotated[int, quantity("freedom")]
+    deviation: Annotated[Floats, quantity("deviation", unit="sigma", note="NaN if not measured")]
+    suspects: Annotated[Integers, quantity("suspect", label="", note="largest first")]
+    residual: Annotated[float, quantity("residual", "")]
+    violation: Annotated[float, quantity("violation", "")]
+    draws: Annotated[Draws | None, "None if none were requested"]
+    seconds: Annotated[float, quantity("seconds", note="including draws")]
 
     @property
     def drawn(self) -> Draws:
@@ -87,13 +90,13 @@ class Inference(NamedTuple):
         return self.draws
 
     @property
+    @derived(quantity("expected", label="mean"))
     def mean(self) -> Floats:
-        """(N_c, 2) mean of the draws, force."""
         return self.drawn.flat.mean(axis=0)
 
     @property
+    @derived(quantity("standard_error", label="error"))
     def error(self) -> Floats:
-        """(N_c, 2) standard error of every force: the standard deviation of the draws."""
         return self.drawn.flat.std(axis=0)
 
     def _repr_html_(self) -> str:

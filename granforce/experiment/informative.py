@@ -3,33 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import UniformSample, sample_uniform
+from granforce.fields import record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
+from granforce.quantities import quantity
 from granforce.records import InputError, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP, TWINS
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 
-@notebook.brief
+@record
 class Informative(NamedTuple):
     """Contacts whose normal force is most worth measuring, the best first.
 
     Of contacts whose normal forces determine each other only one is listed.
     """
 
-    contacts: Integers  # (k,) their numbers in the packing
-    expected: Floats  # (k,) fraction by which the mean error of f_n falls, from covariances
-    before: float  # exact mean interval of f_n now, in ⟨f_n⟩; NaN if not certified
-    after: Floats  # (k,) the same with f_n of that contact known; NaN also if not computed
-    twins: tuple[tuple[int, ...], ...]  # for each: contacts whose measurement gives the same
+    contacts: Annotated[Integers, quantity("backbone")]
+    expected: Annotated[Floats, quantity("part_expected", label="expected_reduction")]
+    before: Annotated[
+        float, quantity("mean_before", label="mean_interval_before", note="NaN if not certified")
+    ]
+    after: Annotated[
+        Floats, quantity("mean_after", label="mean_interval_after", note="NaN also if not computed")
+    ]
+    twins: Annotated[
+        tuple[tuple[int, ...], ...], "for each: contacts whose measurement gives the same"
+    ]
 
     @property
     def reduction(self) -> Floats:

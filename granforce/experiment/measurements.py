@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.packing.importers.text import LARGEST, Source, read_csv
 from granforce.records import InputError
 from granforce.types import Floats, Integers
@@ -15,13 +15,13 @@ from granforce.types import Floats, Integers
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 
 
-@notebook.brief
+@record
 class Measurement(NamedTuple):
     """Forces measured on k contacts; NaN for components that were not measured."""
 
-    contacts: Integers  # (k,) their numbers in the packing
-    forces: Floats  # (k, 2) f_n, f_t, force
-    sigma: Floats  # (k, 2) standard errors
+    contacts: Annotated[Integers, "(k,) their numbers in the packing"]
+    forces: Annotated[Floats, "(k, 2) f_n, f_t, force"]
+    sigma: Annotated[Floats, "(k, 2) standard errors"]
 
     def on(self, count: int) -> tuple[Floats, Floats]:
         """Forces and σ of all contacts of a packing, two arrays (count, 2); NaN if not measured.

@@ -10,7 +10,7 @@ unless the directions of their contacts with the walls are known (`walls`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
@@ -21,6 +21,7 @@ from granforce.experiment import solved
 from granforce.experiment.listing import Frames, Listing, plain, read_frames
 from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
 from granforce.experiment.walls import Bodies, bad_fit, bodies, flagged, read_outline, wall_contacts
+from granforce.fields import record
 from granforce.forces.build import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
@@ -52,20 +53,24 @@ _ESTIMATES = 4
 _LISTED = 10
 
 
-@notebook.brief
+@record
 class Photoelastic(NamedTuple):
     """A packing with measured forces; contacts: listed, candidates, then walls."""
 
-    packing: Packing  # its own network is the likeliest one; loads are NaN if balance is open
-    measured: Floats  # (N_c, 2) f_n, f_t as listed, force; NaN for candidates
-    sigma: Floats  # (N_c, 2) their standard errors
-    added: Mask  # (N_c,) mask of contacts that were not listed
-    left_open: Integers  # (k,) grains that no admissible forces balance, except at walls
-    at_wall: Mask  # (N,) mask of grains at walls, and of the walls themselves
-    ids: Floats  # (N,) their ids in the files; −1, −2, … for the walls
-    walls: tuple[str, ...]  # names of the walls, which are the last bodies of the packing
-    findings: list[Finding]  # repairs, and their places
-    report: dict[str, Any]  # findings and actions, in plain numbers and words
+    packing: Annotated[
+        Packing, "its own network is the likeliest one; loads are NaN if balance is open"
+    ]
+    measured: Annotated[Floats, "(N_c, 2) f_n, f_t as listed, force; NaN for candidates"]
+    sigma: Annotated[Floats, "(N_c, 2) their standard errors"]
+    added: Annotated[Mask, "(N_c,) mask of contacts that were not listed"]
+    left_open: Annotated[Integers, "(k,) grains that no admissible forces balance, except at walls"]
+    at_wall: Annotated[Mask, "(N,) mask of grains at walls, and of the walls themselves"]
+    ids: Annotated[Floats, "(N,) their ids in the files; −1, −2, … for the walls"]
+    walls: Annotated[
+        tuple[str, ...], "names of the walls, which are the last bodies of the packing"
+    ]
+    findings: Annotated[list[Finding], "repairs, and their places"]
+    report: Annotated[dict[str, Any], "findings and actions, in plain numbers and words"]
 
     def _repr_html_(self) -> str:
         """The import as displayed in notebooks."""

@@ -20,12 +20,13 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
 from granforce.experiment.infer import Inference, arguments_of, inference_of, judged
 from granforce.explore.mixing import Mixing
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many, spread_of
 from granforce.numerics.lanes import LANES
+from granforce.quantities import quantity
 from granforce.records import random_seed, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
@@ -34,7 +35,7 @@ from granforce.types import Cancel, Floats, Progress
 UNMEASURED = 2.0
 
 
-@notebook.brief
+@record
 class Remeasured(Inference):
     """An Inference whose draws estimate the error of the likeliest network.
 
@@ -44,11 +45,15 @@ class Remeasured(Inference):
     __slots__ = ()
 
     @property
+    @derived(quantity("expected", label="mean", meaning="likeliest network itself"))
     def mean(self) -> Floats:
         """(N_c, 2) the likeliest network itself, to which the errors refer, force."""
         return self.forces
 
     @property
+    @derived(
+        quantity("standard_error", label="error", meaning="rms of draws less the likeliest network")
+    )
     def error(self) -> Floats:
         """(N_c, 2) standard error of every force: root mean square of draws less the network."""
         return np.sqrt(np.mean((self.drawn.flat - self.forces) ** 2, axis=0))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from granforce import notebook
 from granforce.experiment.listing import Listing
 from granforce.experiment.pegs import Photoelastic
+from granforce.fields import record
 from granforce.forces.build import ensemble
 from granforce.records import (
     Contacts,
@@ -28,14 +28,14 @@ from granforce.tolerances import LARGEST_UNIT
 from granforce.types import Floats, Integers
 
 
-@notebook.brief
+@record
 class SyntheticFrame(NamedTuple):
     """A frame as if read from files, and the true forces; `gf.read_pegs` accepts it."""
 
-    only: Listing
-    pairs: Integers  # (k, 2) ids of the grains that touch inside the frame
-    forces: Floats  # (k, 2) their true f_n, f_t
-    unit: float  # mean true normal force
+    only: Annotated[Listing, "what a reader of the files would return"]
+    pairs: Annotated[Integers, "(k, 2) ids of the grains that touch inside the frame"]
+    forces: Annotated[Floats, "(k, 2) their true f_n, f_t"]
+    unit: Annotated[float, "mean true normal force"]
 
     @property
     def frames(self) -> Floats:

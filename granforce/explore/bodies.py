@@ -11,17 +11,19 @@ ray counts as one where it is certified: A d = 0, d ≥ 0.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
 from granforce.explore.thin import null_space
+from granforce.fields import record
 from granforce.forces import hull
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, inner_point
+from granforce.quantities import FORCE, Field
 from granforce.records import InputError, Packing, takes
 from granforce.types import Floats, Integers, Mask
 
@@ -40,24 +42,30 @@ _SINGULAR = 1e-13
 OPENS, SLIDES_BACK, SLIDES = 0, -1, 1  # f_n = 0, f_t = −μ f_n, f_t = μ f_n
 
 
-@notebook.brief
+@record
 class Side(NamedTuple):
     """A side of S: an end (h = 1), an edge of the polygon (2) or a face of the body (3)."""
 
-    corners: Integers  # (k,) positions in Body.corners; at h = 3 in order around the face
-    stops: tuple[tuple[int, int], ...]  # (number in the packing, OPENS, SLIDES or SLIDES_BACK)
-    normal: Floats  # (h,) unit vector out of S
+    corners: Annotated[
+        Integers, "(k,) positions in Body.corners; at h = 3 in order around the face"
+    ]
+    stops: Annotated[
+        tuple[tuple[int, int], ...], "(number in the packing, OPENS, SLIDES or SLIDES_BACK)"
+    ]
+    normal: Annotated[Floats, "(h,) unit vector out of S"]
 
 
-@notebook.brief
+@record
 class Body(NamedTuple):
     """S as a point, a segment, a polygon or a body, in h orthonormal coordinates u."""
 
-    origin: Floats  # (N_c, 2) the network at u = 0, force
-    axes: Floats  # (h, N_c, 2) networks of length 1: F = origin + u · axes
-    corners: Floats  # (V, h) force
-    rays: Floats  # (R, h) unit vectors along which S is unbounded; none if it is bounded
-    sides: tuple[Side, ...]  # of Side
+    origin: Annotated[Floats, Field("contact component", FORCE, "the network at u = 0")]
+    axes: Annotated[
+        Floats, Field("direction contact component", "", "of length 1: F = origin + u · axes")
+    ]
+    corners: Annotated[Floats, Field("corner direction", FORCE, "corners u of S")]
+    rays: Annotated[Floats, Field("ray direction", "", "unit vectors along which S is unbounded")]
+    sides: Annotated[tuple[Side, ...], "its sides"]
 
     @property
     def bounded(self) -> bool:

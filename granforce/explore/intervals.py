@@ -14,18 +14,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import measures, notebook
+from granforce.fields import record
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import ordered
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
+from granforce.quantities import quantity
 from granforce.records import InputError, float_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, FLAT, INTERVAL_GAP
@@ -35,18 +37,22 @@ Key = tuple[int, int, int]  # contact, component and side of a bound
 Bounds = dict[Key, tuple[float, float]]  # value attained, and the value that bounds it
 
 
-@notebook.brief
+@record
 class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
-    contacts: Integers  # (k,) their numbers in the packing
-    low: Floats  # (k, 2) least value, force; −inf without a limit; NaN: cancelled, not certified
-    high: Floats  # (k, 2) largest value, force; inf without a limit; NaN likewise
-    gap: Floats  # (k, 2, 2) duality gap of [component, low or high] in ⟨f_n⟩
-    backbone: Mask  # (k,) bool, largest f_n > 0
-    max_gap: float  # largest gap among the certified bounds
-    converged: bool  # every bound was certified, with a gap ≤ 10⁻⁸ ⟨f_n⟩ in a bounded S
-    counts: dict[str, int]  # programs solved, skipped by reason, solved again by HiGHS; iterations
+    contacts: Annotated[Integers, quantity("backbone")]
+    low: Annotated[
+        Floats, quantity("low", note="−inf without a limit; NaN: cancelled, or not certified")
+    ]
+    high: Annotated[Floats, quantity("high", note="inf without a limit; NaN likewise")]
+    gap: Annotated[Floats, quantity("interval_gap")]
+    backbone: Annotated[Mask, "(k,) largest f_n > 0"]
+    max_gap: Annotated[float, quantity("max_gap", note="among the certified bounds")]
+    converged: Annotated[bool, "every bound was certified, with a gap ≤ 10⁻⁸ ⟨f_n⟩ in a bounded S"]
+    counts: Annotated[
+        dict[str, int], "programs solved, skipped by reason, solved again; iterations"
+    ]
 
     @property
     def bounded(self) -> Mask:
@@ -72,26 +78,33 @@ class Intervals(NamedTuple):
         return notebook.table("Exact intervals over S", lines)
 
 
-@notebook.brief
+@record
 class Bound(NamedTuple):
     """One exact bound, as soon as it is computed."""
 
-    contact: int  # its number in the packing
-    component: int  # 0 for f_n, 1 for f_t
-    side: int  # 0 for the least value, 1 for the largest
-    value: float  # force
+    contact: Annotated[int, "its number in the packing"]
+    component: Annotated[int, "0 for f_n, 1 for f_t"]
+    side: Annotated[int, "0 for the least value, 1 for the largest"]
+    value: Annotated[float, "force"]
 
 
-@notebook.brief
+@record
 class LimitLoads(NamedTuple):
     """Largest force pairs that S can carry on k contacts."""
 
-    contacts: Integers  # (k,) their numbers in the packing
-    load: Floats  # (k,) limit load F, force; inf without a limit; NaN: cancelled, or not certified
-    gap: Floats  # (k,) duality gap in ⟨f_n⟩
-    max_gap: float
-    converged: bool  # every load was certified with a gap ≤ 10⁻⁸ ⟨f_n⟩
-    counts: dict[str, int]  # programs, again, iterations
+    contacts: Annotated[Integers, quantity("backbone")]
+    load: Annotated[
+        Floats,
+        quantity(
+            "limit_load",
+            label="limit_load",
+            note="inf without a limit; NaN: cancelled, or not certified",
+        ),
+    ]
+    gap: Annotated[Floats, quantity("load_gap")]
+    max_gap: Annotated[float, quantity("max_gap")]
+    converged: Annotated[bool, "every load was certified with a gap ≤ 10⁻⁸ ⟨f_n⟩"]
+    counts: Annotated[dict[str, int], "programs, again, iterations"]
 
 
 @takes(Ensemble)

@@ -7,13 +7,14 @@ numbers, one component at a time, which for thousands takes longer than sampling
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy import fft, stats
 from scipy.special import ndtri
 
-from granforce import notebook
+from granforce.fields import derived, record
+from granforce.quantities import quantity
 from granforce.system import cancelling
 from granforce.types import Floats, Mask
 
@@ -25,25 +26,30 @@ _TAILS = 0.05, 0.95
 _AT_ONCE = 128
 
 
-@notebook.brief
+@record
 class Mixing(NamedTuple):
     """Diagnostics of each component; NaN where it cannot vary or there are too few draws."""
 
-    r_hat: Floats  # (…) split R̂, near 1 if all halves of all chains agree
-    bulk: Floats  # (…) effective sample size for the middle of the distribution
-    tail: Floats  # (…) effective sample size for its 5 % and 95 % quantiles
+    r_hat: Annotated[
+        Floats, quantity("r_hat", label="", note="near 1 if all halves of chains agree")
+    ]
+    bulk: Annotated[Floats, quantity("bulk_size", label="", note="of the middle")]
+    tail: Annotated[Floats, quantity("tail_size", label="", note="of the 5 % and 95 % quantiles")]
 
     @property
+    @derived(quantity("worst_r_hat"))
     def worst_r_hat(self) -> float:
         """Largest R̂, NaN if none is known."""
         return float(np.fmax.reduce(self.r_hat, axis=None, initial=np.nan))
 
     @property
+    @derived(quantity("least_bulk_size"))
     def least_bulk(self) -> float:
         """Smallest bulk effective sample size, NaN if none is known."""
         return float(np.fmin.reduce(self.bulk, axis=None, initial=np.nan))
 
     @property
+    @derived(quantity("least_tail_size"))
     def least_tail(self) -> float:
         """Smallest tail effective sample size, NaN if none is known."""
         return float(np.fmin.reduce(self.tail, axis=None, initial=np.nan))

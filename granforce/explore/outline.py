@@ -11,16 +11,17 @@ away, so that the polygons converge from both sides (Kamenev, Comput. Math. Math
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.forces.contact_problem import cone_costs, forces_of, known_part, make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
+from granforce.quantities import quantity
 from granforce.records import Cancelled, InputError, float_array, moderate, positive, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask, Progress
@@ -34,18 +35,20 @@ _CLOSEST = 1e-5
 _FLOOR = 1e-7
 
 
-@notebook.brief
+@record
 class Outline(NamedTuple):
     """The projection of S on two axes, in ⟨f_n⟩ times the axes' length.
 
     Polygons are anticlockwise.
     """
 
-    inner: Floats  # (k, 2) corners of a polygon inside: projections of states of S
-    outer: Floats  # (m, 2) corners of a polygon outside: of certified half planes
-    gap: float  # largest distance of a corner of the outer polygon from the inner one
-    converged: bool  # the gap is within the tolerance
-    counts: dict[str, int]  # directions, programs, again, iterations as in `Intervals`
+    inner: Annotated[
+        Floats, quantity("inner", label="", note="corners: projections of states of S")
+    ]
+    outer: Annotated[Floats, quantity("outer", label="", note="corners of certified half planes")]
+    gap: Annotated[float, quantity("outline_gap")]
+    converged: Annotated[bool, "the gap is within the tolerance"]
+    counts: Annotated[dict[str, int], "directions, programs, again, iterations as in `Intervals`"]
 
 
 class _Support(NamedTuple):

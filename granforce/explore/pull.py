@@ -6,13 +6,13 @@ a segment. Values are solved together (`numerics.contact_program`).
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
 from granforce.explore.intervals import determined, needs_no_program, solved, values_and_gaps
+from granforce.fields import record
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
@@ -25,6 +25,7 @@ from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
+from granforce.quantities import FORCE, Field, quantity
 from granforce.records import InputError, UndecidedError, float_array, real_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
@@ -44,30 +45,38 @@ _ALONE = 5000
 _AT_WALL = 1e-6
 
 
-@notebook.brief
+@record
 class Pull(NamedTuple):
     """Networks with given f_n on one contact."""
 
-    contact: int  # its number in the packing
-    values: Floats  # (k,) its f_n in the states, force
-    states: Floats  # (k, N_c, 2) admissible networks, force
-    residual: Floats  # (k,) in ⟨f_n⟩, by Ensemble.residual
-    violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
-    opened: Mask  # (k, N_c) bool, contacts without force
-    sliding: Integers  # (k, N_c) int, sign of f_t if |f_t| = μ f_n > 0, 0 otherwise
+    contact: Annotated[int, "its number in the packing"]
+    values: Annotated[
+        Floats, Field("value", FORCE, "f_n of the contact in the states", label="value")
+    ]
+    states: Annotated[Floats, quantity("states", "value contact component")]
+    residual: Annotated[Floats, quantity("residual", "value")]
+    violation: Annotated[Floats, quantity("violation", "value")]
+    opened: Annotated[Mask, Field("value contact", "", "contacts without force")]
+    sliding: Annotated[
+        Integers, Field("value contact", "", "sign of f_t if |f_t| = μ f_n > 0, else 0")
+    ]
 
 
-@notebook.brief
+@record
 class Reach(NamedTuple):
     """The range of f_n of one contact, and the contacts that limit it."""
 
-    contact: int  # its number in the packing
-    low: float  # exact least f_n over S, force
-    high: float  # exact largest f_n over S, force
-    gap: Floats  # (2,) duality gaps in ⟨f_n⟩
-    states: Floats  # (2, N_c, 2) a network at either end, force
-    opened: Mask  # (2, N_c) bool, contacts without force in every network at that end
-    sliding: Integers  # (2, N_c) int, sign of f_t if every network there has |f_t| = μ f_n
+    contact: Annotated[int, "its number in the packing"]
+    low: Annotated[float, Field("", FORCE, "exact least f_n over S")]
+    high: Annotated[float, Field("", FORCE, "exact largest f_n over S")]
+    gap: Annotated[Floats, quantity("interval_gap", "side")]
+    states: Annotated[Floats, Field("side contact component", FORCE, "a network at either end")]
+    opened: Annotated[
+        Mask, Field("side contact", "", "contacts without force in all networks there")
+    ]
+    sliding: Annotated[
+        Integers, Field("side contact", "", "sign of f_t if all there have |f_t| = μ f_n")
+    ]
 
 
 @takes(Ensemble)

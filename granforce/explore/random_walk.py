@@ -10,16 +10,18 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from granforce import measures, notebook
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest, nearest_of_many, starting_network
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.motion.gauss_seidel import SideBySide, gauss_seidel
 from granforce.numerics.lanes import LANES
+from granforce.quantities import quantity
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -53,18 +55,19 @@ RELAXATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@notebook.brief
+@record
 class Walk(NamedTuple):
     """Accepted states of one or more chains, and the effort to reach them."""
 
-    states: Floats  # (S, N_c, 2) admissible networks, force
-    residual: Floats  # (S,) in ⟨f_n⟩, by Ensemble.residual
-    violation: Floats  # (S,) in ⟨f_n⟩, by Ensemble.violation
-    sweeps: Integers  # (S,) solver iterations since the previous state, failures included
-    attempts: Integers  # (S,) perturbations since the previous state
-    counts: dict[str, int]  # accepted, rejected (no equilibrium), unconverged, skipped (a point)
+    states: Annotated[Floats, quantity("states")]
+    residual: Annotated[Floats, quantity("residual", note="by Ensemble.residual")]
+    violation: Annotated[Floats, quantity("violation", note="by Ensemble.violation")]
+    sweeps: Annotated[Integers, quantity("sweeps", note="since the previous state")]
+    attempts: Annotated[Integers, quantity("attempts")]
+    counts: Annotated[dict[str, int], "accepted, rejected (no equilibrium), unconverged, skipped"]
 
     @property
+    @derived(quantity("acceptance"))
     def acceptance(self) -> float:
         """Fraction of attempts that gave a new state (1 if none was needed)."""
         tried = sum(self.counts[name] for name in ("accepted", "rejected", "unconverged"))
@@ -80,16 +83,16 @@ class Walk(NamedTuple):
         return notebook.table("Random walk in S", lines)
 
 
-@notebook.brief
+@record
 class WalkState(NamedTuple):
     """One accepted state of a running walk, as passed to `watch` of `walk`."""
 
-    chain: int
-    number: int  # among the chain's states, from 0
-    forces: Floats  # (N_c, 2) its own copy
-    residual: float  # ⟨f_n⟩
-    violation: float  # ⟨f_n⟩
-    attempts: int  # perturbations since the previous state
+    chain: Annotated[int, "that the state belongs to"]
+    number: Annotated[int, "among the chain's states, from 0"]
+    forces: Annotated[Floats, "(N_c, 2) its own copy, force"]
+    residual: Annotated[float, quantity("residual", "")]
+    violation: Annotated[float, quantity("violation", "")]
+    attempts: Annotated[int, quantity("attempts", "")]
 
 
 def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:

@@ -7,15 +7,17 @@ linear in the forces, so that the stresses of S fill a convex polygon.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
 from granforce.explore.outline import outline, supports
+from granforce.fields import record
 from granforce.forces.balance import stress_of, stress_rows
 from granforce.forces.ensemble import Ensemble
+from granforce.quantities import quantity
 from granforce.records import InputError, float_array, takes, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Progress
@@ -24,20 +26,20 @@ from granforce.types import Cancel, Floats, Progress
 TOLERANCE = 1e-4
 
 
-@notebook.brief
+@record
 class StressOutline(NamedTuple):
     """The stresses of all networks in S, as points ((σ_xx − σ_yy)/2P, σ_xy/P)."""
 
-    angles: Floats  # (k,) θ
-    support: Floats  # (k,) largest cos θ · first + sin θ · second over S
-    gap: Floats  # (k,) duality gaps of the supports, in the same units
-    inner: Floats  # (n, 2) corners of a polygon inside: stresses of networks in S
-    outer: Floats  # (m, 2) corners of a polygon outside, of certified half planes
-    friction: float  # largest shear stress over pressure of any network in S
-    friction_bound: float  # certified upper bound of it
-    original: Floats  # (2,) the stress of the packing's own network
-    converged: bool  # the polygons agree within the tolerance
-    counts: dict[str, int]  # as in `Outline`
+    angles: Annotated[Floats, quantity("stress_angle", label="angle", unit="rad")]
+    support: Annotated[Floats, quantity("stress_support", label="largest", unit="pressure")]
+    gap: Annotated[Floats, quantity("stress_gap", label="")]
+    inner: Annotated[Floats, quantity("stress_inner", label="", note="stresses of networks in S")]
+    outer: Annotated[Floats, quantity("stress_outer", label="", note="of certified half planes")]
+    friction: Annotated[float, quantity("friction")]
+    friction_bound: Annotated[float, quantity("friction_bound")]
+    original: Annotated[Floats, quantity("stress_own", label="")]
+    converged: Annotated[bool, "the polygons agree within the tolerance"]
+    counts: Annotated[dict[str, int], "as in `Outline`"]
 
     def _repr_html_(self) -> str:
         """HTML for notebooks."""

@@ -11,19 +11,20 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from scipy.sparse.linalg import norm
 
-from granforce import notebook
 from granforce.explore import billiard
 from granforce.explore.billiard import RowStore
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
+from granforce.quantities import quantity
 from granforce.records import (
     Cancelled,
     InputError,
@@ -78,23 +79,25 @@ class ChainState(NamedTuple):
 Flown = tuple[list[ChainState], Floats, Integers]
 
 
-@notebook.brief
+@record
 class UniformSample(NamedTuple):
     """Uniform states of S by chain, with diagnostics."""
 
-    states: Floats  # (chains, k, N_c, 2) admissible networks, force
-    residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
-    violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
-    mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
-    reached: bool  # complete, all in S, R̂ ≤ 1.1, and the effective sample size as requested
-    counts: dict[str, Any]  # turns, rejected paths, dropped and skipped states, held coordinates
-    setup_seconds: float  # wall time of the walls
-    sampling_seconds: float  # wall time of the steps, including dropped ones
-    diagnosis_seconds: float  # wall time of the diagnostics
-    method: str
-    walls: Walls  # the coordinates used
-    reach: float  # root mean square distance |s − 1| from the centre, from the warm-up
-    ends: Sequence[ChainState]  # ChainState of each chain, from which it can be continued
+    states: Annotated[Floats, "(chains, k, N_c, 2) admissible networks, force"]
+    residual: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.residual"]
+    violation: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.violation"]
+    mixing: Annotated[Mixing, "R̂ and effective sample sizes of each component (NaN if cancelled)"]
+    reached: Annotated[bool, quantity("reached", note="and all are in S")]
+    counts: Annotated[
+        dict[str, Any], "turns, rejected paths, dropped, skipped states, held coordinates"
+    ]
+    setup_seconds: Annotated[float, quantity("setup_seconds")]
+    sampling_seconds: Annotated[float, quantity("sampling_seconds", note="of dropped states, too")]
+    diagnosis_seconds: Annotated[float, "wall time of the diagnostics, s"]
+    method: Annotated[str, "billiard or hit_and_run"]
+    walls: Annotated[Walls, "the coordinates used"]
+    reach: Annotated[float, "root mean square distance |s − 1| from the centre, from the warm-up"]
+    ends: Annotated[Sequence[ChainState], "of each chain, from which it can be continued"]
 
     @property
     def effective(self) -> float:
@@ -102,11 +105,13 @@ class UniformSample(NamedTuple):
         return min(self.mixing.least_bulk, self.mixing.least_tail)
 
     @property
+    @derived(quantity("states", label="states"))
     def flat(self) -> Floats:
         """All states (chains · k, N_c, 2), chain after chain."""
         return self.states.reshape(-1, *self.states.shape[2:])
 
     @property
+    @derived(quantity("chain"))
     def chain(self) -> Integers:
         """(chains · k,) the chain of each state in `flat`."""
         return np.repeat(np.arange(self.states.shape[0]), self.states.shape[1])

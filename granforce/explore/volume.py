@@ -21,14 +21,16 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import Walls, walls
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
+from granforce.quantities import Field, quantity
 from granforce.records import positive, random_seed, takes, worker_count
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Progress
@@ -59,20 +61,23 @@ _COUNTS = "turns", "refused"
 AGREE = 4.0
 
 
-@notebook.brief
+@record
 class Volume(NamedTuple):
     """The volume of S in its affine hull, forces f_n and f_t of every contact in ⟨f_n⟩."""
 
-    log_volume: float  # ln V
-    error: float  # its standard error
-    dimension: int  # h
-    per_grain: float  # ln V over the number of grains of the backbone
-    ladders: Floats  # (2,) ln V from the ladder down and from the ladder up
-    reached: bool  # the error is as requested, and both ladders agree
-    counts: dict[str, Any]  # rungs, paths, turns, rejected paths
-    seconds: float  # wall time
+    log_volume: Annotated[float, quantity("log_volume", label="log_volume")]
+    error: Annotated[float, quantity("log_volume_error", label="error")]
+    dimension: Annotated[int, quantity("dimension", label="dimension")]
+    per_grain: Annotated[float, quantity("log_volume_per_grain", label="per_grain")]
+    ladders: Annotated[Floats, quantity("log_volume_ladders")]
+    reached: Annotated[
+        bool, Field("", "", "the error is as requested, and both ladders agree", label="reached")
+    ]
+    counts: Annotated[dict[str, Any], "rungs, paths, turns, rejected paths"]
+    seconds: Annotated[float, quantity("seconds")]
 
     @property
+    @derived(quantity("extent"))
     def extent(self) -> float:
         """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
         if not self.dimension:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +22,11 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from granforce import notebook
+from granforce.fields import record
 from granforce.forces import balance, knowledge
 from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.numerics import certificates, inner_point
+from granforce.quantities import quantity
 from granforce.records import (
     Contacts,
     InputError,
@@ -50,28 +52,42 @@ class Hull(NamedTuple):
     resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no point of S is farther from a held wall
 
 
-@notebook.brief
+@record
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `ensemble`."""
+    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `ensemble`.
 
-    packing: Packing
-    mu: float  # the largest friction coefficient of the cones (not necessarily the packing's)
-    index: Integers  # (N_c,) the unknown contacts, as positions in packing.contacts
-    contacts: Contacts  # their geometry
-    grains: Integers  # (M,) grains of the backbone, as positions in packing.x
-    A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then stress
-    b: Floats  # (rows,) force
-    # ⟨f_n⟩ = Σ f_n ℓ / Σ ℓ, force: 2 P0 V / Σ ℓ in every network where the pressure is prescribed,
-    # otherwise the mean |f_n| of the packing's own network, or its mean load without forces
-    force_scale: float
-    original: Floats  # (N_c, 2) the packing's own network on these contacts
-    frozen: Integers  # contacts held at their original forces, as positions in packing.contacts
-    skipped: dict[str, int]  # counts left out: rattlers, unloaded contacts, tangential unknowns
-    prescribed: str  # "pressure", "stress" (with the pressure) or "none"
-    known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
-    find_hull: Callable[[Ensemble], Hull]  # computes `hull`, by programs that import this file
-    computed: Floats | None = None  # (N_c, 2) a network computed while the backbone was determined
+    ⟨f_n⟩ = Σ f_n ℓ / Σ ℓ is 2 P0 V / Σ ℓ in all networks if the pressure is prescribed; otherwise
+    it is the mean |f_n| of the packing's own network, or its mean load without forces.
+    """
+
+    packing: Annotated[Packing, "whose networks these are"]
+    mu: Annotated[
+        float, "the largest friction coefficient of the cones (not necessarily the packing's)"
+    ]
+    index: Annotated[Integers, quantity("backbone", note="the unknown contacts")]
+    contacts: Annotated[Contacts, "their geometry"]
+    grains: Annotated[Integers, "(M,) grains of the backbone, as positions in packing.x"]
+    A: Annotated[sparse.csr_matrix, "(rows, unknowns): forces and torque/r by grain, then stress"]
+    b: Annotated[Floats, "(rows,) force"]
+    force_scale: Annotated[float, quantity("force_scale")]
+    original: Annotated[Floats, quantity("original")]
+    frozen: Annotated[
+        Integers, "contacts held at their original forces, as positions in packing.contacts"
+    ]
+    skipped: Annotated[
+        dict[str, int], "counts left out: rattlers, unloaded contacts, tangential unknowns"
+    ]
+    prescribed: Annotated[str, '"pressure", "stress" (with the pressure) or "none"']
+    known: Annotated[
+        knowledge.Polygons | None, "bounds on single forces, in ⟨f_n⟩; None without any"
+    ]
+    find_hull: Annotated[
+        Callable[[Ensemble], Hull], "computes `hull`, by programs that import this file"
+    ]
+    computed: Annotated[
+        Floats | None, "(N_c, 2) a network computed while the backbone was determined"
+    ] = None
 
     @property
     def per_contact(self) -> int:

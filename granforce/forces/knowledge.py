@@ -6,12 +6,12 @@ bounds coincide is *pinned*; every other bound is a *side*.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import Contacts, InputError, NotJammedError, are_whole, real_array
@@ -23,15 +23,22 @@ _NAMES = "f_n", "f_t"
 _WEIGHTY = 1e-6
 
 
-@notebook.brief
+@record
 class Known(NamedTuple):
     """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high, or on f_n alone; see `sides`."""
 
-    contacts: Integers  # (k,) numbers in the packing
-    # (k, 2) force, or (k,) or one number for f_n alone; −inf, or left out, where nothing is known
-    low: Floats = np.array(-np.inf)
-    high: Floats = np.array(np.inf)  # the same, inf where nothing is known; low for an exact value
-    grains: Integers | None = None  # (k, 2) that these contacts should join; None: not checked
+    contacts: Annotated[Integers, "(k,) numbers in the packing"]
+    low: Annotated[
+        Floats,
+        "(k, 2) force, or (k,) or one number for f_n alone; −inf, or left out, where nothing is "
+        "known",
+    ] = np.array(-np.inf)
+    high: Annotated[Floats, "the same, inf where nothing is known; low for an exact value"] = (
+        np.array(np.inf)
+    )
+    grains: Annotated[
+        Integers | None, "(k, 2) that these contacts should join; None: not checked"
+    ] = None
 
     @property
     def sides(self) -> tuple[Floats, Floats]:

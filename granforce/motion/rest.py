@@ -9,17 +9,18 @@ again from the resulting network with noise on every force.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
 from granforce.motion.flow import Push
 from granforce.motion.inertia import make_step
 from granforce.motion.works import relax, relax_all
+from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Mask
@@ -30,18 +31,22 @@ NOISE, DRAWS = (1e-4, 1e-2), 3
 MOST_STEPS = 500
 
 
-@notebook.brief
+@record
 class Rest(NamedTuple):
     """The outcome of the test of rest of a packing; see `rest`."""
 
-    at_rest: bool  # from the packing's own forces and, with noise, in every draw
-    distance: float  # ⟨f_n⟩, from its own forces to the network reached; NaN without rest
-    noise: tuple[float, ...]  # ⟨f_n⟩, standard deviations
-    # (len(noise), draws) bool, draws that came to rest; all False if its own forces move grains
-    stayed: Mask
-    # (contacts, 2) the network reached from its own forces; if grains move, the forces while moving
-    forces: Floats
-    reason: str  # why it is not at rest; empty if it is
+    at_rest: Annotated[bool, "from the packing's own forces and, with noise, in every draw"]
+    distance: Annotated[
+        float, "from its own forces to the network reached, ⟨f_n⟩; NaN without rest"
+    ]
+    noise: Annotated[tuple[float, ...], "standard deviations, ⟨f_n⟩"]
+    stayed: Annotated[
+        Mask, "(noise, draws) draws that came to rest; all False if its own forces move"
+    ]
+    forces: Annotated[
+        Floats, Field(ALL_CONTACTS, FORCE, "the network reached; while moving if grains move")
+    ]
+    reason: Annotated[str, "why it is not at rest; empty if it is"]
 
 
 @cancelling.cancellable

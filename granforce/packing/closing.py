@@ -7,13 +7,13 @@ linearised non-overlap. A box with a free shape has three strains instead of one
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from granforce import notebook
 from granforce.cell import Cell
+from granforce.fields import record
 from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
 from granforce.motion.contact_dynamics import Motion
@@ -55,12 +55,12 @@ def prescribed_of(motion: Motion) -> dict[str, Any]:
     return {"prescribed": "stress", "stress": (1.0, 1.0, 0.0)}
 
 
-@notebook.brief
+@record
 class Margin(NamedTuple):
     """How clearly contacts differ from other pairs; gaps in largest radii."""
 
-    contact: float  # largest |gap| of a contact
-    other: float  # least gap of any other pair of disks; SKIN / 2 if none is that close
+    contact: Annotated[float, "largest |gap| of a contact"]
+    other: Annotated[float, "least gap of any other pair of disks; SKIN / 2 if none is that close"]
 
     @property
     def certain(self) -> bool:

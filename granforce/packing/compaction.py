@@ -10,12 +10,12 @@ rest; there, linear programs finish the packing (`closing`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.motion import contact_dynamics as dynamics
 from granforce.motion.rest import Rest, rest
 from granforce.numerics.lanes import compiled
@@ -77,21 +77,21 @@ COARSEST = 1.0
 WATCH_EVERY = 5
 
 
-@notebook.brief
+@record
 class Glimpse(NamedTuple):
     """A packing while it is compressed, as passed to `watch` of `pack`; all arrays are copies."""
 
-    step: int
-    x: Floats  # (N, 2) centres inside the box, length
-    r: Floats  # (N,)
-    box: Floats  # (2,)
-    i: Integers  # (k,) grains of the contacts that carry force
-    j: Integers
-    reach: Floats  # (k, 2) from the centre of grain i to that of grain j, length
-    forces: Floats  # (k, 2) f_n, f_t, force
-    packing_fraction: float
-    unbalance: float  # largest change of a grain's momentum per step, ⟨f_n⟩
-    tilt: float = 0.0  # tilt of the cell, length
+    step: Annotated[int, "time steps so far"]
+    x: Annotated[Floats, "(N, 2) centres inside the box, length"]
+    r: Annotated[Floats, "(N,) radii, length"]
+    box: Annotated[Floats, "(2,) sides of the cell, length"]
+    i: Annotated[Integers, "(k,) grains of the contacts that carry force"]
+    j: Annotated[Integers, "(k,) the others"]
+    reach: Annotated[Floats, "(k, 2) from the centre of grain i to that of grain j, length"]
+    forces: Annotated[Floats, "(k, 2) f_n, f_t, force"]
+    packing_fraction: Annotated[float, "φ, rattlers included"]
+    unbalance: Annotated[float, "largest change of a grain's momentum per step, ⟨f_n⟩"]
+    tilt: Annotated[float, "tilt of the cell, length"] = 0.0
 
     @property
     def state(self) -> str:

@@ -18,12 +18,12 @@ grains may start to move although an equilibrium exists.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from granforce import notebook
 from granforce.explore.intervals import limit_load_bounds
+from granforce.fields import record
 from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
@@ -32,6 +32,7 @@ from granforce.motion.flow import Outcome, Push
 from granforce.motion.inertia import grain_velocities, make_step
 from granforce.motion.step import Step, relative_velocities
 from granforce.motion.works import follow, relax
+from granforce.quantities import FORCE, Field, of_one_contact, quantity
 from granforce.records import (
     InputError,
     Packing,
@@ -69,40 +70,49 @@ LEAST_PRECISION, MOST_PRECISION = INTERVAL_GAP, 1.0
 COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
 
 
-@notebook.brief
+@record
 class CriticalForce(NamedTuple):
     """Largest force pair on one contact under which grains rest, and the motion above it."""
 
-    contact: int  # its number in the packing
-    mu: float  # friction coefficient of the ensemble
-    low: float  # F_crit, force: largest load that ended at rest
-    high: float  # smallest load that did not, or the limit load if none was tried
-    limit_load: float  # force
-    forces: Floats  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
-    residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
-    violation: float  # ⟨f_n⟩, by Ensemble.violation
-    moving: Outcome | None  # the outcome under `high`; None if that was not tried
-    converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
-    counts: dict[str, float]  # COUNTS
-    seconds: float  # time of the flows, shared among those computed together
+    contact: Annotated[int, of_one_contact("backbone", label="")]
+    mu: Annotated[float, "friction coefficient of the ensemble"]
+    low: Annotated[float, of_one_contact("critical_low")]
+    high: Annotated[float, of_one_contact("critical_high")]
+    limit_load: Annotated[float, of_one_contact("limit_load")]
+    forces: Annotated[Floats, Field("contact component", FORCE, "equilibrium under `low`")]
+    residual: Annotated[float, of_one_contact("load_residual", label="residual")]
+    violation: Annotated[float, of_one_contact("load_violation", label="violation")]
+    moving: Annotated[Outcome | None, "the outcome under `high`; None if that was not tried"]
+    converged: Annotated[
+        bool,
+        Field(
+            "",
+            "",
+            "high − low ≤ precision, and steady motion or the limit load above",
+            label="converged",
+            each=True,
+        ),
+    ]
+    counts: Annotated[dict[str, float], "COUNTS"]
+    seconds: Annotated[float, of_one_contact("contact_seconds", label="")]
 
 
-@notebook.brief
+@record
 class Response(NamedTuple):
     """First motion above the critical force, scaled so that rms |u| of the backbone is 1."""
 
-    contact: int
-    force: float  # the load
-    displacement: Floats  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
-    rotation: Floats  # (N,) rotation times radius; NaN for rattlers
-    dilation: float  # of the box, ΔL/L per unit of u, 1/length
-    opening: Floats  # (N_c,) normal relative displacement of the ensemble's contacts
-    opened: Mask  # (N_c,) bool, contacts without force
-    slid: Mask  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
-    kept: Mask  # (N_c,) bool, sticking contacts
-    breach: float  # largest violation of Coulomb's law, relative to the fastest contact
-    fastest: float  # largest relative displacement at a contact
-    converged: bool  # breach ≤ 0.001
+    contact: Annotated[int, "its number in the packing"]
+    force: Annotated[float, Field("", FORCE, "the load")]
+    displacement: Annotated[Floats, quantity("displacement", "grain axis")]
+    rotation: Annotated[Floats, Field("grain", "", "rotation times radius; NaN for rattlers")]
+    dilation: Annotated[float, "of the box, ΔL/L per unit of u, 1/length"]
+    opening: Annotated[Floats, Field("contact", "", "normal relative displacement")]
+    opened: Annotated[Mask, Field("contact", "", "contacts without force")]
+    slid: Annotated[Mask, Field("contact", "", "pressed contacts at |f_t| = μ f_n")]
+    kept: Annotated[Mask, Field("contact", "", "sticking contacts")]
+    breach: Annotated[float, quantity("motion_breach", "", note="relative to the fastest contact")]
+    fastest: Annotated[float, "largest relative displacement at a contact"]
+    converged: Annotated[bool, "breach ≤ 0.001"]
 
 
 # A generator for `works.follow` that yields flows, is sent their outcomes, and returns a result.
@@ -110,13 +120,15 @@ T = TypeVar("T")
 Asking = Generator[Push, Outcome, T]
 
 
-@notebook.brief
+@record
 class Protocol(NamedTuple):
     """How the load on a contact is raised."""
 
-    precision: float = 0.01  # of the bracket, ⟨f_n⟩
-    rise: float = RISE  # fraction of the way from the last load at rest to the limit load
-    max_steps: int = MOST_STEPS  # of the flow per load
+    precision: Annotated[float, "of the bracket, ⟨f_n⟩"] = 0.01
+    rise: Annotated[float, "fraction of the way from the last load at rest to the limit load"] = (
+        RISE
+    )
+    max_steps: Annotated[int, "of the flow per load"] = MOST_STEPS
 
 
 @cancelling.cancellable

@@ -11,12 +11,12 @@ Contacts that carry nothing without the load are included.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.forces.build import with_idle
 from granforce.forces.contact_problem import forces_of, make_system
 from granforce.forces.ensemble import Ensemble
@@ -35,6 +35,7 @@ from granforce.perturb.critical_force import (
     motion_of,
     raised,
 )
+from granforce.quantities import ALL_CONTACTS, FORCE, Field, quantity
 from granforce.records import (
     InputError,
     Packing,
@@ -54,33 +55,33 @@ LOAD_PRECISION, MOST_LOAD_PRECISION = 1e-4, 0.1
 NO_LIMIT = "contact forces can balance every multiple of this load, so it has no critical factor"
 
 
-@notebook.brief
+@record
 class LoadFactor(NamedTuple):
     """Largest multiple of a load that networks can balance, certified from both sides."""
 
-    factor: float  # λ, attained by `forces`; inf without a limit
-    gap: float  # in λ: the limit is proved to be at most factor + gap
-    load: Floats  # (N, 3) the load, force and torque
-    forces: Floats  # (contacts, 2) a network at the limit, on all contacts of the packing, force
+    factor: Annotated[float, "λ, attained by `forces`; inf without a limit"]
+    gap: Annotated[float, "in λ: the limit is proved to be at most factor + gap"]
+    load: Annotated[Floats, "(N, 3) the load, force and torque"]
+    forces: Annotated[Floats, Field(ALL_CONTACTS, FORCE, "a network at the limit")]
 
 
-@notebook.brief
+@record
 class CriticalLoad(NamedTuple):
     """Largest multiple of a load at which bodies rest, and the motion above it."""
 
-    low: float  # largest λ that ended at rest
-    high: float  # smallest λ that did not, or the load factor if none was tried
-    precision: float  # of the bracket, high − low, as a fraction of the load factor
-    load_factor: float  # λ
-    load: Floats  # (N, 3) the load, force and torque
-    forces: Floats  # (contacts, 2) equilibrium under `low`, on all contacts of the packing, force
-    residual: float  # its unbalance with the load, in ⟨f_n⟩
-    violation: float  # in ⟨f_n⟩
-    displacement: Floats  # (N, 2) the first motion, rms |u| = 1; NaN for fixed bodies
-    rotation: Floats  # (N,) rotation times radius; NaN likewise
-    breach: float  # of Coulomb's law by that motion, relative to the fastest contact
-    converged: bool  # high − low ≤ precision · load_factor, and the motion is steady
-    counts: dict[str, float]  # as in CriticalForce
+    low: Annotated[float, "largest λ that ended at rest"]
+    high: Annotated[float, "smallest λ that did not, or the load factor if none was tried"]
+    precision: Annotated[float, "of the bracket, high − low, as a fraction of the load factor"]
+    load_factor: Annotated[float, "λ"]
+    load: Annotated[Floats, "(N, 3) the load, force and torque"]
+    forces: Annotated[Floats, Field(ALL_CONTACTS, FORCE, "equilibrium under `low`")]
+    residual: Annotated[float, quantity("residual", "", note="with the load")]
+    violation: Annotated[float, quantity("violation", "")]
+    displacement: Annotated[Floats, "(N, 2) the first motion, rms |u| = 1; NaN for fixed bodies"]
+    rotation: Annotated[Floats, "(N,) rotation times radius; NaN likewise"]
+    breach: Annotated[float, "of Coulomb's law by that motion, relative to the fastest contact"]
+    converged: Annotated[bool, "high − low ≤ precision · load_factor, and the motion is steady"]
+    counts: Annotated[dict[str, float], "as in CriticalForce"]
 
 
 @takes(Ensemble)

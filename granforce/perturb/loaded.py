@@ -12,29 +12,30 @@ Such a network exists up to the limit load. Grains may start to move earlier (`c
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
+from granforce.quantities import FORCE, Field, quantity
 from granforce.records import InputError, float_array, real_array, takes
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
 
 
-@notebook.brief
+@record
 class Loaded(NamedTuple):
     """Networks under loads that push the grains of one contact apart."""
 
-    contact: int  # its number in the packing
-    loads: Floats  # (k,) force
-    states: Floats  # (k, N_c, 2) networks, force; without the load
-    residual: Floats  # (k,) unbalance with the load, in ⟨f_n⟩, by Ensemble.residual
-    violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
+    contact: Annotated[int, "its number in the packing"]
+    loads: Annotated[Floats, Field("load", FORCE, "loads that push its grains apart", label="load")]
+    states: Annotated[Floats, Field("load contact component", FORCE, "networks, without the load")]
+    residual: Annotated[Floats, quantity("residual", "load", note="with the load")]
+    violation: Annotated[Floats, quantity("violation", "load")]
 
 
 @takes(Ensemble)

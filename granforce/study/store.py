@@ -20,12 +20,12 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import platformdirs
 import xarray as xr
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.records import InputError
 from granforce.study import entries, keys
 from granforce.study.keys import Parameters
@@ -39,25 +39,25 @@ class NotKeptError(InputError):
     """A result could not be written to the store, for example because the disk is full."""
 
 
-@notebook.brief
+@record
 class Entry(NamedTuple):
     """Metadata of one entry, without its arrays."""
 
-    name: str  # folder in the store: <kind>-<key>
-    kind: str
-    params: Parameters  # as in the key: floats to 15 significant digits
-    version: int | str  # of the algorithm
-    bytes: int  # on disk
-    created: str  # UTC, ISO 8601
+    name: Annotated[str, "folder in the store: <kind>-<key>"]
+    kind: Annotated[str, "of result"]
+    params: Annotated[Parameters, "as in the key: floats to 15 significant digits"]
+    version: Annotated[int | str, "of the algorithm"]
+    bytes: Annotated[int, "on disk"]
+    created: Annotated[str, "UTC, ISO 8601"]
 
 
-@notebook.brief
+@record
 class Verdict(NamedTuple):
     """Whether one entry is intact; if not, the reason in words."""
 
-    name: str
-    ok: bool
-    reason: str
+    name: Annotated[str, "of the entry"]
+    ok: Annotated[bool, "whether it is intact"]
+    reason: Annotated[str, "why not, in words"]
 
 
 def default_path() -> Path:

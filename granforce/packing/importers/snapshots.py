@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from granforce import notebook
+from granforce.fields import record
 from granforce.packing.importers.notes import noted
 from granforce.records import InputError, Packing
 from granforce.types import Floats
 
 
-@notebook.brief
+@record
 class Snapshot(NamedTuple):
     """A packing, and the ids of its grains in the files; −1, −2, … for walls."""
 
-    packing: Packing
-    ids: Floats  # (N,)
+    packing: Annotated[Packing, "with the simulation's own forces"]
+    ids: Annotated[Floats, "(N,) of its grains"]
 
 
-@notebook.brief
+@record
 class Snapshots(NamedTuple):
     """The complete snapshots in the files of a simulation."""
 
-    word: str  # kind of number: timestep, …
-    numbers: Sequence[int]  # in the order of the files, at least one
-    read: Callable[[int], Snapshot]
-    lost: str = ""  # description of what was cut off after the last of them
+    word: Annotated[str, "kind of number: timestep, …"]
+    numbers: Annotated[Sequence[int], "in the order of the files, at least one"]
+    read: Annotated[Callable[[int], Snapshot], "the snapshot of a number"]
+    lost: Annotated[str, "description of what was cut off after the last of them"] = ""
 
     @noted(lambda snapshot: snapshot.packing.info)
     def snapshot(self, number: int | None = None) -> Snapshot:

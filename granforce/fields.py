@@ -1,0 +1,84 @@
+"""The declared fields of records, and how records describe themselves with them."""
+
+import functools
+import typing
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from granforce.quantities import Field
+
+C = TypeVar("C", bound=type)
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def record(kind: C) -> C:
+    """A decorator of records (named tuples and dataclasses): a short repr, and help on all fields.
+
+    Fields are Annotated with a Field or, if neither labelled nor stored, with a text alone.
+    """
+    kind.__repr__ = _short  # type: ignore[assignment, method-assign]
+    texts = {name: fields(kind)[name].text for name in _names(kind) if name in fields(kind)}
+    if hasattr(kind, "_fields"):
+        for name, text in texts.items():
+            getattr(kind, name).__doc__ = text
+    make = kind.__new__ if hasattr(kind, "_fields") else kind.__init__  # type: ignore[misc]
+    make.__annotations__ = {}  # the signature in `help` has names only
+    lines = (f"    {name}: {text}" for name, text in texts.items())
+    kind.__doc__ = "\n".join([(kind.__doc__ or "").rstrip(), "", *lines])
+    return kind
+
+
+def derived(field: Field) -> Callable[[F], F]:
+    """A decorator of a property's function: a field that is computed from others."""
+
+    def declare(function: F) -> F:
+        function.field = field  # type: ignore[attr-defined]
+        function.__doc__ = function.__doc__ or f"{field.text}."
+        return function
+
+    return declare
+
+
+@functools.cache
+def fields(kind: type) -> dict[str, Field]:
+    """The declared fields of a record, then its derived ones, by name."""
+    hints = typing.get_type_hints(kind, None, {kind.__name__: kind}, include_extras=True)
+    found = {name: _declared(getattr(hint, "__metadata__", ())) for name, hint in hints.items()}
+    for base in reversed(kind.__mro__):
+        for name, value in vars(base).items():
+            function = value.fget if isinstance(value, property) else None
+            found[name] = getattr(function, "field", found.get(name))
+    return {name: field for name, field in found.items() if field is not None}
+
+
+def _declared(metadata: Iterable[Any]) -> Field | None:
+    """The Field, or text, of a type's metadata; None without."""
+    for told in metadata:
+        if isinstance(told, (Field, str)):
+            return Field("", "", told, label="") if isinstance(told, str) else told
+    return None
+
+
+def _names(kind: Any) -> Iterable[str]:
+    """The fields of a named tuple or a dataclass, in order."""
+    return getattr(kind, "_fields", None) or kind.__dataclass_fields__
+
+
+def _short(record: Any) -> str:
+    """A record in a line: arrays by their shape, records and tables by their type."""
+    parts = []
+    for name in _names(type(record)):
+        value = getattr(record, name)
+        if isinstance(value, np.ndarray):
+            parts.append(f"{name}{list(value.shape)}")
+        elif value is None or isinstance(value, (bool, str)):
+            parts.append(
+                f"{name}={str(value)[:40]!r}" if isinstance(value, str) else f"{name}={value}"
+            )
+        elif isinstance(value, (int, float, np.number)):
+            parts.append(f"{name}={value:.6g}")
+        else:
+            parts.append(f"{name}: {type(value).__name__}")
+    return f"{type(record).__name__}({', '.join(parts)})"
