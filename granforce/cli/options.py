@@ -261,9 +261,10 @@ def add_known(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--known",
         type=Input,
-        metavar="FILE.csv",
+        metavar="FILE.{csv,npz,zarr}",
         help="known forces, in the packing's units: columns contact, and f_n, f_t (exact) or "
-        "f_n_low, f_n_high, f_t_low, f_t_high (bounds); empty fields are ignored",
+        "f_n_low, f_n_high, f_t_low, f_t_high (bounds), as written by intervals with --out; empty "
+        "fields, nan and infinite bounds are ignored",
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
+from granforce.cli.input_tables import read_known
 from granforce.explore.random_walk import UNBOUNDED_WALK
 from granforce.explore.uniform import FEWEST_EFFECTIVE, MIXED
 from granforce.forces.knowledge import Known, refuse_others
@@ -217,7 +218,7 @@ def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
 def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
     """The known forces in the options, likewise."""
     given = getattr(arguments, "known", None)
-    return {} if given is None else {"known": importers.read_known(given)}
+    return {} if given is None else {"known": read_known(given)}
 
 
 class Unit(NamedTuple):

@@ -10,14 +10,10 @@ import xarray as xr
 
 from granforce.cli.results import contact_labels, unit
 from granforce.labelled import COMPONENTS, UNITS, column_name, parts
-from granforce.packing.importers.npz import read_arrays
-from granforce.packing.importers.text import PACKING, read_csv
-from granforce.records import InputError, Packing, are_whole, float_array
 from granforce.study.keys import Parameters
 from granforce.study.schema import VARIABLES
 from granforce.study.series import save_series
-from granforce.system.files import expanded, written
-from granforce.types import Floats, Integers
+from granforce.system.files import written
 
 # Coordinates of contacts: their grains, and the point of contact.
 _LABELS: dict[str, dict[str, str]] = {
@@ -39,7 +35,7 @@ def write_columns(path: str, columns: Mapping[str, Any], *more: xr.Dataset) -> N
 
 
 def _dataset(columns: Mapping[str, Any]) -> xr.Dataset:
-    """Columns as variables of `to_dataset`: f_n_low and f_t_low become low, by component."""
+    """Columns as variables of `to_dataset`: f_n_low and f_t_low are low, f_n and f_t are forces."""
     first, *others = columns
     _, rows, word = parts(first)
     coordinates: dict[str, Any] = {rows: (rows, columns[first], {"units": word} if word else {})}
@@ -54,6 +50,7 @@ def _dataset(columns: Mapping[str, Any]) -> xr.Dataset:
             variable = column_name(component, variable)
             variables[variable] = rows, columns[name], _attributes(variable, word)
         elif component == COMPONENTS[0]:
+            variable = variable or "forces"
             values = np.stack([columns[one] for one in both], axis=-1)
             variables[variable] = (rows, "component"), values, _attributes(variable, word)
             coordinates["component"] = COMPONENTS
@@ -112,69 +109,3 @@ def write_states(
             for k, component in enumerate(COMPONENTS)
         }
         write_csv(path, columns | pair)
-
-
-def read_states(path: str, packing: Packing) -> tuple[Integers, Floats]:
-    """Contacts (k,) of a packing and states (S, k, 2) on them, from a file of `write_states`.
-
-    Raises InputError for files of another kind or unit, and for states of another packing.
-    """
-    readers = {".csv": _states_of_table, ".npz": _states_of_arrays, ".zarr": _states_of_dataset}
-    reader = readers.get(Path(path).suffix)
-    if reader is None:
-        raise InputError(f"{path}: the name must end with .csv, .npz or .zarr")
-    contact, i, j, states = reader(path)
-    contacts = packing.contacts
-    count = len(contacts.i)
-    if contact.ndim != 1 or not contact.size or not are_whole(contact, count - 1).all():
-        raise InputError(f"{path}: contacts must be numbered 0 … {count - 1} as in the packing")
-    contact = contact.astype(np.int64)
-    if not (np.array_equal(contacts.i[contact], i) and np.array_equal(contacts.j[contact], j)):
-        raise InputError(
-            f"{path}: its contacts join other grains; does it belong to another packing?"
-        )
-    return contact, float_array(states, (-1, len(contact), 2), f"{path}: states")
-
-
-_States = tuple[Any, Any, Any, Any]  # numbers of contacts, their grains i and j, and states
-
-
-def _states_of_table(path: str) -> _States:
-    table = read_csv(path).in_packing_unit(COMPONENTS)
-    state, contact = table.whole("state"), table.whole("contact")
-    forces = np.column_stack([table.numbers(component) for component in COMPONENTS])
-    first = int(np.sum(state == state[0]))
-    if not np.array_equal(contact, np.resize(contact[:first], len(contact))):
-        raise InputError(f"{path}: every state must have the same contacts in the same order")
-    i, j = (table.some(range(first)).whole(name) for name in ("i", "j"))
-    if len(forces) % first:
-        raise InputError(f"{path}: the last state is not complete")
-    return contact[:first], i, j, forces.reshape(-1, first, 2)
-
-
-def _states_of_arrays(path: str) -> _States:
-    arrays = read_arrays(path)
-    return _picked(path, arrays, f"states{PACKING}", arrays)
-
-
-def _states_of_dataset(path: str) -> _States:
-    try:
-        dataset = xr.open_zarr(expanded(path), consolidated=False).load()
-    except Exception as error:  # of many kinds, by zarr and xarray
-        raise InputError(f"{path}: not a Zarr dataset ({type(error).__name__})") from None
-    units = dataset["states"].attrs.get("units") if "states" in dataset else None
-    given = {name: values.values for name, values in dataset.variables.items()}
-    return _picked(path, given, "states", {"states"} if units == UNITS["packing"] else set())
-
-
-def _picked(path: str, arrays: Mapping[Any, Any], states: str, in_unit: Any) -> _States:
-    names = ("contact", "i", "j", states)
-    if not any(str(name).startswith("states") for name in arrays):
-        raise InputError(f"{path}: contains no states; granforce walk or uniform --out writes them")
-    if states not in in_unit or any(name not in arrays for name in names):
-        raise InputError(
-            f"{path}: no states in the packing's unit; write them with granforce walk or uniform "
-            "--out with --unit packing"
-        )
-    contact, i, j, values = (arrays[name] for name in names)
-    return contact, i, j, values

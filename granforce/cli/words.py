@@ -352,8 +352,8 @@ def add_plot(commands: Commands) -> None:
         "--states",
         type=Input,
         metavar="FILE.{csv,npz,zarr}",
-        help="draw the mean of these networks, written by walk or uniform with --out (default: the "
-        "packing's original network)",
+        help="draw the mean of these networks, written by walk, uniform or infer with --out "
+        "(default: the packing's original network)",
     )
     command.add_argument(
         "--state", type=int, metavar="K", help="draw only network number K, counted from 0"

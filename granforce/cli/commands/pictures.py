@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from granforce.cli.input_tables import read_states
 from granforce.cli.results import check_outputs
-from granforce.cli.tables import read_states
 from granforce.packing import importers
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
@@ -39,9 +39,9 @@ def plot(arguments: argparse.Namespace) -> None:
     if arguments.states is not None:
         contacts, states = read_states(arguments.states, packing)
         if arguments.state is not None:
-            states = states[whole(arguments.state, "--state", 0, len(states) - 1)]
+            states = states[[whole(arguments.state, "--state", 0, len(states) - 1)]]
         networks = {"states": states, "contacts": contacts}
-    if arguments.colour == "spread" and networks.get("states", packing.forces).ndim < 3:
+    if arguments.colour == "spread" and len(networks.get("states", "1")) < 2:
         raise InputError("--colour spread needs several networks: give --states without --state")
     drawn = picture.plot(
         packing,
