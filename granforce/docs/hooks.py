@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -27,10 +28,15 @@ DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.(?:png|json))\)")  # as in the sources
+FORMULA = re.compile(r"\$\$(.+?)\$\$", re.S)  # LaTeX, which browsers show as MathML without a script
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
-# The theme reserves five words for every column of a table, however narrow its content.
-STYLE = ".md-typeset table:not([class]) th { min-width: 0 }"
+# The theme reserves five words for every column of a table, however narrow its content; Chromium
+# ignores the columnalign of MathML.
+STYLE = """.md-typeset table:not([class]) th { min-width: 0 }
+mtd[columnalign="left"] { text-align: left }
+mtd[columnalign="right"] { text-align: right }
+"""
 
 # Sections of the library reference, by the module that a name comes from.
 SECTIONS = {
@@ -70,9 +76,14 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Link figures to their place on the site, and show those of the gallery."""
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
+    markdown = FORMULA.sub(formula, markdown)
     if page.file.src_uri == GALLERY.name:
         markdown = SHOWN.sub(pictured, markdown)
     return markdown
+
+
+def formula(found: re.Match[str]) -> str:
+    return f'<div style="overflow-x: auto">{convert(found[1], display="block")}</div>'
 
 
 def gallery() -> Iterator[tuple[str, bytes]]:
