@@ -28,7 +28,7 @@ DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.(?:png|json))\)")  # as in the sources
-FORMULA = re.compile(r"\$\$(.+?)\$\$", re.S)  # LaTeX, which browsers show as MathML without a script
+FORMULA = re.compile(r"\$\$(.+?)\$\$", re.S)  # LaTeX, shown as MathML
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
 # The theme reserves five words for every column of a table, however narrow its content; Chromium
