@@ -160,9 +160,22 @@ class _Batch(NamedTuple):
     def open(self, numbers: Iterable[int]) -> list[int]:
         """The numbers whose value and bound are not yet within the accuracy."""
         none = np.inf, -np.inf
-        known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
+        return [k for k in numbers if not self._agree(*self.bounds.get(self.keys[k], none))]
+
+    def better(self, before: tuple[float, float], new: tuple[float, float]) -> tuple[float, float]:
+        """The better value and the better bound of two pairs.
+
+        The better of two values is the smaller, or the one nearer the bound if below it. A bound
+        above a value is not one: its multipliers are so large that the rounding of b counts. Then
+        a new pair that agrees replaces both.
+        """
+        bound = max(before[1], new[1])
+        value = min(before[0], new[0], key=lambda value: (abs(value - bound), value))
+        return (value, bound) if self._agree(value, bound) or not self._agree(*new) else new
+
+    def _agree(self, value: float, bound: float) -> bool:
         # A value below its bound comes from a state whose unbalance, though small, costs too much.
-        return [k for k, value, bound in known if not abs(value - bound) <= self.accuracy]
+        return abs(value - bound) <= self.accuracy
 
 
 class Solver:
@@ -242,19 +255,13 @@ class Solver:
                     if self.progress:
                         self.progress(self.done, self.total)
                 before = bounds.get(key, (np.inf, -np.inf))
-                least = max(before[1], bound[k])
-                bounds[key] = _nearer(before[0], attained[k], least), least
+                bounds[key] = batch.better(before, (float(attained[k]), float(bound[k])))
                 self.on_value(key, *bounds[key])
                 if points is not None and (key not in points or bounds[key][0] != before[0]):
                     points[key] = outcome.y
                 self.counts["iterations"] += outcome.steps
                 if self.on_state and outcome.loaded < 0 and np.isfinite(attained[k]):
                     self.on_state(key, outcome.y)
-
-
-def _nearer(one: float, other: float, bound: float) -> float:
-    """The better of two values: the smaller, or the one nearer the bound if below it."""
-    return min(one, other, key=lambda value: (abs(value - bound), value))
 
 
 def certify(

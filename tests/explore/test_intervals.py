@@ -16,6 +16,7 @@ from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_system
 from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
+from granforce.packing.compaction import pack
 from granforce.packing.importers import load_packing
 from granforce.records import InputError
 from granforce.study import slices
@@ -366,3 +367,26 @@ def test_what_is_not_certified_is_not_handed_out():
     assert np.array_equal(np.isnan(limits.load), ~(limits.gap <= INTERVAL_GAP))
     sure = np.isfinite(found.low) & np.isfinite(found.high)
     assert np.all(found.low[sure] <= found.high[sure] + 2e-8 * S.force_scale)
+
+
+@pytest.mark.parametrize("n, seed", [(8, 1), (8, 3), (7, 74789), (16, 2), (14, 510889)])
+def test_bounds_of_a_single_network_at_prescribed_stress_are_that_network(n, seed):
+    """More equations than forces: multipliers may be so large that rounding counts."""
+    S = ensemble(pack(n, 1.0, seed), prescribed="stress")
+    assert S.dimension == 0
+    bounds, loads = intervals(S), limit_load_bounds(S)
+    assert bounds.converged and loads.converged
+    assert max(bounds.max_gap, loads.max_gap) <= INTERVAL_GAP
+    for end in (bounds.low, bounds.high):
+        assert np.abs(end - S.original).max() < 1e-7 * S.force_scale
+    # The load takes the place of f_n, up to what friction needs at μ = 1.
+    spare = S.original[:, 0] - np.abs(S.original[:, 1])
+    np.testing.assert_allclose(loads.load, spare, atol=1e-7 * S.force_scale)
+
+
+def test_a_pair_that_agrees_replaces_a_bound_above_a_value():
+    batch = certified_values._Batch([0], [], {}, None, 1e-8)
+    assert batch.better((1.0, 1.0 + 1e-7), (1.0 + 1e-9, 1.0)) == (1.0 + 1e-9, 1.0)
+    assert batch.better((1.0, 1.0 + 1e-7), (1.0 + 1e-6, 1.0)) == (1.0, 1.0 + 1e-7)
+    assert batch.better((1.0, 0.5), (2.0, 1.0)) == (1.0, 1.0)
+    assert batch.better((np.inf, -np.inf), (1.0, 0.9)) == (1.0, 0.9)
