@@ -197,7 +197,7 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
     bounds = None if conditions.bounds is None else conditions.bounds[free]
     friction = contacts.friction(mu)
     slopes = np.where(friction > 0, friction, mu)
-    bounds = _without_friction(bounds, slopes > friction, free)
+    bounds = _without_friction(bounds, slopes > friction, free, scale)
     known = None if bounds is None else knowledge.polygons(bounds, slopes, scale, free)
     return Ensemble(
         packing=packing,
@@ -221,13 +221,18 @@ def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ense
     )
 
 
-def _without_friction(bounds: Floats | None, smooth: Mask, index: Integers) -> Floats | None:
-    """The bounds (N_c, 2, 2) with f_t = 0 on smooth contacts among others that have friction."""
+def _without_friction(
+    bounds: Floats | None, smooth: Mask, index: Integers, scale: float
+) -> Floats | None:
+    """The bounds (N_c, 2, 2) with f_t = 0 on smooth contacts among others that have friction.
+
+    Raises NotJammedError where known bounds exclude 0 by more than ADMISSIBLE.
+    """
     if not smooth.any():
         return bounds
     if bounds is None:
         bounds = np.tile([-np.inf, np.inf], (len(smooth), 2, 1))
-    wrong = smooth & ((bounds[:, 1, 0] > 0) | (bounds[:, 1, 1] < 0))
+    wrong = smooth & (np.maximum(bounds[:, 1, 0], -bounds[:, 1, 1]) > ADMISSIBLE * scale)
     for c in index[wrong][:1]:
         raise NotJammedError(f"contact {c} has no friction, so that its f_t is 0, not as known")
     bounds[smooth, 1] = 0.0

@@ -171,12 +171,15 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     # Coulomb's law tightens a contact's bounds: the smallest |f_t| requires its f_n.
     smallest = np.maximum(0.0, np.maximum(least[:, 1], -most[:, 1]))
     rough = mu > 0
-    needed = np.where(smallest > 0, np.inf, 0.0)
+    needed = np.where(smallest > ADMISSIBLE, np.inf, 0.0)
     needed[rough] = smallest[rough] / mu[rough]
+    # Admissible forces may exceed their cone by ADMISSIBLE in f_n or in f_t.
+    over = needed - most[:, 0] > ADMISSIBLE / np.where(rough, np.minimum(mu, 1.0), 1.0)
+    over |= least[:, 0] - most[:, 0] > ADMISSIBLE
     least[:, 0] = np.maximum(least[:, 0], needed)
     short = least[:, 0] - most[:, 0]
-    if np.any(short > ADMISSIBLE):
-        c = int(np.argmax(short))
+    if np.any(over):
+        c = int(np.argmax(np.where(over, short, -np.inf)))
         raise NotJammedError(_beyond_coulomb(index[c], bounds[c], mu[c], short[c] * scale))
     pinned, value = np.zeros(low.shape, dtype=bool), np.zeros(low.shape)
     pinned[:, 0] = most[:, 0] - least[:, 0] <= FLAT
@@ -186,8 +189,11 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     least[:, 1], most[:, 1] = np.maximum(least[:, 1], -cone), np.minimum(most[:, 1], cone)
     pinned[:, 1] = most[:, 1] - least[:, 1] <= FLAT * mu
     pinned[:, 1] &= rough | pinned[:, 0]
-    fixed = pinned[:, 1]
+    fixed = pinned[:, 1] & rough
     value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])
+    # Forces given exactly keep their balance if they are slightly outside their cone.
+    exactly = (low == high) & pinned & np.stack([rough, rough], axis=1)
+    value[exactly] = low[exactly]
     slid = np.abs(value[:, 1]) / np.where(rough, mu, np.inf)
     bounded = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
     bounded[:, 0, 0] = low[:, 0] > np.where(pinned[:, 1], slid, 0.0)
@@ -209,6 +215,11 @@ def _beyond_coulomb(contact: int, bounds: Floats, mu: float, short: Floats) -> s
             f"contacts can only press; the bound must be relaxed by {-high:.3g}"
         )
     tangential = f"f_t ≥ {t_low:.6g}" if t_low > 0 else f"f_t ≤ {t_high:.6g}"
+    if mu == 0:
+        return (
+            f"no network satisfies the bounds on contact {contact}: {tangential}, but f_t is 0 "
+            f"where μ is 0; the bound must be relaxed by {max(t_low, -t_high):.3g}"
+        )
     return (
         f"no network satisfies the bounds on contact {contact}: f_n ≤ {high:.6g} and "
         f"{tangential} contradict Coulomb's law at μ = {mu:g}; the bound on f_n must be relaxed by "

@@ -337,6 +337,38 @@ def test_what_coulombs_law_forbids_is_told(low, high, words):
     assert re.search(words, told(gf.Known([1], low, high)))
 
 
+def test_friction_that_is_not_there_is_told():
+    message = told(gf.Known([1], [0.0, 0.2], [1.0, ANY]), mu=0.0)
+    assert message.endswith(
+        "f_t ≥ 0.2, but f_t is 0 where μ is 0; the bound must be relaxed by 0.2"
+    )
+
+
+@pytest.mark.parametrize("mu", [1e-3, 0.3, 10.0, "mixed"])
+def test_a_network_that_s_admits_may_be_known(mu):
+    """Admissible forces exceed their cones by up to 10⁻⁹ ⟨f_n⟩, also where μ is 0."""
+    packing = gf.scene("books", 0.8) if mu == "mixed" else packed(30, mu)
+    friction = np.full(len(packing.contacts.i), 0.8 if mu == "mixed" else mu)
+    if mu == "mixed":
+        friction[::3] = 0.0
+    S = gf.ensemble(packing, friction)
+    states = gf.walk(S, 5, seed=1).states
+    middle, state = states.mean(axis=0), states[-1]
+    step = 1e-10
+    while S.violation(state + step * (state - middle)) < 0.4e-9:
+        step *= 1.5
+    beyond = state + step * (state - middle)
+    beyond[S.friction == 0, 1] = 0.4e-9 * S.force_scale * (S.residual(beyond) < 0.5e-10)
+    for network in (*states, beyond):
+        if not S.admits(network):
+            continue
+        K = gf.ensemble(packing, friction, known=gf.Known(S.index, network, network))
+        bounds = intervals(K)
+        assert K.dimension == 0 and bounds.converged
+        given = S.expand(network)[bounds.contacts]
+        assert max(np.abs(end - given).max() for end in bounds[1:3]) < 1e-8 * S.force_scale
+
+
 def test_a_contact_that_carries_nothing_cannot_be_known_to_carry():
     S = gf.ensemble(reference(NAME))
     idle = np.setdiff1d(np.arange(len(S.packing.contacts.i)), S.index)
