@@ -64,8 +64,8 @@ MEANINGS = {
     "(0.1 if it is larger)",
     "steps": "time steps of the compaction",
     "sweeps_done": "Gauss–Seidel sweeps in these steps",
-    "at_rest": "whether contact dynamics, solved to machine precision, leaves the packing at rest, "
-    "also with noise on its forces",
+    "at_rest": "whether contact dynamics, solved to machine precision, leaves the packing at rest "
+    "under its own forces, also with noise on them",
     "distance_to_rest": "largest change of a force before contact dynamics, solved to machine "
     "precision, comes to rest, in units of ⟨f_n⟩",
     "reason": "why it is not at rest",

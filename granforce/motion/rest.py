@@ -4,7 +4,8 @@ A network in S shows that balance and friction allow rest, not that the grains s
 contacts do not dilate, so that the same contacts and loads may also allow motion, and the initial
 forces decide between the two. A packing is at rest if the exact step of contact dynamics (`step`,
 `flow`), with all velocities initially zero, ends without motion from the packing's own forces, and
-again from the resulting network with noise on every force.
+again from the resulting network with noise on every force. From forces that are no network, grains
+may also come to rest, but under other forces: then the packing is not at rest under its own.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from granforce.motion.works import relax, relax_all
 from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling
+from granforce.tolerances import NO_EQUILIBRIUM
 from granforce.types import Cancel, Floats, Integers, Mask
 
 # Standard deviations of the noise on each force (in ⟨f_n⟩), and number of draws for each.
@@ -35,7 +37,9 @@ MOST_STEPS = 500
 class Rest(NamedTuple):
     """The outcome of the test of rest of a packing; see `rest`."""
 
-    at_rest: Annotated[bool, "from the packing's own forces and, with noise, in every draw"]
+    at_rest: Annotated[
+        bool, "its own forces are a network, and it rests under them and in all draws"
+    ]
     distance: Annotated[
         float, "from its own forces to the network reached, ⟨f_n⟩; NaN without rest"
     ]
@@ -59,11 +63,15 @@ def rest(
     cancel: Cancel | None = None,
     **conditions: Any,
 ) -> Rest:
-    """Whether contact dynamics leaves a packing at rest, from its own forces and with noise.
+    """Whether contact dynamics leaves a packing at rest, under its own forces and with noise.
 
     packing: a Packing with forces, of any origin, or its Ensemble. noise: standard deviations of
     the normal noise on every component, in ⟨f_n⟩; draws: number of draws of each, from seed.
     conditions: of a Packing, as for `ensemble`. cancel() returning True raises Cancelled.
+
+    Forces with a residual or violation above 0.05 ⟨f_n⟩ are no network: grains may come to rest
+    elsewhere, at other forces, which is reported as not at rest. Smaller errors, of simulations or
+    of rounded files, show only in `distance`.
 
     Raises NotJammedError if S is empty, InputError if the packing has no forces, and for conditions
     with an Ensemble.
@@ -92,11 +100,24 @@ def rest(
     moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)
     distance = float(np.abs(first.forces - forces).max())
     why = _reason(noise, draws - stayed.sum(axis=1), draws)
-    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, moving), why)
+    reasons = [reason for reason in (_elsewhere(S, distance), why) if reason]
+    return Rest(not reasons, distance, noise, stayed, _on_all(S, moving), "; ".join(reasons))
+
+
+def _elsewhere(S: Ensemble, distance: float) -> str:
+    """Why the rest that was reached is not that of the packing's own forces; empty if it is."""
+    residual, violation = S.residual(S.original), S.violation(S.original)
+    size, what = max((residual, "unbalance"), (violation, "violation of Coulomb's law"))
+    if size <= NO_EQUILIBRIUM:
+        return ""
+    return (
+        f"its own forces are no network, with a largest {what} of {size:.2g} ⟨f_n⟩; grains come to "
+        f"rest elsewhere, at forces up to {distance:.2g} ⟨f_n⟩ from these"
+    )
 
 
 def _reason(noise: tuple[float, ...], moved: Integers, draws: int) -> str:
-    """Why a packing is not at rest that rests under its own forces; moved: draws at each noise."""
+    """Why grains that came to rest move with noise; moved: draws at each level that moved."""
     parts = [
         f"{count} of {draws} draws with noise of {level:g} ⟨f_n⟩"
         for level, count in zip(noise, moved, strict=True)

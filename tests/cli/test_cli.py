@@ -274,7 +274,7 @@ def test_limit_loads_of_chosen_contacts(run, tmp_path):
 
 
 def test_rest_tells_whether_the_forces_themselves_balance(run):
-    """Dynamics can come to rest from forces out of balance, at those of a network."""
+    """From forces out of balance grains come to rest elsewhere, at those of a network."""
     packing = packed(30, 0.3)
     wrong = packing.forces.copy()
     wrong[3] *= 1.5
@@ -282,8 +282,9 @@ def test_rest_tells_whether_the_forces_themselves_balance(run):
         save_packing(packing._replace(forces=forces), "p.npz")
         code, out, _ = run("rest", "p.npz", "--json")
         report = json.loads(out)
-        assert code == 0 and report["at_rest"]
+        assert code == 0 and report["at_rest"] == balanced
         assert (report["residual"] < 1e-9) == balanced == (report["distance_to_rest"] < 1e-9)
+        assert balanced or f"of {report['residual']:.2g} ⟨f_n⟩; grains come" in report["reason"]
 
 
 def test_import_keeps_what_was_read(run, tmp_path):

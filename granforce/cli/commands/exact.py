@@ -229,7 +229,6 @@ def rest(arguments: argparse.Namespace) -> None:
     result = motion.rest(S)
     lines: dict[str, Any] = {"at_rest": result.at_rest}
     lines |= {} if result.at_rest else {"reason": result.reason}
-    # Dynamics may come to rest from forces that do not balance.
     checked = {"residual": S.residual, "violation": S.violation}
     lines |= {name: float(check(S.original)) for name, check in checked.items()}
     lines |= {"distance_to_rest": result.distance, "noise": list(result.noise)}
