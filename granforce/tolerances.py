@@ -31,6 +31,9 @@ ROUNDING = 1e-14
 # 5–20 %, and saves at least four fifths of the sweeps.
 AT_REST = 1e-3
 
+# Two packings are the same state if contact normals and forces (in ⟨f_n⟩) differ by at most this.
+SAME_STATE = 1e-3
+
 # Residual of an equilibrium for sweeps alone, which they reach in reasonable time.
 EQUILIBRIUM = 1e-6
 

@@ -64,7 +64,10 @@ class Margin(NamedTuple):
 
     @property
     def certain(self) -> bool:
-        """Whether every gap is either rounding or clearly open."""
+        """Whether every gap is either rounding or clearly open.
+
+        Otherwise it is not certain that some pair without force touches.
+        """
         return self.contact < CLOSED and self.other > TOUCHING
 
 
@@ -72,8 +75,10 @@ class Margin(NamedTuple):
 def margin(packing: Packing) -> Margin:
     """The Margin of a packing's contacts, from the gaps of all its pairs.
 
-    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs are clearly apart;
-    soft or measured disks overlap, and their contacts have no such margin.
+    In a packing of rigid disks at rest, contacts that carry force are closed to rounding, 10⁻¹³. A
+    pair without force is a contact if its gap is below 10⁻⁹; gaps near this limit, on both sides,
+    make the list of contacts uncertain. Soft or measured disks overlap, and their contacts have no
+    margin.
     """
     refuse_shapes(packing, "the margin is defined")
     if not len(packing.r):

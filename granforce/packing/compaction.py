@@ -22,7 +22,7 @@ from granforce.numerics.lanes import compiled
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
-from granforce.packing.settling import SEVERAL, come_to_rest
+from granforce.packing.settling import SEVERAL, come_to_rest, same_state
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -73,6 +73,8 @@ WORK = (
 DISK_BYTES = 2000
 # Coarsest accuracy of a step: an error as fast as the fastest grain means nothing was solved.
 COARSEST = 1.0
+# The compaction ends if the last phase fails in the same state so many times after the first.
+MOST_REPEATS = 2
 # Steps between two calls of `watch`.
 WATCH_EVERY = 5
 
@@ -136,11 +138,14 @@ def pack(
     least every 5 steps; neither changes a bit of the result. cancel() returning True raises
     Cancelled.
 
-    Returns a Packing whose forces balance to 10⁻¹⁰ ⟨f_n⟩, whose overlaps are below 10⁻⁹ of the
-    largest radius, and whose contacts are certain: `info` contains their `margin`, and the fraction
-    of steps that ended before they were accurate (`unfinished_steps`).
+    Returns a Packing whose forces balance to 10⁻¹⁰ ⟨f_n⟩, and whose pressing contacts are closed to
+    10⁻¹¹ of the largest radius, without larger overlaps. Other pairs with gaps below 10⁻⁹ are
+    contacts without force; `margin` tells whether that is certain, from the largest gap of a
+    contact and the least of any other pair, which are also in `info`. info["unfinished_steps"] is
+    the number of steps that ended before they were accurate.
 
-    Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
+    Raises NotJammedError after max_steps, with the state reached, or once a state that fails the
+    test of rest returns again and again, and InputError for bad input.
     """
     mu = friction(mu)
     pressure = moderate(pressure, "pressure")
@@ -165,6 +170,8 @@ def pack(
     look = None if watch is None else _looking(watch, unit, pressure, counters)
     if look is not None:
         look(motion, np.inf)
+    tested: Packing | None = None
+    repeats = 0
     while True:
         motion, overlap, unbalance = _advance(motion, mu, pace, counters, work, look)
         step = int(counters[dynamics.STEPS])
@@ -173,7 +180,15 @@ def pack(
         cancelling.check("compaction")
         motion, finished, certificate = _finish(motion, mu, unbalance <= slow, work, look)
         if finished is not None and certificate is not None:
-            break
+            if certificate.at_rest:
+                break
+            repeats = repeats + 1 if tested is not None and same_state(tested, finished) else 0
+            tested = finished
+            if repeats >= MOST_REPEATS:
+                raise NotJammedError(
+                    f"not at rest after {step} steps: {certificate.reason}, and the dynamics leads "
+                    "back to the same state; use another seed"
+                )
         if step >= max_steps:
             raise NotJammedError(
                 f"not jammed after {step} steps: {_state(_fraction(motion), unbalance)}, strain "
@@ -413,7 +428,7 @@ def _finish(
     work: dict[str, Any],
     look: Callable[[dynamics.Motion, float], object] | None,
 ) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
-    """The finished packing in natural units with its test of rest, or None if it still moves."""
+    """The packing in natural units with its test of rest, or None if it still moves."""
     if mu > NEARLY_FRICTIONLESS:
         return come_to_rest(motion, mu, work, look) if slow else (motion, None, None)
     if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:

@@ -33,7 +33,7 @@ from granforce.packing.neighbours import separations
 from granforce.packing.pair_list import cell_of, relisted
 from granforce.records import NotJammedError, Packing, UndecidedError, make_contacts
 from granforce.system import cancelling
-from granforce.tolerances import CLOSED, TOUCHING
+from granforce.tolerances import CLOSED, SAME_STATE, TOUCHING
 from granforce.types import Floats, Integers, Mask
 
 # Softness ε of the overdamped motion: the overlap of a pressing contact, in largest radii. At 10⁻⁴
@@ -88,7 +88,8 @@ def come_to_rest(
 ) -> tuple[Motion, Packing | None, Rest | None]:
     """The motion at rest, its packing in natural units and the test of rest; None if it moves.
 
-    work: counters to increase. look(motion, unbalance) is called repeatedly.
+    After ATTEMPTS tests in which noise moved grains, the last packing and its failed test. work:
+    counters to increase. look(motion, unbalance) is called repeatedly.
     """
     motion.velocity[:], motion.dilation[:] = 0.0, 0.0
     for _ in range(ATTEMPTS):
@@ -107,7 +108,19 @@ def come_to_rest(
             return motion, packing._replace(forces=certificate.forces), certificate
         motion.force[:] = 0.0
         motion.force[listed] = certificate.forces
-    return motion, None, None
+    return motion, packing, certificate
+
+
+def same_state(one: Packing, other: Packing) -> bool:
+    """Whether two packings of the same grains have the same contacts and forces to SAME_STATE."""
+    if len(one.contacts.i) != len(other.contacts.i):
+        return False
+    sorted_rows = []
+    for packing in (one, other):
+        c, scale = packing.contacts, packing.forces[:, 0].mean()
+        rows = np.column_stack([c.i, c.j, c.normal, packing.forces / scale])
+        sorted_rows.append(rows[np.lexsort((c.j, c.i))])
+    return bool(np.abs(sorted_rows[0] - sorted_rows[1]).max(initial=0.0) <= SAME_STATE)
 
 
 def _creep(

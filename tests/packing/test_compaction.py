@@ -92,6 +92,46 @@ def test_packings_are_at_rest_and_stay_there_with_noise(mu):
     assert packing.info["distance_to_rest"] < 1e-6
 
 
+def test_a_state_that_fails_the_test_of_rest_again_and_again_ends_the_compaction(monkeypatch):
+    """Nothing else stops it for minutes, as with `pack(11, 10, seed=100236)`."""
+    tests = []
+
+    def failing(packing, **conditions):
+        tests.append(packing)
+        return rest(packing, **conditions)._replace(at_rest=False, reason="grains move in a test")
+
+    monkeypatch.setattr(settling, "rest", failing)
+    with pytest.raises(NotJammedError, match=r"move in a test, and .* the same state"):
+        pack(12, 1.0, 1)
+    assert len(tests) == 3 * settling.ATTEMPTS
+    assert settling.same_state(tests[-1], tests[-2])
+
+
+def test_states_with_other_contacts_or_forces_are_not_the_same():
+    packing = packed(60, 0.3)
+    order = np.random.default_rng(0).permutation(len(packing.contacts.i))
+    listed = packing._replace(contacts=packing.contacts.picked(order), forces=packing.forces[order])
+    assert settling.same_state(packing, listed)
+    assert settling.same_state(packing, packing._replace(forces=2 * packing.forces))
+    changed = packing.forces.copy()
+    changed[5] += 0.01
+    fewer = packing._replace(
+        contacts=packing.contacts.picked(order[1:]), forces=packing.forces[order[1:]]
+    )
+    for other in (packing._replace(forces=changed), fewer, pack(60, 0.3, 2)):
+        assert not settling.same_state(packing, other)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 1.0])
+def test_only_pairs_without_force_may_be_in_doubt(mu):
+    for seed in range(1, 5):
+        packing = packed(60, mu, seed)
+        apart, gap = margin(packing), np.abs(packing.contacts.gap) / packing.r.max()
+        assert gap[packing.forces[:, 0] > 0].max() < CLOSED
+        assert apart.contact < TOUCHING <= apart.other
+        assert apart.certain == (gap.max() < CLOSED)
+
+
 def after(packing, steps):
     """The motion after further steps of the dynamics that a packing was made by, its last one."""
     unit, n = packing.r.max(), len(packing.r)
