@@ -4,7 +4,11 @@ import ast
 import tomllib
 from pathlib import Path
 
+import pytest
+
 import granforce
+
+pytestmark = pytest.mark.fast
 
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ROOT / "granforce"

@@ -11,6 +11,8 @@ import granforce as gf
 from granforce import notebook
 from granforce.records import make_contacts, make_packing
 
+pytestmark = pytest.mark.fast
+
 SVG = "{http://www.w3.org/2000/svg}"
 
 

@@ -5,6 +5,7 @@ S is one point: test_random_walk.
 """
 
 import numpy as np
+import pytest
 from packings import lattice
 
 from granforce import bench
@@ -12,6 +13,8 @@ from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.packing import pair_list
 from granforce.packing.compaction import pack
+
+pytestmark = pytest.mark.fast
 
 
 def test_neighbour_lists_made_in_every_step_give_the_same_packing(monkeypatch):

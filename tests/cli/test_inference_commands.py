@@ -10,6 +10,8 @@ import pytest
 from granforce.cli.parser import main
 from granforce.packing.importers import load_packing
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.fixture
 def folder(away):

@@ -11,6 +11,8 @@ from granforce.forces.build import ensemble
 from granforce.packing.scenes import scene
 from granforce.records import InputError
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.mark.parametrize("walls", [True, False])
 def test_without_errors_the_truth_comes_back(walls):

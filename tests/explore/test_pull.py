@@ -8,6 +8,8 @@ import granforce as gf
 from granforce.explore.intervals import intervals
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
+pytestmark = pytest.mark.fast
+
 NAME = "n100_mu0.1_s11"
 
 

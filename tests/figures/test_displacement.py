@@ -10,6 +10,8 @@ from granforce.figures import style
 from granforce.figures.displacement import LONGEST_ARROW, displacement
 from granforce.figures.networks import overlaid, places
 
+pytestmark = pytest.mark.fast
+
 GROUND = [[-50, -1], [50, -1], [50, 0], [-50, 0]]
 
 

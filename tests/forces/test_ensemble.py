@@ -13,6 +13,8 @@ from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing
 from granforce.tolerances import SEEN_CARRYING
 
+pytestmark = pytest.mark.fast
+
 REFERENCES = ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"]
 
 

@@ -8,6 +8,8 @@ import pytest
 from granforce import measures
 from granforce.records import InputError
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.fixture
 def states(rng):

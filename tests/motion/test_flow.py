@@ -9,6 +9,8 @@ from granforce.motion.inertia import make_step
 from granforce.motion.works import relax
 from granforce.packing.compaction import pack
 
+pytestmark = pytest.mark.fast
+
 N = 60
 
 

@@ -18,6 +18,8 @@ from granforce.numerics import (
 from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.lanes import LANES, MANY, ONE, load
 
+pytestmark = pytest.mark.fast
+
 NEVER = np.zeros(1, dtype=bool)
 
 

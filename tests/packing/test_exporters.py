@@ -17,6 +17,8 @@ from granforce.packing.importers import load_packing, read_lammps, save_packing
 from granforce.packing.scenes import scene
 from granforce.records import InputError
 
+pytestmark = pytest.mark.fast
+
 PACKINGS = {
     "periodic": lambda: load_packing(SMALL),
     "tilted": lambda: skewed(load_packing(SMALL))[0],

@@ -11,6 +11,8 @@ from granforce.perturb.critical_force import critical_force
 from granforce.perturb.loaded import loaded_networks
 from granforce.records import InputError
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.mark.parametrize("mu", [0.1, 1])
 def test_networks_balance_loads_up_to_the_critical_force_and_lines_between_them_do(mu):

@@ -11,6 +11,8 @@ from granforce.study import cells as study
 from granforce.study.kinds import KINDS, PACKING, get_packing
 from granforce.study.store import open_store
 
+pytestmark = pytest.mark.fast
+
 DATA = Path(__file__).resolve().parents[2] / "data"
 REFERENCE = Path(__file__).parents[1] / "reference"
 MADE = PACKING.parameters(20, 0.1, 1)

@@ -9,6 +9,8 @@ import pytest
 
 from granforce.system.terminal import Bar, one_line, print_list, print_report
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.fixture(autouse=True)
 def of_terminal(capsys, monkeypatch):

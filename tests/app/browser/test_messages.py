@@ -21,6 +21,8 @@ from app.state.known import Knowledge
 from app.state.pulls import Hand
 from app.widgets import file_buttons, file_drop, number
 
+pytestmark = pytest.mark.fast
+
 COMPONENTS = {
     kind.__name__: kind
     for kind in (
