@@ -23,6 +23,7 @@ _HOME = {
     "Contacts": "records",
     "InputError": "records",
     "InputWarning": "records",
+    "ResultWarning": "records",
     "NotJammedError": "records",
     "Packing": "records",
     "Relaxation": "records",

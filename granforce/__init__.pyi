@@ -101,6 +101,7 @@ from granforce.records import InputWarning as InputWarning
 from granforce.records import NotJammedError as NotJammedError
 from granforce.records import Packing as Packing
 from granforce.records import Relaxation as Relaxation
+from granforce.records import ResultWarning as ResultWarning
 from granforce.records import Shapes as Shapes
 from granforce.records import UnboundedError as UnboundedError
 from granforce.records import UndecidedError as UndecidedError

@@ -16,9 +16,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 def record(kind: C) -> C:
     """A decorator of records (named tuples and dataclasses): a short repr, and help on all fields.
 
+    Named tuples are equal if all their fields are, arrays by their elements.
+
     Fields are Annotated with a Field or, if neither labelled nor stored, with a text alone.
     """
     kind.__repr__ = _short  # type: ignore[assignment, method-assign]
+    if hasattr(kind, "_fields"):
+        kind.__eq__, kind.__ne__ = _same, _differ  # type: ignore[assignment, method-assign]
     texts = {name: fields(kind)[name].text for name in _names(kind) if name in fields(kind)}
     if hasattr(kind, "_fields"):
         for name, text in texts.items():
@@ -64,6 +68,28 @@ def _declared(metadata: Iterable[Any]) -> Field | None:
 def _names(kind: Any) -> Iterable[str]:
     """The fields of a named tuple or a dataclass, in order."""
     return getattr(kind, "_fields", None) or kind.__dataclass_fields__
+
+
+def _same(record: Any, other: Any) -> bool:
+    return type(record) is type(other) and all(map(_equal, record, other))
+
+
+def _differ(record: Any, other: Any) -> bool:
+    return not _same(record, other)
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two fields are equal; NaN equals NaN."""
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        one, other = np.asarray(one), np.asarray(other)
+        numbers = one.dtype.kind in "fc" and other.dtype.kind in "fc"
+        return np.array_equal(one, other, equal_nan=numbers)
+    if isinstance(one, (list, tuple)) and not hasattr(one, "_fields"):
+        same = type(one) is type(other) and len(one) == len(other)
+        return same and all(map(_equal, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
+    return bool(one == other or (one != one and other != other))
 
 
 def _short(record: Any) -> str:

@@ -63,6 +63,10 @@ class InputWarning(UserWarning):
     """Input can be used, but is probably wrong; the message says what to check."""
 
 
+class ResultWarning(UserWarning):
+    """A result is not what was requested; the message says why, and what to do."""
+
+
 class NotJammedError(InputError):
     """No admissible force network exists, or none was reached within the budget."""
 

@@ -11,13 +11,12 @@ import xarray as xr
 
 from granforce import measures
 from granforce.cli.input_tables import read_known
-from granforce.explore.random_walk import UNBOUNDED_WALK
-from granforce.explore.uniform import FEWEST_EFFECTIVE, MIXED
+from granforce.explore.uniform import unreliable
 from granforce.forces.knowledge import Known, refuse_others
 from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
-from granforce.records import InputError, Packing, worker_count
+from granforce.records import InputError, Packing, ResultWarning, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
@@ -130,7 +129,7 @@ def prepared(
                 "--prescribe pressure needs a periodic box with a pressure: leave it out"
             )
         _refuse_others(known, packing)
-        named = kinds.imported_parameters(packing)
+        named = kinds.parameters_of(open_store(arguments.cache), packing)
     parameters = name(named)
     check_outputs(*outputs)
     store = store_of(arguments)
@@ -190,7 +189,10 @@ def stored_result(
     with Bar(kind.title, kind.unit) as progress:
         keywords = {"workers": arguments.workers, "progress": progress, **(options or {})}
         keywords |= {} if watching is None else {"watch": watching(progress)}
-        dataset, cached = study.get(store, kind, parameters, **keywords)
+        with warnings.catch_warnings():
+            if kind is not kinds.INFORMATIVE:  # the commands say so themselves, also if cached
+                warnings.simplefilter("ignore", ResultWarning)
+            dataset, cached = study.get(store, kind, parameters, **keywords)
     ends = {"seconds": dataset["seconds"].item(), "cached": cached}
     return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, ends)
 
@@ -283,18 +285,15 @@ def extents(dataset: xr.Dataset) -> dict[str, float]:
 
 def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
     """The walk of the options; output: a file that will be written."""
-    with warnings.catch_warnings():
-        # The commands say so themselves, also of stored walks.
-        warnings.filterwarnings("ignore", UNBOUNDED_WALK)
-        return stored_result(
-            *(arguments, kinds.WALK, output),
-            watching=telling_eta,
-            states=arguments.states,
-            seed=arguments.walk_seed,
-            relax=RELAXATIONS[arguments.relax],
-            chains=arguments.chains,
-            **conditions(arguments),
-        )
+    return stored_result(
+        *(arguments, kinds.WALK, output),
+        watching=telling_eta,
+        states=arguments.states,
+        seed=arguments.walk_seed,
+        relax=RELAXATIONS[arguments.relax],
+        chains=arguments.chains,
+        **conditions(arguments),
+    )
 
 
 def extension(dataset: xr.Dataset) -> dict[str, Any]:
@@ -308,19 +307,11 @@ def extension(dataset: xr.Dataset) -> dict[str, Any]:
 
 def sample_notes(dataset: xr.Dataset) -> list[str]:
     """A note if the states of a sample are not to be relied on, and what to do."""
-    r_hat, sizes = dataset["worst_r_hat"].item(), ("least_bulk_size", "least_tail_size")
-    effective = min(dataset[name].item() for name in sizes)
     if not dataset["dimension"].item():
         return []
-    if np.isnan(r_hat):
-        why = "too few states to test whether the chains have mixed"
-    elif r_hat > MIXED:
-        why = f"the chains have not mixed (worst R̂ {r_hat:.3g}, above {MIXED:g})"
-    elif effective < FEWEST_EFFECTIVE:
-        why = f"the effective sample size is only {effective:.3g} (below {FEWEST_EFFECTIVE})"
-    else:
-        return []
-    return [f"the sample is unreliable: {why}; use more --states"]
+    sizes = [dataset[name].item() for name in ("least_bulk_size", "least_tail_size")]
+    why = unreliable(dataset["worst_r_hat"].item(), min(sizes))
+    return [f"the sample is unreliable: {why}; use more --states"] if why else []
 
 
 # Work of the samplers, which only the JSON report has.

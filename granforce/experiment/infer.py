@@ -90,6 +90,15 @@ class Inference(NamedTuple):
         return self.draws
 
     @property
+    def shortfall(self) -> str:
+        """Why the draws are not to be relied on, and what to do; empty if they are."""
+        draws = self.draws
+        if draws is None or (draws.reached and np.isnan(draws.mixing.worst_r_hat)):
+            return ""
+        why = uniform.unreliable(draws.mixing.worst_r_hat, draws.effective)
+        return why and f"the error bars are unreliable: {why}; draw more states"
+
+    @property
     @derived(quantity("expected", label="mean"))
     def mean(self) -> Floats:
         return self.drawn.flat.mean(axis=0)

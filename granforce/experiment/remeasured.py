@@ -43,6 +43,7 @@ class Remeasured(Inference):
     """
 
     __slots__ = ()
+    shortfall = ""  # the draws are independent
 
     @property
     @derived(quantity("expected", label="mean", meaning="likeliest network itself"))

@@ -28,8 +28,9 @@ from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
 from granforce.quantities import quantity
-from granforce.records import InputError, float_array, takes
+from granforce.records import InputError, brief_list, float_array, takes
 from granforce.system import cancelling
+from granforce.system.plain import counted
 from granforce.tolerances import CARRYING, FLAT, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
@@ -59,6 +60,12 @@ class Intervals(NamedTuple):
         """Mask (k,) of contacts whose f_n and f_t both have finite bounds."""
         finite = np.isfinite(self.low) & np.isfinite(self.high)
         return np.asarray(finite.all(axis=1))
+
+    @property
+    def shortfall(self) -> str:
+        """Which values could not be certified, and what to do; empty if all were."""
+        nan = np.isnan(self.low + self.high).any(axis=1)
+        return "" if self.converged else uncertified(self.contacts[nan])
 
     def _repr_html_(self) -> str:
         """HTML for notebooks."""
@@ -105,6 +112,22 @@ class LimitLoads(NamedTuple):
     max_gap: Annotated[float, quantity("max_gap")]
     converged: Annotated[bool, "every load was certified with a gap ≤ 10⁻⁸ ⟨f_n⟩"]
     counts: Annotated[dict[str, int], "programs, again, iterations"]
+
+    @property
+    def shortfall(self) -> str:
+        """Which loads could not be certified, and what to do; empty if all were."""
+        return "" if self.converged else uncertified(self.contacts[np.isnan(self.load)])
+
+
+def uncertified(contacts: Integers) -> str:
+    """A message on contacts without certified values, which are NaN; empty without any."""
+    if not len(contacts):
+        return ""
+    return (
+        f"{counted(len(contacts), 'contact has', 'contacts have')} values that could not be "
+        f"certified (nan): {brief_list(contacts.tolist())}; only networks with other forces far "
+        "above 10⁴ ⟨f_n⟩ attain them; try a slightly different friction coefficient"
+    )
 
 
 @takes(Ensemble)

@@ -50,6 +50,11 @@ class Outline(NamedTuple):
     converged: Annotated[bool, "the gap is within the tolerance"]
     counts: Annotated[dict[str, int], "directions, programs, again, iterations as in `Intervals`"]
 
+    @property
+    def shortfall(self) -> str:
+        """Why the outline is less accurate than requested, and what to do; empty if it is not."""
+        return "" if self.converged else "the outline is less accurate than requested: see its gap"
+
 
 class _Support(NamedTuple):
     """Directions d with their points and bounds, in order of their angles."""

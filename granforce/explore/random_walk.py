@@ -26,6 +26,7 @@ from granforce.records import (
     InputError,
     NotJammedError,
     Relaxation,
+    ResultWarning,
     choice,
     random_seed,
     refuse_options,
@@ -175,7 +176,8 @@ def walk(
 
     point = ensemble.dimension == 0 and skip
     if not ensemble.bounded:
-        warnings.warn(f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined", stacklevel=4)
+        words = f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined"
+        warnings.warn(words, ResultWarning, stacklevel=4)
     if begun is not None:
         ensemble.refuse_foreign(begun.states, begun.residual, "the walk to continue")
     if begun is not None and len(begun.states) and not point:

@@ -105,6 +105,16 @@ class UniformSample(NamedTuple):
         return min(self.mixing.least_bulk, self.mixing.least_tail)
 
     @property
+    def shortfall(self) -> str:
+        """Why the sample is not to be relied on, and what to do; empty if it is."""
+        if not self.walls.dimension:
+            return ""
+        why = unreliable(self.mixing.worst_r_hat, self.effective)
+        if not self.reached and not why:
+            why = f"the effective sample size is {self.effective:.3g}, less than requested"
+        return why and f"the sample is unreliable: {why}; draw more states"
+
+    @property
     @derived(quantity("states", label="states"))
     def flat(self) -> Floats:
         """All states (chains · k, N_c, 2), chain after chain."""
@@ -115,6 +125,17 @@ class UniformSample(NamedTuple):
     def chain(self) -> Integers:
         """(chains · k,) the chain of each state in `flat`."""
         return np.repeat(np.arange(self.states.shape[0]), self.states.shape[1])
+
+
+def unreliable(worst_r_hat: float, effective: float) -> str:
+    """Why states of chains with this R̂ and effective sample size are unreliable; empty if not."""
+    if np.isnan(worst_r_hat):
+        return "too few states to test whether the chains have mixed"
+    if worst_r_hat > MIXED:
+        return f"the chains have not mixed (worst R̂ {worst_r_hat:.3g}, above {MIXED:g})"
+    if effective < FEWEST_EFFECTIVE:
+        return f"the effective sample size is only {effective:.3g} (below {FEWEST_EFFECTIVE})"
+    return ""
 
 
 def init(polytope: Walls, seed: int | np.random.SeedSequence) -> ChainState:

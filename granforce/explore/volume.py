@@ -77,6 +77,11 @@ class Volume(NamedTuple):
     seconds: Annotated[float, quantity("seconds")]
 
     @property
+    def shortfall(self) -> str:
+        """Why ln V is less accurate than requested, and what to do; empty if it is not."""
+        return "" if self.reached else inaccurate(self.error, *self.ladders)
+
+    @property
     @derived(quantity("extent"))
     def extent(self) -> float:
         """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
@@ -94,6 +99,14 @@ class Volume(NamedTuple):
             "ln V per grain": self.per_grain,
         }
         return notebook.table("Volume of S", lines)
+
+
+def inaccurate(error: float, one: float, other: float) -> str:
+    """A message on ln V with too large an error, or from two ladders that do not agree."""
+    return (
+        f"ln V is less accurate than requested: its standard error is {error:.3g}, and its two "
+        f"estimates are {one:.6g} and {other:.6g}; compare with another seed"
+    )
 
 
 @takes(Ensemble)

@@ -96,6 +96,19 @@ class CriticalForce(NamedTuple):
     counts: Annotated[dict[str, float], "COUNTS"]
     seconds: Annotated[float, of_one_contact("contact_seconds", label="")]
 
+    @property
+    def shortfall(self) -> str:
+        """Why this is not the critical force as requested, and what to do; empty if it is."""
+        return "" if self.converged else unsteady(f"contact {self.contact}")
+
+
+def unsteady(what: str) -> str:
+    """A message on a load under which no steady motion was found."""
+    return (
+        f"{what}: the motion under the smallest load not at rest is not steady, so that its "
+        "critical value may be larger; allow more steps (max_steps)"
+    )
+
 
 @record
 class Response(NamedTuple):

@@ -34,6 +34,7 @@ from granforce.perturb.critical_force import (
     checked,
     motion_of,
     raised,
+    unsteady,
 )
 from granforce.quantities import ALL_CONTACTS, FORCE, Field, quantity
 from granforce.records import (
@@ -82,6 +83,11 @@ class CriticalLoad(NamedTuple):
     breach: Annotated[float, "of Coulomb's law by that motion, relative to the fastest contact"]
     converged: Annotated[bool, "high − low ≤ precision · load_factor, and the motion is steady"]
     counts: Annotated[dict[str, float], "as in CriticalForce"]
+
+    @property
+    def shortfall(self) -> str:
+        """Why this is not the critical load as requested, and what to do; empty if it is."""
+        return "" if self.converged else unsteady("the load")
 
 
 @takes(Ensemble)

@@ -36,6 +36,7 @@ from granforce.perturb.critical_force import critical_forces
 from granforce.records import (
     InputError,
     Packing,
+    ResultWarning,
     brief,
     choice,
     friction,
@@ -423,6 +424,7 @@ def _share(counter: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     warnings.formatwarning = one_line
+    warnings.simplefilter("ignore", ResultWarning)  # the stored results say so
 
 
 def _end_with_parent() -> None:

@@ -11,6 +11,7 @@ import select
 import signal
 import socket
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -18,7 +19,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from granforce.records import Cancelled, worker_count
+from granforce.records import Cancelled, ResultWarning, worker_count
 from granforce.system.interrupts import interrupted
 from granforce.types import Cancel, Mask
 
@@ -78,12 +79,19 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
 
 
 def cancellable(function: Callable[P, T]) -> Callable[P, T]:
-    """Run the function inside `watched`, with its own keyword argument `cancel`."""
+    """Run the function inside `watched`, with its own keyword argument `cancel`.
+
+    A ResultWarning says if its result, or one of a list, has a `shortfall` without being cancelled.
+    """
 
     @functools.wraps(function)
     def inside(*arguments: P.args, **options: P.kwargs) -> T:
         with watched(cast("Cancel | None", options.pop("cancel", None))):
-            return function(*arguments, **options)
+            result = function(*arguments, **options)
+            for one in result if isinstance(result, list) else [result]:
+                if (reason := getattr(one, "shortfall", "")) and not cancelled():
+                    warnings.warn(reason, ResultWarning, stacklevel=3)
+            return result
 
     return inside
 

@@ -482,3 +482,16 @@ def test_the_app_reads_addresses_of_a_proxy_only_if_asked(words, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["granforce"])
     assert main(["app", "--no-show", "--port", "0", *words]) == 0
     assert ("--use-xheaders" in served[0]) == bool(words)
+
+
+@pytest.mark.parametrize("options", ["", "--box isotropic --pressure 2", "--radii r.txt"])
+def test_a_packing_in_a_file_has_the_results_of_the_options_that_made_it(run, options):
+    Path("r.txt").write_text("\n".join(map(str, np.linspace(0.3, 0.7, 12))))
+    made = f"-n 12 --mu 0.3 --seed 2 {options}".split()
+    assert run("pack", *made, "--out", "p.npz")[0] == 0
+    assert json.loads(run("intervals", "p.npz", "--json")[1])["cached"] is False
+    for words in (made, ["p.npz"]):
+        assert json.loads(run("intervals", *words, "--json")[1])["cached"] is True
+    packing = gf.load_packing("p.npz")
+    save_packing(packing._replace(forces=2 * packing.forces), "other.npz")
+    assert json.loads(run("intervals", "other.npz", "--json")[1])["cached"] is False

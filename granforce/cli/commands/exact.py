@@ -24,6 +24,7 @@ from granforce.cli.results import (
     unit,
 )
 from granforce.cli.tables import write_columns
+from granforce.explore.intervals import uncertified
 from granforce.explore.stress_outline import stress_inside
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
@@ -31,10 +32,8 @@ from granforce.motion import rest as motion
 from granforce.packing import importers
 from granforce.perturb import grain_loads
 from granforce.perturb.critical_force import COUNTS
-from granforce.records import brief_list
 from granforce.study import kinds
 from granforce.study.cells import Kind
-from granforce.system.plain import counted
 from granforce.system.terminal import print_notes, print_report, report_after
 
 LOADS = COUNTS[:3]  # by outcome; then comes the work done
@@ -90,6 +89,8 @@ def perturb(arguments: argparse.Namespace) -> None:
         if arguments.out is not None:
             names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
             write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
+    if undecided := lines["loads_undecided"]:
+        print_notes([f"{undecided} loads ended in unsteady motion: F_crit may be larger"])
 
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
@@ -106,7 +107,7 @@ def intervals(arguments: argparse.Namespace) -> None:
     forces = unit(arguments, dataset)
     low, high = (dataset[side].values for side in ("low", "high"))
     bounded, certified = np.isfinite(high - low), ~(np.isnan(low) | np.isnan(high))
-    left = dataset["backbone"].values[~certified.all(axis=1)].tolist()
+    left = dataset["backbone"].values[~certified.all(axis=1)]
     # Entries of earlier versions also have positions of determined forces.
     position = np.full(len(low), np.nan)
     if (whole := bounded.all(axis=1)).any():
@@ -122,7 +123,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "exact_eta3": dataset["eta3"].item(),
         **forces.reported(extents(dataset)),
         **_without_limit(bounded | ~certified),
-        **({"contacts_not_certified": len(left)} if left else {}),
+        **({"contacts_not_certified": len(left)} if len(left) else {}),
         "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
@@ -146,19 +147,8 @@ def intervals(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
             write_columns(arguments.out, columns, certificate)
-    _name_uncertified(left)
-
-
-def _name_uncertified(contacts: list[int]) -> None:
-    """A note on contacts without certified values, if any."""
-    if contacts:
-        print_notes(
-            [
-                f"{counted(len(contacts), 'contact has', 'contacts have')} values that could not "
-                f"be certified (nan): {brief_list(contacts)}; only networks with other forces far "
-                "above 10⁴ ⟨f_n⟩ attain them; try a slightly different friction coefficient"
-            ]
-        )
+    if len(left):
+        print_notes([uncertified(left)])
 
 
 def _without_limit(bounded: Any) -> dict[str, int]:
@@ -183,12 +173,12 @@ def limit_loads(arguments: argparse.Namespace) -> None:
             "least_limit_load": float(finite.min()),
             "largest_limit_load": float(finite.max()),
         }
-    without, left = int(np.isinf(load).sum()), dataset["backbone"].values[np.isnan(load)].tolist()
+    without, left = int(np.isinf(load).sum()), dataset["backbone"].values[np.isnan(load)]
     lines = {
         "contacts": len(load),
         **forces.reported(reported),
         **({"contacts_without_a_limit": without} if without else {}),
-        **({"contacts_not_certified": len(left)} if left else {}),
+        **({"contacts_not_certified": len(left)} if len(left) else {}),
         **solved(dataset),
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
@@ -197,7 +187,8 @@ def limit_loads(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, listed(columns)):
         if arguments.out is not None:
             write_columns(arguments.out, columns)
-    _name_uncertified(left)
+    if len(left):
+        print_notes([uncertified(left)])
 
 
 def load_factor(arguments: argparse.Namespace) -> None:

@@ -24,6 +24,7 @@ from granforce.cli.results import (
 )
 from granforce.cli.tables import write_columns, write_csv, write_states
 from granforce.explore.random_walk import UNBOUNDED_WALK
+from granforce.explore.volume import inaccurate
 from granforce.records import InputError, whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -88,7 +89,10 @@ def uniform(arguments: argparse.Namespace) -> int:
         **ends,
     }
     print_report(without_work(lines, arguments), arguments.json)
-    print_notes(sample_notes(dataset))
+    notes = sample_notes(dataset)
+    if arguments.effective is not None and not reached and not notes:
+        notes = ["the effective sample size is less than --effective; use more --states"]
+    print_notes(notes)
     return 1 if arguments.effective is not None and not reached else 0
 
 
@@ -116,6 +120,8 @@ def volume(arguments: argparse.Namespace) -> int:
         **ends,
     }
     print_report(without_work(lines, arguments), arguments.json)
+    if not reached:
+        print_notes([inaccurate(dataset["log_volume_error"].item(), down, up)])
     return 0 if reached else 1
 
 

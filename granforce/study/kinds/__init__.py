@@ -5,7 +5,13 @@ line and the app take it from `KINDS`.
 """
 
 from granforce.study.kinds.bounds import INTERVALS, LIMIT_LOADS, OUTLINE, STRESS
-from granforce.study.kinds.packings import PACKING, get_packing, imported_parameters, keep_packing
+from granforce.study.kinds.packings import (
+    PACKING,
+    get_packing,
+    imported_parameters,
+    keep_packing,
+    parameters_of,
+)
 from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
 from granforce.study.kinds.states import (
     INFERENCE,
@@ -35,6 +41,7 @@ __all__ = [
     "get_packing",
     "imported_parameters",
     "keep_packing",
+    "parameters_of",
     "typed",
 ]
 

@@ -22,7 +22,7 @@ from granforce.packing.compaction import (
 from granforce.packing.scenes import scene
 from granforce.records import InputError, Packing, friction, moderate, positive, random_seed, whole
 from granforce.study import slices
-from granforce.study.cells import Kind, get, packing_version, save
+from granforce.study.cells import Kind, get, load, packing_version, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.keys import Parameters
@@ -81,6 +81,34 @@ def imported_parameters(packing: Packing) -> Parameters:
     tilt = [packing.tilt] if packing.tilt else []
     digest = hash_of(*given, np.array([packing.mu, packing.pressure, *tilt]))
     return {"imported": digest, "mu": packing.mu}
+
+
+def parameters_of(store: Store, packing: Packing) -> Parameters:
+    """The parameters of a packing: those with which `pack` made it, else those of an imported one.
+
+    The former only if the store has the same packing under them, bit for bit; only gaps, which
+    files give by the radii, may differ by rounding.
+    """
+    made = _made(packing)
+    stored = None if made is None else load(store, PACKING, made)
+    if made is not None and stored is not None:
+        own, contacts = dataset_packing(stored), packing.contacts
+        same = own._replace(info=packing.info, contacts=own.contacts._replace(gap=contacts.gap))
+        if same == packing:
+            return made
+    return imported_parameters(packing)
+
+
+def _made(packing: Packing) -> Parameters | None:
+    """The parameters that the info of a packing names, or None."""
+    settings = ("seed", "radii", "dt", "box_mass", "sweeps", "accuracy", "drag_below", "box")
+    given = {name: packing.info[name] for name in settings if name in packing.info}
+    if given.get("radii") == "list":
+        given["radii"] = packing.r.tolist()
+    try:
+        return _packing_parameters(len(packing.r), packing.mu, pressure=packing.pressure, **given)
+    except (TypeError, ValueError):  # of another program
+        return None
 
 
 def hash_of(*arrays: Any) -> str:
