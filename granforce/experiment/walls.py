@@ -20,7 +20,6 @@ from scipy import optimize
 
 from granforce.experiment.boundary import boundary
 from granforce.experiment.listing import Listing
-from granforce.experiment.repair import rows_of
 from granforce.packing.importers.geometry import components
 from granforce.records import Contacts, InputError, make_contacts, positive
 from granforce.types import Floats, Integers, Mask
@@ -184,7 +183,7 @@ def wall_contacts(
     at_wall (N,): grains at walls. walls: as returned by `read_outline`, or None for angles if they
     are listed. reach: gap in mean radii up to which a grain at a wall touches a side.
     """
-    rows = rows_of(listing)
+    rows = listing.rows
     lines = np.flatnonzero((rows == -1).any(axis=1) & (rows >= 0).any(axis=1))
     grain = np.maximum(rows[lines, 0], rows[lines, 1])
     beta = np.where(rows[lines, 0] >= 0, listing.beta[lines], listing.beta[lines] + np.pi)
@@ -248,14 +247,15 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
             f"walls {shape}: fewer than four grains are at walls (by a flag, or an id below 0); "
             "give the outline with its numbers"
         )
-    x, r, flag = x[at_wall], r[at_wall], flag[at_wall]
+    unit = r.mean()  # the tolerances of the fit are absolute
+    x, r, flag = x[at_wall] / unit, r[at_wall] / unit, flag[at_wall]
     if shape == "box":
         numbers = []
         for axis in (0, 1):
             low, high = x[:, axis] - r, x[:, axis] + r
             numbers.append(np.median(low[low < low.min() + _AT_SIDE * r.mean()]))
             numbers.append(np.median(high[high > high.max() - _AT_SIDE * r.mean()]))
-        return WallOutline("box", tuple(map(float, numbers)))
+        return WallOutline("box", tuple(float(unit * number) for number in numbers))
     inner = flag < 0
     if shape == "annulus" and inner.sum() < 3:
         raise InputError(
@@ -273,7 +273,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Wal
     start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
     best = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
     cut = best if shape == "annulus" else best[[0, 1, 3]]
-    return _outline(shape, ",".join(repr(float(value)) for value in cut))
+    return _outline(shape, ",".join(repr(float(unit * value)) for value in cut))
 
 
 def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> WallOutline:

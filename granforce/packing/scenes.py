@@ -159,22 +159,48 @@ def _touching(gap: Floats, r: Floats, what: str, tolerance: float) -> Mask:
     return gap <= tolerance * scale
 
 
-def _places(x: Floats, walls: Floats) -> tuple[Integers, Integers, Floats]:
-    """Pairs of disk and wall (k,), and the wall's nearest place (k, 2), each once.
+class _Touched(NamedTuple):
+    """Places where disks touch walls."""
 
-    Walls that meet share one place, their common end, for a disk in the open angle between them.
+    disk: Integers  # (k,)
+    wall: Integers  # (k,)
+    place: Floats  # (k, 2) the nearest point of the wall
+    away: Floats  # (k, 2) unit vector from the disk's centre to the place
+
+
+def _touched(x: Floats, r: Floats, walls: Floats, tolerance: float) -> _Touched:
+    """The places where disks touch walls, each once.
+
+    Where walls meet, several may have the same nearest point; and the end of a wall that lies on
+    another wall is not a place of its own.
     """
+    place, is_end = _nearest(x, walls)
+    away = place - x[:, None]
+    distance = np.hypot(*away.T).T
+    disk, wall = np.nonzero(_touching(distance - r[:, None], r, "a disk and a wall", tolerance))
+    near, once = tolerance * r.max(), np.ones(len(disk), dtype=bool)
+    for k in np.flatnonzero(np.bincount(disk)[disk] > 1)[::-1]:
+        others = np.flatnonzero(once & (disk == disk[k]))
+        others = others[others != k]
+        here = place[disk[k], wall[k]]
+        same = np.hypot(*(place[disk[others], wall[others]] - here).T) <= near
+        if is_end[disk[k], wall[k]]:
+            on_wall = _nearest(here[None], walls[wall[others]])[0][0]
+            same |= np.hypot(*(on_wall - here).T) <= near
+        once[k] = not same.any()
+    disk, wall = disk[once], wall[once]
+    return _Touched(disk, wall, place[disk, wall], away[disk, wall] / distance[disk, wall][:, None])
+
+
+def _nearest(x: Floats, walls: Floats) -> tuple[Floats, Mask]:
+    """The point of each wall nearest to each of x, (N, k, 2), and whether it is an end (N, k)."""
     begin, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
     size = (along**2).sum(axis=1)
     if np.any(size == 0):
         raise InputError(f"wall {int(np.argmax(size == 0))} has no length")
     share = ((x[:, None] - begin) * along).sum(axis=-1) / size
     place = begin + np.clip(share, 0, 1)[..., None] * along
-    disk, wall = (index.ravel() for index in np.indices(share.shape))
-    flat = place.reshape(-1, 2)
-    keys = np.column_stack([disk, np.round(flat, 9)])
-    first = np.sort(np.unique(keys, axis=0, return_index=True)[1])
-    return disk[first], wall[first], flat[first]
+    return place, (share <= 0) | (share >= 1)
 
 
 class Behind(NamedTuple):
@@ -195,11 +221,7 @@ def places_behind(x: Floats, r: Floats, walls: Floats, tolerance: float) -> Behi
 
 
 def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: float) -> Behind:
-    disk, wall, place = _places(x, walls)
-    away = place - x[disk]
-    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
-    disk, wall, place, away = disk[against], wall[against], place[against], away[against]
-    away /= np.hypot(*away.T)[:, None]
+    disk, wall, place, away = _touched(x, r, walls, tolerance)
     held = pressing[wall] == 0
     lids = np.flatnonzero(pressing)
     grain = np.empty(len(disk), dtype=np.int64)
