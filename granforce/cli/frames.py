@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -62,12 +62,11 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     """Analyse the requested snapshots; print a row for each. Returns 1 if one failed."""
     states = whole(arguments.states, "--states", 0)
     worker_count(arguments.workers, "--workers")
-    numbers = _chosen(snapshots.numbers, arguments.frames)
+    numbers = _chosen(snapshots.numbers, arguments.frames, snapshots.refusal)
     _check_out(arguments.out)
     check_outputs(arguments.csv)
     store = open_store(arguments.cache)
-    if snapshots.lost:
-        print_notes([snapshots.lost])
+    print_notes(snapshots.notes)
     with Bar("snapshots", "cell") as progress:
         dataset, failed = evolution(
             store.path,
@@ -105,12 +104,18 @@ def _check_out(path: str | None) -> None:
     check_outputs(path)
 
 
-def _chosen(available: Sequence[Number], text: str) -> list[Number]:
-    """The numbers of the requested frames."""
+def _chosen(
+    available: Sequence[Number],
+    text: str,
+    refusal: Callable[[float], InputError] | None = None,
+) -> list[Number]:
+    """The numbers of the requested frames; refusal(number): the error of one that is not there."""
     if text == "all":
         return list(available)
     numbers = set(different("--frames", text, float, "all, or ") or [])
     for number in sorted(numbers - set(available)):
+        if refusal is not None:
+            raise refusal(number)
         raise InputError(
             f"no frame {number:g}; the frames are {min(available):g} … {max(available):g}"
         )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from granforce.experiment.pegs import open_frames
 from granforce.fields import record
-from granforce.records import InputError
+from granforce.packing.importers.text import EmptyError
+from granforce.records import InputError, InputWarning
 from granforce.system.files import expanded
 
 # The contents of files, by their names.
@@ -31,8 +33,9 @@ class Frame(NamedTuple):
 def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
     """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
 
-    Sorted by number. columns: of text files, as for `read_pegs`. Raises InputError if there are
-    none, or two with the same number.
+    Sorted by number. columns: of text files, as for `read_pegs`. InputWarnings name files that are
+    empty, and frames that are in one of two files only. Raises InputError if there are no frames,
+    or two with the same number.
     """
     if not paths:
         raise InputError("give a folder of frames, or their files")
@@ -56,11 +59,19 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
             f"{', '.join(map(str, paths))}: no frames; expected *_solved.mat, or text files with "
             "'positions' (or 'centers') and 'adjacency' in their names"
         )
-    frames = [
-        Frame(str(one), None if two is None else str(two), float(number))
-        for one, two in pairs
-        for number in _numbers(one, two, len(pairs), columns)
-    ]
+    frames = []
+    for one, two in pairs:
+        try:
+            numbers = _numbers(one, two, len(pairs), columns)
+        except EmptyError as error:
+            if len(pairs) == 1:
+                raise
+            warnings.warn(f"{error}: left out", InputWarning, stacklevel=2)
+            continue
+        paths = str(one), None if two is None else str(two)
+        frames += [Frame(*paths, float(number)) for number in numbers]
+    if not frames:
+        raise InputError(f"{pairs[0][0]} and all others contain no frame")
     frames.sort(key=lambda frame: frame.number)
     for one, two in itertools.pairwise(frames):
         if one.number == two.number:
@@ -77,7 +88,10 @@ def _numbers(
     one: Path, two: Path | None, count: int, columns: Mapping[str, str] | None
 ) -> list[float]:
     """Numbers of the frames in one pair of files; from the name if each file has one frame."""
-    inside = open_frames(one, two, columns=columns).frames
+    opened = open_frames(one, two, columns=columns)
+    inside = opened.frames
+    for note in getattr(opened, "notes", []):
+        warnings.warn(note, InputWarning, stacklevel=3)
     by_name = _digits(one) if count > 1 and two is not None else []
     return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
 
@@ -98,5 +112,9 @@ def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
         by_number = [{_digits(one)[-1]: one for one in those if _digits(one)} for those in some]
         both = sorted(set(by_number[0]) & set(by_number[1]), key=int)
         if both:
+            for key in sorted(set(by_number[0]) ^ set(by_number[1]), key=int):
+                found = by_number[key not in by_number[0]][key]
+                note = f"{found}: no file has the other half of frame {key}: left out"
+                warnings.warn(note, InputWarning, stacklevel=3)
             return [(by_number[0][key], by_number[1][key]) for key in both]
     return []

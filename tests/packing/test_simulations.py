@@ -9,7 +9,9 @@ import gzip
 import io
 import itertools
 import lzma
+import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -129,6 +131,68 @@ def snapshots_of(name, files, options):
     found = opened(*given(*files), MU, **options)
     assert isinstance(found, snapshots.Snapshots)
     return found
+
+
+def some_empty(name, missing):
+    """Files of snapshots 0, 1, …, each whole or without "particles" or "contacts"."""
+    data = fstat = ""
+    for k, what in enumerate(missing):
+        one, two = particles(k), contacts(k, k + 1.0)
+        if name == "mercury":
+            one, two = (text.replace("9 0 ", f"9 {k} ") for text in mercury_files([k + 1.0]))
+            two = re.sub(r"(?m)^0 ", f"{k} ", two)
+            if what:
+                two = f"# {k} 1\n"
+            if what == "particles":
+                one = f"0 {k} 0 0 0 3 3 1\n"
+        elif what:
+            two = re.sub(r"(?m)^18$", "0", two[: two.index("py\n") + 3])
+            if what == "particles":
+                one = re.sub(r"(?m)^9$", "0", one[: one.index("radius\n") + 7])
+        data, fstat = data + one, fstat + two
+    return data, fstat
+
+
+@pytest.mark.parametrize("name", READ)
+@pytest.mark.parametrize(
+    "missing", [case for case in itertools.product(("", "particles", "contacts"), repeat=3)]
+)
+def test_empty_frames_are_left_out_and_named_unless_they_are_chosen(name, missing, tmp_path):
+    read, _, options, _ = READ[name]
+    files = some_empty(name, missing)
+    whole = [k for k, what in enumerate(missing) if not what]
+    if not whole:
+        with pytest.raises(InputError, match=r"empty|no line with numbers|no contacts at"):
+            read(*given(*files), MU, **options)
+        return
+    assert list(snapshots_of(name, files, options).numbers) == whole
+    for frame in (None, *whole):
+        found = read(*given(*files), MU, frame=frame, **options)
+        assert found.pressure == pytest.approx(1.0 + (whole[-1] if frame is None else frame))
+        assert len(found.info.get("notes", [])) == (
+            len(set(missing) - {""}) if frame is None else 0
+        )
+    for k, what in enumerate(missing):
+        if what:
+            what = what.replace("particles", "atoms") if name == "lammps" else what
+            with pytest.raises(InputError, match=rf"time ?step {k} has no {what}: there is \d"):
+                read(*given(*files), MU, frame=k, **options)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_series_leaves_out_empty_frames_and_says_so(name, tmp_path, capsys):
+    paths = [str(tmp_path / part) for part in ("one", "two")]
+    for path, text in zip(paths, some_empty(name, ("particles", "", "contacts")), strict=True):
+        Path(path).write_text(text)
+    options = ["--mu", "0.3", *(["--box", "3", "3"] if name == "mercury" else [])]
+    out = ["--out", str(tmp_path / "s.zarr"), "--cache", str(tmp_path / "cache")]
+    assert main(["import", name, *paths, *options, "--frames", "all", *out]) == 0
+    said = capsys.readouterr()
+    assert len(said.out.splitlines()) == 2
+    assert re.search("time ?step 0 has no (atoms|particles): left out", said.err)
+    assert re.search("time ?step 2 has no contacts: left out", said.err)
+    assert main(["import", name, *paths, *options, "--frames", "0,1", *out]) == 2
+    assert re.search("time ?step 0 has no (atoms|particles): there is 1", capsys.readouterr().err)
 
 
 def test_a_single_frame_that_is_cut_off_is_refused():

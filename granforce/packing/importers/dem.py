@@ -33,6 +33,7 @@ from granforce.packing.importers.text import (
     Source,
     Table,
     check_grains,
+    is_number,
     make_table,
     read_text,
     renamed,
@@ -199,14 +200,20 @@ def open_mercury(
     mu, cell = friction(mu), _cell(box, tilt)
     steps, lost = _mercury_steps(data)
     contacts, times, cut = _mercury_contacts(fstat)
-    stored = np.unique(times)
-    nearest = np.array([stored[np.argmin(np.abs(stored - step.time))] for step in steps])
-    step_times = np.array([step.time for step in steps])
+    stored, step_times = np.unique(times), np.array([step.time for step in steps])
+    which = np.array([np.argmin(np.abs(stored - time)) for time in step_times])
+    nearest = stored[which]
     both = np.abs(nearest - step_times) <= 1e-4 * np.maximum(np.abs(nearest), np.abs(step_times))
+    filled = np.array([len(step.rows) > 0 for step in steps])
+    # Of several steps with nearly the time of these contacts, they are of the one nearest to it.
+    off = np.where(filled, np.abs(nearest - step_times), np.inf)
+    both &= filled & (off <= np.array([off[which == k].min() for k in which]))
     numbers = np.flatnonzero(both).tolist()
+    empty = {k: "contacts" if filled[k] else "particles" for k in np.flatnonzero(~both).tolist()}
     if not numbers:
         raise InputError(
-            f"{contacts.name}: no contacts at time {step_times[-1]:g}; "
+            f"{contacts.name}: no contacts at times of particles, the last of which is "
+            f"{step_times[-1]:g}; "
             f"they are of {times.min():g} … {times.max():g}"
         )
     if cut and len(numbers) > 1 and nearest[numbers[-1]] == times[-1]:
@@ -222,7 +229,7 @@ def open_mercury(
         ids = np.concatenate([np.arange(grains), -1.0 - np.arange(walls_there)])
         return Snapshot(packing._replace(info=info), ids)
 
-    return Snapshots("time step", numbers, read, lost)
+    return Snapshots("time step", numbers, read, lost, empty)
 
 
 class _TimeStep(NamedTuple):
@@ -419,7 +426,7 @@ def _yade_links(source: Source, named: bool) -> Table:
     """A Table of interactions, with the names of the file if valid, otherwise the standard ones."""
     name, rows, comments, _ = _split(source)
     words = [word.lower() for word in rows[0][1]]
-    if words[0].lstrip("+-").replace(".", "").isdigit():
+    if is_number(words[0]):
         words = comments[-1].split() if comments else []
     else:
         rows = rows[1:]
@@ -454,7 +461,8 @@ def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
     while at < len(rows):
         number, fields = rows[at]
         lost = f"time step {len(steps)} is cut off in {name}"
-        if steps and at == len(rows) - 1:
+        is_empty = fields[0] == "0" and len(fields) in (6, 8) and (ended or at < len(rows) - 1)
+        if steps and at == len(rows) - 1 and not is_empty:
             return steps, lost
         if len(fields) not in (6, 8):
             raise InputError(
@@ -463,10 +471,10 @@ def _mercury_steps(source: Source) -> tuple[list[_TimeStep], str]:
             )
         head = make_table(name, ("n", "time"), [fields[:2]], [number])
         count, left = head.numbers("n")[0], rows[at + 1 :]
-        if not (count.is_integer() and 0 < count):
+        if not (count.is_integer() and (count > 0 or is_empty)):
             raise InputError(f"{name}, line {number}: {fields[0][:20]} particles are announced")
         left = left[: int(count)]
-        whole = ended and len(left) == count and len(left[-1][1]) >= len(left[0][1])
+        whole = is_empty or (ended and len(left) == count and len(left[-1][1]) >= len(left[0][1]))
         if steps and at + 1 + len(left) == len(rows) and not whole:
             return steps, lost
         if len(left) < count:

@@ -78,6 +78,12 @@ class Dump(NamedTuple):
                 item.body.append(line.split())
         return found
 
+    def announced(self, step: int) -> str:
+        """The number of rows that a snapshot announces, "" without one."""
+        lines = (self.lines[k].strip() for k in self.at[step])
+        after = itertools.dropwhile(lambda line: not line.startswith("ITEM: NUMBER OF"), lines)
+        return next(filter(None, itertools.islice(after, 1, None)), "")
+
     def is_cut(self, step: int) -> bool:
         """Whether the file ends before all rows of a snapshot, or within the last."""
         if self.at[step].stop != len(self.lines):
@@ -174,8 +180,13 @@ def open_lammps(
         return Snapshot(found, np.sort(atoms.numbers("id")))
 
     whole = steps[:-1] if cut else steps
+    # In the contacts' dump, too, a snapshot without atoms has no rows.
+    empty = {step: "contacts" for step in whole if second.announced(step) == "0"}
+    empty |= {step: "atoms" for step in whole if first.announced(step) == "0"}
+    filled = [step for step in whole if step not in empty]
     lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""
-    return Snapshots("timestep", whole, read, lost)
+    # Reading one of them says which table is empty.
+    return Snapshots("timestep", filled or whole, read, lost, empty if filled else {})
 
 
 def read_dump(source: Source) -> Dump:

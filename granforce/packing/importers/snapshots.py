@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
 from granforce.fields import record
 from granforce.packing.importers.notes import noted
-from granforce.records import InputError, Packing
+from granforce.records import InputError, Packing, brief_list
 from granforce.types import Floats
 
 
@@ -24,9 +24,30 @@ class Snapshots(NamedTuple):
     """The complete snapshots in the files of a simulation."""
 
     word: Annotated[str, "kind of number: timestep, …"]
-    numbers: Annotated[Sequence[int], "in the order of the files, at least one"]
+    numbers: Annotated[Sequence[int], "in the order of the files, at least one; without empty ones"]
     read: Annotated[Callable[[int], Snapshot], "the snapshot of a number"]
     lost: Annotated[str, "description of what was cut off after the last of them"] = ""
+    empty: Annotated[Mapping[int, str], "numbers of empty ones, and what is missing there"] = {}
+
+    @property
+    def notes(self) -> list[str]:
+        """Words on snapshots that are cut off or empty."""
+        missing = sorted(set(self.empty.values()))
+        named = {words: [k for k, why in self.empty.items() if why == words] for words in missing}
+        return [self.lost] * bool(self.lost) + [
+            f"{self.word}{'s' if len(some) > 1 else ''} {brief_list(some)} "
+            f"{'have' if len(some) > 1 else 'has'} no {words}: left out"
+            for words, some in named.items()
+        ]
+
+    def refusal(self, number: float) -> InputError:
+        """The error of a number that is not among them."""
+        ends = sorted({self.numbers[0], self.numbers[-1]})
+        available = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
+        if number in self.empty:
+            missing = self.empty[int(number)]
+            return InputError(f"{self.word} {number:g} has no {missing}: {available}")
+        return InputError(f"no {self.word} {number}: {available}")
 
     @noted(lambda snapshot: snapshot.packing.info)
     def snapshot(self, number: int | None = None) -> Snapshot:
@@ -40,18 +61,16 @@ class Snapshots(NamedTuple):
         """The same without warnings."""
         if number is None:
             last = self.numbers[-1]
-            note = f"{self.lost}; {self.word} {last} is read" if self.lost else None
-            found = self.read(last)
-            return found if note is None else _noted(found, note)
+            notes = [f"{note}; {self.word} {last} is read" for note in self.notes]
+            return _noted(self.read(last), notes)
         if number not in self.numbers:
-            ends = sorted({self.numbers[0], self.numbers[-1]})
-            available = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
-            raise InputError(f"no {self.word} {number}: {available}")
+            raise self.refusal(number)
         return self.read(self.numbers[self.numbers.index(number)])  # 100.0 is 100
 
 
-def _noted(found: Snapshot, note: str) -> Snapshot:
-    """The snapshot with one more note on its packing."""
+def _noted(found: Snapshot, more: Sequence[str]) -> Snapshot:
+    """The snapshot with more notes on its packing."""
     info = found.packing.info
-    notes = [*info.get("notes", []), note]
-    return found._replace(packing=found.packing._replace(info={**info, "notes": notes}))
+    notes = [*info.get("notes", []), *more]
+    info = {**info, "notes": notes} if notes else info
+    return found._replace(packing=found.packing._replace(info=info))

@@ -41,6 +41,10 @@ Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 PACKING = " [packing]"
 
 
+class EmptyError(InputError):
+    """A file contains nothing."""
+
+
 class Table(NamedTuple):
     """Rows of text fields under named columns."""
 
@@ -237,7 +241,7 @@ def read_text(source: Source) -> tuple[str, str]:
     except UnicodeDecodeError:
         raise InputError(f"{name}: not a text file; give plain text in UTF-8") from None
     if not text.strip():
-        raise InputError(f"{name}: the file is empty")
+        raise EmptyError(f"{name}: the file is empty")
     return name, text
 
 
@@ -269,7 +273,7 @@ def read_csv(source: Source) -> Table:
     if len(rows) < 2:
         raise InputError(f"{name}: a header line and at least one row are needed")
     header, *rows = _trimmed(rows)
-    if all(_is_number(column) for column in header):
+    if all(is_number(column) for column in header):
         raise InputError(
             f"{name}: the first line contains only numbers; add a line with the names of the "
             "columns, such as x,y,r for grains (other names: --columns, or columns= in Python)"
@@ -288,12 +292,12 @@ def _from_the_header(lines: list[str]) -> list[str]:
     if first is None or not comments:
         return lines
     kept = [""] * first + lines[first:]
-    if all(map(_is_number, re.split(r"[,;\s]+", lines[first].strip(" ,;\t")))):
+    if all(map(is_number, re.split(r"[,;\s]+", lines[first].strip(" ,;\t")))):
         kept[comments[-1]] = lines[comments[-1]].lstrip(_COMMENT + " \t")
     return kept
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
