@@ -2,12 +2,13 @@
 
 Text files of positions and contacts may have a column for the frame, a flag for grains at walls,
 and a header, with fields separated by commas, semicolons, tabs or blanks. Columns are recognised by
-the header or, without one, by their number and contents:
+the header or, without one, by their number and contents, and where these allow two readings, by
+whether contacts join neighbours:
 
     frame, id, x, y, radius, flag     id, x, y, radius, flag     x, y, radius, flag
     frame, id, x, y, radius           id, x, y, radius           x, y, radius
     frame, id1, id2, f_t, f_n         id1, id2, f_t, f_n         (the contacts; ids < 0: a wall)
-    id1, id2, flag, f_t, f_n          (where the third is 0 throughout)
+    id1, id2, flag, f_t, f_n          (where the third is 0 or 1 throughout)
 
 Without a column for the frame, a new frame begins where the ids of the grains restart.
 
@@ -17,14 +18,15 @@ adjacencyMatrix. Angles and signs refer to the axes of the files: **t** is **n**
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, SupportsIndex
 
 import numpy as np
 
-from granforce.packing.importers.text import LARGEST, Source, read_text
-from granforce.records import InputError
+from granforce.packing.importers.text import LARGEST, EmptyError, Source, read_text
+from granforce.records import InputError, brief_list
 from granforce.types import Floats, Integers, Mask
 
 _GRAINS = ("frame", "id", "x", "y", "radius", "flag")
@@ -42,8 +44,14 @@ _WORDS = {
     "tangential": ("tangential", "ft", "f_t", "tangentialforce", "tangential_force"),
     "normal": ("normal", "fn", "f_n", "normalforce", "normal_force"),
 }
+_SLIDING = "flag (not used)"  # of a contact
 # Least mean number of grains per frame, if frames are recognised by their ids.
 _LEAST = 3
+# Least fraction of the contacts that join neighbours if the columns are those that were recognised.
+_FITS = 0.9
+# Largest gap of two grains that may touch, in mean radii: centres and radii are known only to some
+# tenths of a radius.
+FAR = 1.0
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 
 
@@ -78,6 +86,50 @@ class Listing(NamedTuple):
         columns = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
         return self._replace(**columns, lines=(self.lines[0], self.lines[1][rows]))
 
+    @property
+    def rows(self) -> Integers:
+        """Rows (k, 2) of the grains in contacts; −1 for a wall, −2 for a missing grain."""
+        order = np.argsort(self.ids, kind="stable")
+        place = np.searchsorted(self.ids, self.ends, sorter=order)
+        rows = order[np.minimum(place, len(order) - 1)]
+        rows = np.where(self.ids[rows] == self.ends, rows, -2)
+        return np.where(self.ends < 0, -1, rows)
+
+    @property
+    def gaps(self) -> Floats:
+        """Gaps (k,) of the disks joined by contacts; NaN if one is a wall or missing."""
+        rows = self.rows
+        listed = np.all(rows >= 0, axis=1)
+        i, j = np.where(listed[:, None], rows, 0).T
+        gap = np.hypot(*(self.x[j] - self.x[i]).T) - self.r[i] - self.r[j]
+        return np.where(listed, gap, np.nan)
+
+    @property
+    def mean_radius(self) -> float:
+        """The mean of the radii that can be read, NaN without any."""
+        good = self.r[np.isfinite(self.r) & (self.r > 0)]
+        return float(good.mean()) if len(good) else np.nan
+
+    @property
+    def fit(self) -> float:
+        """Fraction of the contacts between grains that join existing, close grains."""
+        inner = np.all(self.ends >= 0, axis=1)
+        return float(np.mean(self.gaps[inner] <= FAR * self.mean_radius)) if inner.any() else 1.0
+
+    def renumbered(self) -> Iterator[tuple[str, int, Listing]]:
+        """The listing with ids that count its grains: in which order, from which number."""
+        count = len(self.ids)
+        orders = {
+            "as they are listed": np.arange(count),
+            "by id": np.argsort(self.ids, kind="stable"),
+            "by x": np.argsort(self.x[:, 0], kind="stable"),
+            "by y": np.argsort(self.x[:, 1], kind="stable"),
+        }
+        for (words, order), first in itertools.product(orders.items(), (1, 0)):
+            ids = np.empty(count)
+            ids[order] = np.arange(first, first + count)
+            yield words, first, self._replace(ids=ids)
+
 
 class Frames(Protocol):
     """A source of frames: their numbers, and the Listing of one, by default the last."""
@@ -102,6 +154,13 @@ class Columns(NamedTuple):
         """Numbers of the frames, ascending; empty without such a column."""
         numbers = self.values.get("frame", np.zeros(0))
         return np.unique(numbers[np.isfinite(numbers)])
+
+    @property
+    def framed(self) -> bool:
+        """Whether there is a column for the frame, or ids that restart."""
+        return "frame" in self.values or (
+            "id" in self.values and _begun_anew(self.values["id"]) is not None
+        )
 
     def of(self, frame: float) -> Columns:
         """The rows of one frame, or all rows if there is no column for the frame."""
@@ -144,6 +203,15 @@ class TextFrames(NamedTuple):
             )
         return one if len(one) else two if len(two) else np.ones(1)
 
+    @property
+    def notes(self) -> list[str]:
+        """Words on frames that are in one of the files only."""
+        numbers = np.setxor1d(self.grains.frames, self.contacts.frames)
+        if not len(numbers) or not (len(self.grains.frames) and len(self.contacts.frames)):
+            return []
+        named = brief_list([plain(number) for number in numbers])
+        return [f"frames {named} are not in both files: left out"]
+
     def listing(self, frame: float | None = None) -> Listing:
         """The Listing of a frame, by default the last."""
         available = self.frames
@@ -184,17 +252,48 @@ def read_frames(
     that of both files; its number applies to files of which other columns are given, too.
     """
     given = _by_name(columns or {})
-    files = [
-        _columns(source, wanted, {name: given[name] for name in wanted if name in given})
+    grains, contacts = (
+        _readings(source, wanted, {name: given[name] for name in wanted if name in given})
         for source, wanted in ((positions, _GRAINS), (adjacency, _CONTACTS))
-    ]
-    if "frame" in given and not any(file.frame_given for file in files):
+    )
+    if "frame" in given and not (grains[0].frame_given or contacts[0].frame_given):
         raise InputError(
-            f"{files[0].name} and {files[1].name}: no column has the header "
+            f"{grains[0].name} and {contacts[0].name}: no column has the header "
             f"{given['frame'][:40]!r} for frame; to give its number, also give the other columns "
             "of its file"
         )
-    return _with_frames(*files)
+    return _fitting(grains, contacts)
+
+
+def _fitting(grains: Sequence[Columns], contacts: Sequence[Columns]) -> TextFrames:
+    """The first readings of both files by which contacts join neighbours, or else the first.
+
+    If the grains have no frames, a third column of 0 and 1 of the contacts is a flag.
+    """
+    pairs = [
+        (one, two)
+        for one in grains
+        for two in sorted(contacts, key=lambda two: _SLIDING not in two.values and not one.framed)
+    ]
+    fitting = [pair for pair in pairs if len(pairs) == 1 or _fit(*pair) >= _FITS]
+    one, two = (fitting or pairs)[0]
+    first = two.values["id1"]
+    if len(fitting) != 1 and _SLIDING in two.values and len(np.unique(first)) == 1 < len(first):
+        raise InputError(
+            f"{two.name}: the first of five columns is always {plain(first[0])}, and the third is "
+            "0 or 1, so the columns of the grains are unknown: name the columns (--columns "
+            "i=…,j=…,f_t=…,f_n=…)"
+        )
+    return _with_frames(one, two)
+
+
+def _fit(grains: Columns, contacts: Columns) -> float:
+    """Fraction of the contacts that join neighbours in the last frame, with any order of ids."""
+    try:
+        listing = _with_frames(grains, contacts).listing()
+    except InputError:
+        return 0.0
+    return max(listing.fit, *(other.fit for _, _, other in listing.renumbered()))
 
 
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
@@ -265,8 +364,11 @@ def plain(number: float) -> int | float:
     return int(number) if float(number).is_integer() else float(number)
 
 
-def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) -> Columns:
-    """The Columns of a text file of grains or contacts; given: headers or numbers of columns."""
+def _readings(source: Source, wanted: Sequence[str], given: Mapping[str, str]) -> Sequence[Columns]:
+    """The possible Columns of a text file of grains or contacts, the most likely first.
+
+    given: headers or numbers of columns.
+    """
     name, text = read_text(source)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if "\0" in text:
@@ -277,7 +379,7 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
     while rows and not any(np.isfinite(_number(field)) for field in rows[0][1]):
         header = rows.pop(0)[1]
     if not rows:
-        raise InputError(f"{name}: no line with numbers; is it a PeGS file?")
+        raise EmptyError(f"{name}: no line with numbers; is it a PeGS file?")
     width = max(set(counts := [len(fields) for _, fields in rows]), key=counts.count)
     numbers = np.full((len(rows), width), np.nan)
     for row, (_, fields) in zip(numbers, rows, strict=True):
@@ -289,13 +391,21 @@ def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) ->
     else:  # of the other file, perhaps
         taken = header is not None and _plain(given["frame"]) in map(_plain, header)
     if taken:
-        named = _given(name, header, wanted, width, given)
+        readings = [_given(name, header, wanted, width, given)]
     else:
-        named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
-    values = {column: numbers[:, k] for k, column in enumerate(named) if column}
-    description = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
+        named = header and _named(header, wanted, width)
+        readings = [named] if named else _by_content(name, numbers, wanted)
     places = np.array([k for k, _ in rows])
-    return Columns(name, values, places, description, taken and "frame" in given)
+    return [
+        Columns(
+            name,
+            {column: numbers[:, k] for k, column in enumerate(names) if column},
+            places,
+            f"{name}: {', '.join(filter(None, names))}, separated by {_SEPARATORS[separator]}",
+            taken and "frame" in given,
+        )
+        for names in readings
+    ]
 
 
 def _number(text: str) -> float:
@@ -364,61 +474,57 @@ def _given(
     return named
 
 
-def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[str]:
-    """Names of the columns from their number and contents."""
-    width = numbers.shape[1]
-    names = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
-    if (
-        names
-        and names[0] == "id1"
-        and width == 5
-        and len(np.unique(numbers[:, 0])) == 1 < len(numbers)
-    ):
+def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> list[Sequence[str]]:
+    """Possible names of the columns from their number and contents, the most likely first."""
+    readings = _of_contacts(numbers) if "id1" in wanted else _of_grains(numbers)
+    if not readings:
         raise InputError(
-            f"{name}: the third of five columns is 0 throughout, so the column of "
-            "the second grain is unknown: name the columns (--columns i=…,j=…,f_t=…,f_n=…)"
-        )
-    if names is None:
-        raise InputError(
-            f"{name}: {width} fields in a line, which are not "
+            f"{name}: {numbers.shape[1]} fields in a line, which are not "
             f"{', '.join(wanted)} (the first and the last may be missing); is it a PeGS file? "
             "Give a header line that names the columns"
         )
-    return names
+    return readings
 
 
-def _as_contacts(numbers: Floats) -> Sequence[str] | None:
-    columns = {4: _CONTACTS[1:], 5: _CONTACTS}.get(numbers.shape[1])
-    if columns is None:
-        return None
-    if len(columns) == 5 and not np.nan_to_num(numbers[:, 2]).any():
-        # No grain is in every contact: the third is a flag, and the first two are the grains.
-        columns = ("id1", "id2", "", "tangential", "normal")
-    whole = [_whole(numbers[:, columns.index(name)]) for name in ("id1", "id2")]
-    return columns if all(whole) else None
+def _of_contacts(numbers: Floats) -> list[Sequence[str]]:
+    width = numbers.shape[1]
+    readings: list[Sequence[str]] = [_CONTACTS[5 - width :]] if width in (4, 5) else []
+    if width == 5 and _among(numbers[:, 2], (0, 1)):
+        flagged = ("id1", "id2", _SLIDING, "tangential", "normal")
+        # No grain is in every contact: of zeros alone it is a flag even beside several frames.
+        readings.insert(1 if np.nan_to_num(numbers[:, 2]).any() else 0, flagged)
+    ends = ("id1", "id2")
+    return [
+        names for names in readings if all(_whole(numbers[:, names.index(end)]) for end in ends)
+    ]
 
 
-def _as_grains(numbers: Floats) -> Sequence[str] | None:
+def _of_grains(numbers: Floats) -> list[Sequence[str]]:
     width = numbers.shape[1]
     if width < 3:
-        return None
+        return []
     first, last = numbers[:, 0], numbers[:, min(width, 6) - 1]
-    flagged, counted = _flags(last), _whole(first)
+    flagged, counted = _among(last, (-1, 0, 1)), _whole(first)
     alone = len(np.unique(first[np.isfinite(first)])) > 0.9 * np.isfinite(first).sum()
     anew = not alone and _begun_anew(first) is not None
+    sized = bool(np.mean(last > 0) > 0.9)  # what may be a radius
     if width >= 6:
-        return (*_GRAINS, *[""] * (width - 6)) if counted else None
+        return [(*_GRAINS, *[""] * (width - 6))] if counted else []
     if width == 5:
         # A frame number repeats; the id of a grain occurs once per frame.
         if not counted:
-            return None
-        alone |= anew and not _whole(numbers[:, 1])
-        return _GRAINS[1:] if flagged and alone else _GRAINS[:5]
+            return []
+        with_id = flagged and (alone or anew)
+        named = alone or (anew and not _whole(numbers[:, 1]))
+        readings: list[Sequence[str]] = [_GRAINS[1:]] if with_id else []
+        readings += [_GRAINS[:5]] if sized or not with_id else []
+        return readings if named else readings[::-1]
     if width == 4:
-        if counted and (alone or anew) and not flagged:
-            return _GRAINS[1:5]
-        return _GRAINS[2:] if flagged else None
-    return _GRAINS[2:5]
+        with_id = counted and (alone or anew) and (sized or not flagged)
+        readings = [*([_GRAINS[2:]] if flagged else []), *([_GRAINS[1:5]] if with_id else [])]
+        # A flag on all grains says nothing, radii of 1 do.
+        return readings[::-1] if np.all(last == 1) else readings
+    return [_GRAINS[2:5]]
 
 
 def _whole(column: Floats) -> bool:
@@ -427,6 +533,7 @@ def _whole(column: Floats) -> bool:
     return len(finite) > 0 and bool(np.mean(finite == np.round(finite)) > 0.9)
 
 
-def _flags(column: Floats) -> bool:
+def _among(column: Floats, values: Sequence[int]) -> bool:
+    """Whether nearly all numbers are among these."""
     finite = column[np.isfinite(column)]
-    return len(finite) > 0 and bool(np.mean(np.isin(finite, (-1, 0, 1))) > 0.9)
+    return len(finite) > 0 and bool(np.mean(np.isin(finite, values)) > 0.9)

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from granforce import notebook
 from granforce.experiment import solved
 from granforce.experiment.listing import Frames, Listing, plain, read_frames
-from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
+from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired
 from granforce.experiment.walls import Bodies, bad_fit, bodies, flagged, read_outline, wall_contacts
 from granforce.fields import record
 from granforce.forces.build import ensemble
@@ -149,7 +149,8 @@ def read_pegs(
         raise InputError.of("reach", reach, words)
     if walls is not None and not hasattr(walls, "gaps"):
         walls = read_outline(walls)
-    listing = open_frames(positions, adjacency, columns=columns).listing(frame)
+    opened = open_frames(positions, adjacency, columns=columns)
+    listing = opened.listing(frame)
     check_grains(len(listing.ids), most_grains, listing.names[0])
     listing = listing._replace(r=scale * listing.r)
     if reverse:
@@ -161,7 +162,7 @@ def read_pegs(
     ignored = {} if note is None else {"flags_ignored": int(np.sum(listing.flag != 0))}
     listing = listing._replace(flag=sides)
     at_wall = sides != 0
-    rows = rows_of(listing)
+    rows = listing.rows
     with_wall = (rows == -1).any(axis=1)
     at_wall[rows[with_wall].max(axis=1)] = True
     listed = _listed(listing, rows)
@@ -170,7 +171,8 @@ def read_pegs(
     saved = gain_by_reversing(
         (*listed.pairs.T, normal), np.nan_to_num(listed.forces), np.zeros_like(x), ~at_wall
     )
-    notes = [] if note is None else [note]
+    notes = [] if frame is not None else [*getattr(opened, "notes", [])]
+    notes += [] if note is None else [note]
     if saved > WORTH_REVERSING:
         notes.append(worth_reversing(saved, reverse))
     touching = wall_contacts(listing, x, r, at_wall, walls, reach)

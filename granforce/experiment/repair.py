@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.experiment.listing import Listing, plain
+from granforce.experiment.listing import FAR, Listing, plain
 from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
 from granforce.records import InputError
 from granforce.types import Floats, Integers
@@ -34,9 +34,6 @@ KINDS = {
 }
 # Overlap, as a fraction of the smaller radius, beyond which one of two disks must be false.
 OVERLAP = 0.5
-# Largest gap of two grains that may touch, in mean radii: centres and radii are known only to some
-# tenths of a radius.
-FAR = 1.0
 # Largest fraction of the data to repair, by default.
 MOST = 0.1
 # Two detections are the same grain if centres are closer than the first fraction of the smaller
@@ -128,37 +125,6 @@ def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing,
     return listing, account, note
 
 
-def rows_of(listing: Listing) -> Integers:
-    """Rows (k, 2) of the grains in contacts; −1 for a wall, −2 for a missing grain."""
-    order = np.argsort(listing.ids, kind="stable")
-    place = np.searchsorted(listing.ids, listing.ends, sorter=order)
-    rows = order[np.minimum(place, len(order) - 1)]
-    rows = np.where(listing.ids[rows] == listing.ends, rows, -2)
-    return np.where(listing.ends < 0, -1, rows)
-
-
-def gaps_of(listing: Listing, rows: Integers) -> Floats:
-    """Gaps (k,) of the disks joined by contacts; NaN if one is a wall or missing."""
-    listed = np.all(rows >= 0, axis=1)
-    i, j = np.where(listed[:, None], rows, 0).T
-    gap = np.hypot(*(listing.x[j] - listing.x[i]).T) - listing.r[i] - listing.r[j]
-    return np.where(listed, gap, np.nan)
-
-
-def _fitting(listing: Listing) -> float:
-    """Fraction of the contacts between grains that join existing, close grains."""
-    inner = np.all(listing.ends >= 0, axis=1)
-    if not inner.any():
-        return 1.0
-    gap = gaps_of(listing, rows_of(listing))[inner]
-    return float(np.mean(gap <= FAR * _mean_radius(listing)))
-
-
-def _mean_radius(listing: Listing) -> float:
-    good = listing.r[np.isfinite(listing.r) & (listing.r > 0)]
-    return good.mean() if len(good) else np.nan
-
-
 def _named(listing: Listing, account: Account) -> tuple[Listing, str]:
     """The listing with ids under which contacts join neighbours, and a description of the change.
 
@@ -166,35 +132,24 @@ def _named(listing: Listing, account: Account) -> tuple[Listing, str]:
     of the frame in some order; the order is accepted if contacts then join neighbours.
     """
     needed = 1 - account.most
-    share = _fitting(listing)
+    share = listing.fit
     readable = np.mean(np.isfinite(listing.r) & (listing.r > 0)) if len(listing.r) else 0.0
     if account.strict or share >= needed or readable < needed:
         return listing, ""
-    count = len(listing.ids)
-    orders = {
-        "as they are listed": np.arange(count),
-        "by id": np.argsort(listing.ids, kind="stable"),
-        "by x": np.argsort(listing.x[:, 0], kind="stable"),
-        "by y": np.argsort(listing.x[:, 1], kind="stable"),
-    }
-    for words, order in orders.items():
-        for first in (1, 0):
-            ids = np.empty(count)
-            ids[order] = np.arange(first, first + count)
-            other = listing._replace(ids=ids)
-            if _fitting(other) >= needed:
-                return other, (
-                    f"the ids of {listing.names[1]} are not those of {listing.names[0]}: they "
-                    f"count its grains {words}, from {first}; taken so, {_fitting(other):.0%} "
-                    f"of the contacts join neighbours (by their names {share:.0%})"
-                )
+    for words, first, other in listing.renumbered():
+        if other.fit >= needed:
+            return other, (
+                f"the ids of {listing.names[1]} are not those of {listing.names[0]}: they count "
+                f"its grains {words}, from {first}; taken so, {other.fit:.0%} of the contacts join "
+                f"neighbours (by their names {share:.0%})"
+            )
     raise InputError(_strangers(listing, share))
 
 
 def _strangers(listing: Listing, share: float) -> str:
     """Why ids and positions do not belong together, and what to do."""
-    rows = rows_of(listing)
-    gap, radius = gaps_of(listing, rows), _mean_radius(listing)
+    rows = listing.rows
+    gap, radius = listing.gaps, listing.mean_radius
     absent = np.flatnonzero((rows == -2).any(axis=1))
     words = f"only {share:.0%} of the contacts in {listing.names[1]} join neighbours"
     if len(absent):
@@ -283,8 +238,8 @@ def _fits(listing: Listing) -> Floats:
 
     An unusual radius subtracts up to 2.
     """
-    rows = rows_of(listing)
-    gap = gaps_of(listing, rows)
+    rows = listing.rows
+    gap = listing.gaps
     finite = np.isfinite(gap)
     off = np.abs(gap[finite] - np.median(gap[finite]) if finite.any() else gap[finite])
     value = np.clip(1 - off / (_FIT * listing.r.mean()), -1, 1)
@@ -325,7 +280,7 @@ def _without_missing_grains(listing: Listing, account: Account) -> Listing:
     texts = [f"{listing.place(1, k)}: the grain touches itself" for k in loops]
     account.note("contacts_with_themselves", texts, _places(listing, loops))
     listing = listing.with_contacts(np.setdiff1d(np.arange(len(listing.ends)), loops))
-    rows = rows_of(listing)
+    rows = listing.rows
     bad = np.flatnonzero((rows == -2).any(axis=1) | (rows < 0).all(axis=1))
     texts = []
     for k in bad:
@@ -340,8 +295,8 @@ def _without_missing_grains(listing: Listing, account: Account) -> Listing:
 
 
 def _without_long_contacts(listing: Listing, account: Account) -> Listing:
-    rows = rows_of(listing)
-    gap = gaps_of(listing, rows)
+    rows = listing.rows
+    gap = listing.gaps
     with np.errstate(invalid="ignore"):
         bad = np.flatnonzero(gap > FAR * listing.r.mean())
     texts = [
@@ -380,7 +335,7 @@ def _note_friction(listing: Listing, account: Account, mu: float) -> None:
 
 def _places(listing: Listing, contacts: Integers) -> Floats:
     """(k, 2) places of contacts: between their grains, or at the only existing one."""
-    rows = rows_of(listing)[contacts]
+    rows = listing.rows[contacts]
     listed = rows >= 0
     x = np.where(listed[..., None], listing.x[np.where(listed, rows, 0)], np.nan)
     with np.errstate(invalid="ignore"):

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from granforce.experiment.listing import Listing
 from granforce.experiment.matfile import read_struct
-from granforce.packing.importers.text import LARGEST, Source
+from granforce.packing.importers.text import LARGEST, EmptyError, Source
 from granforce.records import InputError
 from granforce.system.files import content_of, path_text
 from granforce.types import Floats
@@ -186,7 +186,7 @@ def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> List
         beta.append(azimuth)
         owner.append(np.full(size, k))
     if not ends:
-        raise InputError(f"{name}: no particle has neighbours; is it the file after diskSolve?")
+        raise EmptyError(f"{name}: no particle has neighbours; is it the file after diskSolve?")
     owner = np.concatenate(owner)
     with np.errstate(all="ignore"):
         spread = single["fitError"] / single["r"] ** 2

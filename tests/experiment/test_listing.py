@@ -15,7 +15,7 @@ from granforce.experiment.boundary import boundary
 from granforce.experiment.frames import frames_of
 from granforce.experiment.pegs import read_pegs
 from granforce.experiment.walls import bad_fit, fitted, flagged
-from granforce.records import InputError
+from granforce.records import InputError, InputWarning
 
 N = 40
 CLEAN = {"mu": 0.3, "reach": 0.1, "error": 0.001}
@@ -196,8 +196,73 @@ def test_a_third_column_of_zeros_is_a_flag(made, taken):
     """No grain is in every contact."""
     grains, rows = made
     same(read(grains, [[row[1], row[2], 0, row[3], row[4]] for row in rows]), taken)
-    with pytest.raises(InputError, match="0 throughout, so the column of the second"):
+    with pytest.raises(InputError, match="so the columns of the grains are unknown: name the col"):
         read(grains, [[1, row[1], 0, row[3], row[4]] for row in rows])
+
+
+FLAGS = {"0 and 1": lambda k: k % 3 == 0, "all 1": lambda k: 1, "one 1": lambda k: k == 5}
+
+
+@pytest.mark.parametrize("flag", FLAGS)
+@pytest.mark.parametrize("ids", ["listed", "counted", "restarting", "framed"])
+def test_a_third_column_of_zeros_and_ones_is_a_flag(made, taken, flag, ids):
+    """Whether grains have ids, count from 0, or have several frames; and the report says so."""
+    grains, rows = made
+    end = (lambda id: (id - 3) // 10) if ids == "counted" else (lambda id: id)
+    flagged = [
+        [end(row[1]), end(row[2]), int(FLAGS[flag](k)), row[3], row[4]]
+        for k, row in enumerate(sorted(rows))
+    ]
+    listed = columns(grains, *{"counted": (2, 3, 4, 5), "framed": range(6)}.get(ids, range(1, 6)))
+    times = 2 if ids == "restarting" else 1
+    found = read(listed * times, flagged * times)
+    same(found, taken)
+    assert "id1, id2, flag (not used), tangential, normal" in found.report["columns"]
+
+
+def test_frames_are_no_flag():
+    """Two frames 0 and 1, in which grain 1 takes part in every contact."""
+    grains = [[f, k, 2.0 * k, 0.0, 1.0, 0] for f in (0, 1) for k in range(3)]
+    rows = [[f, a, 1, 0.0, 5.0] for f in (0, 1) for a in (0, 2)]
+    for text in (grains, [row[1:] for row in grains]):
+        found = read(text, rows, frame=0)
+        assert found.report["contacts_listed"] == 2 and found.report["unbalanced"] == 0
+    rows = [[7, *row[1:]] for row in rows[:2]]  # one frame, in a list of one frame
+    found = read([row[1:] for row in grains[:3]], rows)
+    assert found.report["frame"] == 7 and found.report["contacts_listed"] == 2
+
+
+@pytest.mark.parametrize("chosen", [(1, 2, 3, 4), (2, 3, 4), (2, 3, 4, 5), (1, 2, 3, 4, 5)])
+def test_radii_of_1_are_no_flag(made, chosen):
+    """Equal grains in units of their radius; and a flag of grains at whole pixels."""
+    grains = [
+        [0, k, float(2 * (k % 6) + k // 6 % 2), 2.0 * (k // 6), 1.0, int(k % 6 in (0, 5))]
+        for k in range(24)
+    ]
+    x = np.array([row[2:4] for row in grains])
+    near = [(i, j) for i in range(24) for j in range(i) if np.hypot(*(x[i] - x[j])) < 2.3]
+    first = 0 if 1 in chosen else 1
+    rows = [[i + first, j + first, 0.0, 1.0] for i, j in near]
+    found = read(columns(grains, *chosen), rows)
+    assert np.all(found.packing.r[:24] == 1) and np.array_equal(found.packing.x[:24], x)
+    assert found.report["contacts_listed"] == len(near)
+
+
+def test_frames_in_one_file_only_are_named(made, tmp_path):
+    grains, rows = made
+    later = [[k, *row[1:]] for k in (2, 3) for row in grains]
+    found = read([*grains, *later], [*rows, *([3, *row[1:]] for row in rows)])
+    assert found.report["frame"] == 3
+    assert any("frames 2 are not in both files" in note for note in found.report["notes"])
+    for k, listed in ((1, rows), (2, []), (3, rows)):
+        (tmp_path / f"positions_{k}.txt").write_text(file(grains).getvalue())
+        (tmp_path / f"adjacency_{k}.txt").write_text(file(listed).getvalue())
+    (tmp_path / "adjacency_4.txt").write_text(file(rows).getvalue())
+    with pytest.warns(InputWarning) as noted:
+        assert [frame.number for frame in frames_of(tmp_path)] == [1, 3]
+    text = " ".join(str(one.message) for one in noted)
+    assert "adjacency_2.txt: the file is empty: left out" in text
+    assert "adjacency_4.txt: no file has the other half of frame 4" in text
 
 
 def test_columns_are_named_by_header_or_number(made, taken):
