@@ -2,6 +2,7 @@
 // and in the browser.
 
 import { button, createElement } from "../browser/dom.js"
+import { keepChapter } from "../browser/local_storage.js"
 import { plain } from "../browser/to_object.js"
 import { CHAPTERS } from "./chapters.js"
 import { PredictDoSee } from "./predict_do_see.js"
@@ -68,6 +69,7 @@ class Lesson {
     this.close()
     const chapter = CHAPTERS[number], turn = ++this.openings
     this.number = number
+    keepChapter(chapter.name)
     this.show()
     const parts = this.lay(chapter)
     const { model, source } = this, palettes = () => plain(model.palettes)

@@ -2,12 +2,12 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { copyButton } from "../browser/clipboard.js"
-import { lastView } from "../browser/local_storage.js"
+import { lastChapter, lastView } from "../browser/local_storage.js"
 
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
-// Entry pages: name, title, and query; that of Explore is its last view, in which a packing of the visitor's own
-// is named by its content.
-const DOORS = [["explore", "Explore", lastView], ["learn", "Learn", () => "?learn"]]
+// Entry pages: name, title, and query: the last view of Explore, in which a packing of the visitor's own is named by
+// its content, and the last chapter of Learn.
+const DOORS = [["explore", "Explore", lastView], ["learn", "Learn", () => `?learn=${lastChapter()}`]]
 const YEAR_S = 365 * 24 * 3600
 
 export function render({ model }) {

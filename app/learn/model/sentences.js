@@ -67,7 +67,8 @@ function slips(body) {
 export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + ", each with a normal and a tangential component"
-  if (empty && !scene.idle) {
+  if (scene.idle) return `<b>${2 * count} unknown force components</b> <span>(${forces}; without a load all of them can be 0)</span>`
+  if (empty) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
     const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
     return `<b>${2 * count} unknown force components; ${sum}: ${none}</b> <span>(${forces}${because})</span>`

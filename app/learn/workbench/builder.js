@@ -41,6 +41,7 @@ export class Builder {
     this.pressure = false // instead of gravity
     this.pressing = new Set() // numbers of walls
     this.untouched = true // the scene is an initial one
+    this.undos = [] // texts of earlier scenes
     this.host = host
     host.innerHTML = `
       <span role="radiogroup" aria-label="What presses the bodies">
@@ -58,7 +59,7 @@ export class Builder {
       <label data-for="disk">radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
       ${["width", "height", "degrees"].map((name, k) => `<label data-for="block">${name} <input class="side" data-side="${k}" inputmode="decimal"></label>`).join("")}
       <button type="button" class="soft anew" title="Begin anew, with one body on the floor">Clear</button>
-      <span class="how"></span>
+      <span class="how" role="status"></span>
       <span class="presses">No gravity. A pressing wall pushes with a force equal to its length.</span>`
     host.addEventListener("click", (event) => {
       const { tool, load } = event.target.dataset
@@ -97,8 +98,11 @@ export class Builder {
     const valid = text.trim() && Number.isFinite(value), fits = valid && (!block || this.reshape(this.chosen, changed))
     if (fits) sizes.block = changed
     this.tell()
-    if (!fits) this.host.querySelector(".how").textContent = valid ? "There is no room to change the block like this." : "Type a number."
+    if (!fits) this.refuse(valid ? "There is no room to change the block like this." : "Type a number.")
   }
+
+  /** Say why nothing changes, in place of the explanation of the tool. */
+  refuse(words) { this.host.querySelector(".how").textContent = words }
 
   /** Choose pressure or gravity. */
   choose(pressure) {
@@ -112,6 +116,13 @@ export class Builder {
 
   /** Load another scene, by default the initial one with the chosen kind of load. */
   begin(text = this.pressure ? UNDER_PRESS : "") {
+    this.undos.push(this.text)
+    this.load(text)
+  }
+
+  undo() { this.load(this.undos.pop()) }
+
+  load(text) {
     this.text = null // accept any scene that arrives
     this.changed(text)
   }
@@ -133,6 +144,8 @@ export class Builder {
     const spelled = (rows) => rows.map((row) => row.map((v) => Number(v.toFixed(12))).join()).join(";")
     const press = this.walls.flatMap((wall, k) => (this.pressing.has(wall) ? [k] : [])).join()
     this.untouched = false
+    if (!this.held?.moved) this.undos.push(this.text) // a drag is one step
+    if (this.held) this.held.moved = true
     this.text = `${spelled(this.bodies)}|${spelled(this.walls)}${this.pressure ? `|p${press}` : ""}`
     this.changed(this.text)
   }
@@ -145,7 +158,7 @@ export class Builder {
     if (this.tool === "remove") return this.remove(index, at)
     if (this.tool === "press") return this.switchWall(at)
     if (this.tool === "wall") {
-      if (this.walls.length >= MOST_WALLS) return true
+      if (this.walls.length >= MOST_WALLS) { this.refuse(`A scene has ${MOST_WALLS} walls at most.`); return true }
       this.walls.push([...at, ...at])
       this.held = { wall: this.walls.length - 1 }
       return true
@@ -153,6 +166,7 @@ export class Builder {
     if (this.block && Math.hypot(...this.handle[1].map((v, k) => v - at[k])) < GRIP / unit) this.held = { body: this.chosen, turns: true }
     else if (index >= 0) this.take(index, at)
     else if (this.bodies.length < MOST_BODIES) this.add(at)
+    else this.refuse(`A scene has ${MOST_BODIES} bodies at most.`)
     return true
   }
 
@@ -165,7 +179,7 @@ export class Builder {
   /** Add a body; a block lies flat on the nearest edge. */
   add(at) {
     const row = this.placed([...at, ...this.sizes[this.tool]], -1, 45)
-    if (!row) return
+    if (!row) return this.refuse("There is no room here: bodies and walls may touch, but not overlap.")
     this.take(this.bodies.push(row) - 1, at)
     this.publish()
   }
@@ -205,7 +219,11 @@ export class Builder {
     if (held.turns) {
       const degrees = Math.round((Math.atan2(at[1] - y, at[0] - x) * 180) / Math.PI - 90)
       this.reshape(held.body, body.slice(2).with(2, this.flat(body.with(4, degrees), held.body, FLAT)))
-    } else this.replace(held.body, this.placed([at[0] + held.grip[0], at[1] + held.grip[1], ...body.slice(2)], held.body, FLAT))
+    } else {
+      const row = this.placed([at[0] + held.grip[0], at[1] + held.grip[1], ...body.slice(2)], held.body, FLAT)
+      if (row) this.replace(held.body, row)
+      else this.refuse("There is no room there.")
+    }
   }
 
   /** Give a body another size or turn, and move it as far as contacts need; returns whether there is room. */
@@ -215,9 +233,9 @@ export class Builder {
     return Boolean(at)
   }
 
-  /** Put another row in place of a body, if there is one and it differs. */
+  /** Put another row in place of a body, if it differs. */
   replace(index, row) {
-    if (!row || row.every((v, k) => v === this.bodies[index][k])) return
+    if (row.every((v, k) => v === this.bodies[index][k])) return
     this.bodies[index] = row
     this.tell()
     this.publish()
@@ -247,8 +265,9 @@ export class Builder {
     }
     if (held?.wall === undefined) return
     const [a, b, c, d] = this.walls[held.wall], short = Math.hypot(a - c, b - d) < 0.3
-    if (short || this.bodies.some((body) => gap(shape(body), shape([a, b, c, d])) < -1e-9)) this.walls.splice(held.wall, 1)
-    else this.publish()
+    if (!short && this.bodies.every((body) => gap(shape(body), shape([a, b, c, d])) >= -1e-9)) return this.publish()
+    this.walls.splice(held.wall, 1)
+    this.refuse(short ? "This wall is too short: drag from one end to the other." : "No wall here: it would cut a body.")
   }
 
   /** By keyboard: arrow keys move a cursor from the position `from`, Enter takes and releases, Q and E turn a block. */
