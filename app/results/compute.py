@@ -133,14 +133,11 @@ def exact(library: Library, shown: Shown) -> Work:
     def work(job: Job) -> Shown:
         replay = shown.replay
         bounding = progress_feed.shared(progress_feed.Bounding, params)
-        try:
-            dataset = load_or_compute(
-                library, job, "exact intervals, widest first", kinds.INTERVALS, params,
-                begun=bounding.restart, watch=bounding.add,
-                widths=replay.high[:, 0] - replay.low[:, 0],
-            )  # fmt: skip
-        finally:
-            bounding.forget()
+        dataset = load_or_compute(
+            library, job, "exact intervals, widest first", kinds.INTERVALS, params,
+            begun=bounding.restart, watch=bounding.add,
+            widths=replay.high[:, 0] - replay.low[:, 0],
+        )  # fmt: skip
         result = Shown(shown.cell, shown.replay, dataset)
         library.keep_in_memory(result)
         return result
@@ -191,6 +188,11 @@ def thrust(library: Library, cell: Cell) -> Callable[[Job], dict[str, Any]]:
 def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
     library.lend_packing(packing)
     if "imported" in packing:
+        if library.stored(kinds.PACKING, packing) is None:
+            raise InputError(
+                "this packing is not on this server: drop its files under Your packing, or choose "
+                "another scene"
+            )
         return
     with in_turn(job, "packing", packing):
         if "scene" in packing:

@@ -142,10 +142,6 @@ class Bounding:
 
     def __init__(self) -> None:
         self.version = 0  # number of changes
-        self.forget()
-
-    def forget(self) -> None:
-        """Drop everything: pages then see the results of the next run."""
         self.low = self.high = np.zeros(0, np.float32)
 
     def restart(self, S: Any) -> None:
