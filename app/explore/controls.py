@@ -54,8 +54,8 @@ def differs(state: AppState) -> str:
 
 
 def _opener(state: AppState) -> str:
-    """The line that opens the options, with the number of disks on screen."""
-    n = None if state.cell is None else state.cell.selection.packing.get("n")
+    """The line that opens the options, with the number of disks requested."""
+    n = None if state.selection is None else state.selection.packing.get("n")
     return MADE if n is None else f"{n} disks\n{MADE}"
 
 
@@ -133,6 +133,7 @@ class Controls:
         state.param.watch(self._command, ["selection", "missing", "replay"])
         state.knowledge.param.watch(self._command, "known")
         self._command()
+        self.work.param.watch(self._refused, "message")
         self.work.computation.param.watch(self._rest, "running")
 
     # From the widgets
@@ -152,8 +153,6 @@ class Controls:
             state.ask(self._selection(), at_once=True)
         except InputError as error:
             self.work.message = str(error)
-        if self.work.message:  # a refused value is removed from its field
-            self._follow()
 
     def _selection(self) -> Selection:
         now, packing = self.state.selection, self.state.selection.packing
@@ -174,6 +173,11 @@ class Controls:
     def _choose(self, event: Any) -> None:
         if not self._following and event.new:
             self.state.choose(series=event.new)
+
+    def _refused(self, event: Any) -> None:
+        """Remove a refused value from its field."""
+        if event.new:
+            self._follow()
 
     # From the state
 
@@ -209,6 +213,7 @@ class Controls:
 
     def _rest(self, *events: Any) -> None:
         state = self.state
-        self.go.visible = state.missing and not self.work.computation.running
+        task = self.work.computation
+        self.go.visible = state.missing and not task.running and not task.message
         if state.missing:
             self.go.label = f"Compute {differs(state)}"

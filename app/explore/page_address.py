@@ -29,7 +29,7 @@ class Address(Scripted):
         super().__init__(**params)
         self._state, self._requests = state, 0
         state.work.reader.param.watch(self._settle, "running")
-        state.param.watch(self._tell, "selection")
+        state.param.watch(self._tell, ["selection", "cell"])
         for part in state.parts:
             part.param.watch(self._tell, [name for name in VIEW if name in part.param])
         self._tell()

@@ -10,8 +10,6 @@ from granforce.study.keys import Parameters
 from ..browser.bundle import Scripted
 from ..state import scene_links
 
-IMPORTED = "imported"  # listed only while such a packing is on screen
-
 
 class SceneList(Scripted):
     """Names of all scenes; choosing one opens it; see scene_list.js."""
@@ -21,14 +19,13 @@ class SceneList(Scripted):
     usual = param.Number(doc="μ of the scene on screen, which is not taken along")
 
     def __init__(self, **params: Any) -> None:
-        titles = [*scene_links.titles(), [IMPORTED, "Your packing", "Explore"]]
-        super().__init__(titles=titles, **params)
+        super().__init__(titles=scene_links.titles(), **params)
         self.follow({})
 
     def follow(self, packing: Parameters) -> None:
         """Show the scene of a packing with these parameters."""
-        if IMPORTED in packing:
-            self.param.update(shown=IMPORTED, usual=packing["mu"])
+        if scene_links.IMPORTED in packing:
+            self.param.update(shown=scene_links.IMPORTED, usual=packing["mu"])
             return
         shown = packing.get("scene", scene_links.MANY)
         self.param.update(shown=shown, usual=EVERY[shown].mu)

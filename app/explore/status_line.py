@@ -80,7 +80,10 @@ def facts(state: AppState) -> Iterator[str]:
     """Facts about the numbers on screen, as HTML."""
     cell, replay = state.cell, state.replay
     if cell is None or replay is None:
-        yield "opening the packing …"
+        if not state.missing:
+            yield "opening the packing …"
+        elif not state.work.computation.running:
+            yield f"<b>Nothing is shown</b>: {state.requested}"
         return
     if state.missing and not state.work.computation.running:
         yield f"<b>Still showing μ = {cell.mu:g}, {cell.series}: the requested results follow</b>"

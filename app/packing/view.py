@@ -225,11 +225,7 @@ def reduction(knowledge: Knowledge, replay: Replay) -> Any:
 def measured(state: AppState, replay: Replay) -> dict[str, Any]:
     """Measured f_n in ⟨f_n⟩ of an opened frame, and its deviation in σ; otherwise {}."""
     measurement = state.measured
-    if (
-        measurement is None
-        or state.selection is None
-        or state.selection.packing != measurement.packing
-    ):
+    if measurement is None or state.packing != measurement.packing:
         return {}
     normal, off = (
         measurement.force[replay.backbone] / replay.force_scale,

@@ -221,6 +221,15 @@ class Library:
             if dataset is not None:
                 kinds.keep_packing(cache, params, dataset_packing(dataset))
 
+    def as_imported(self, selection: Selection) -> Selection:
+        """A Selection with the friction with which its imported packing was stored."""
+        imported = selection.packing.get("imported")
+        for store in self.stores if imported else ():
+            for entry in study.entries(store, kinds.PACKING):
+                if entry.params.get("imported") == imported:
+                    return selection._replace(packing=entry.params)
+        return selection
+
     def expected_steps(self, n: int, mu: float) -> float | None:
         """Compaction steps of n grains, from the stored packing nearest in n, then μ; or None."""
         known = []
@@ -265,11 +274,10 @@ def cell_of(cells: Sequence[Cell], selection: Selection | None) -> Cell | None:
     return next((c for c in cells if selection is not None and c.selection.names(selection)), None)
 
 
-def best_cell(cells: Sequence[Cell], selection: Selection | None = None) -> Cell | None:
-    """The cell of the Selection, or the best one to open; None without cells."""
-    best = cell_of(cells, selection)
-    if best is not None or not cells:
-        return best
+def best_cell(cells: Sequence[Cell]) -> Cell | None:
+    """The best cell to open; None without cells."""
+    if not cells:
+        return None
     names = [cell.series for cell in cells]
     fullest = max(dict.fromkeys(names), key=names.count)
     return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)

@@ -78,7 +78,8 @@ class AppState(param.Parameterized):
         }
         self.param.watch(self._need_loads, "replay")
         self.looks.param.watch(self._need_loads, ["colour", "thickness"])
-        self.work.computation.param.watch(self._bring_back, "dismissed")
+        self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
+        self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
         self.param.watch(self._forget, "cell")
         self.knowledge.param.watch(self._forget, "known")
         self.hand.param.watch(self._forget, "pulls")
@@ -92,12 +93,15 @@ class AppState(param.Parameterized):
 
     def open(self, query: str = "") -> None:
         """Show the selection of a link, computing it if necessary, or a good one to begin with."""
+        selection: Selection | None = None
+        texts: dict[str, str] = {}
+        self.work.message = ""
         try:
             selection, texts = read_link(query)
-            self.work.message = ""
+            if selection is not None:
+                selection.check(LIMITS)
         except InputError as error:
-            selection, texts = None, {}
-            self.work.message = str(error)
+            selection, self.work.message = None, str(error)
         view = read_view(texts, self._viewed)
         new = {name: self._viewed[name].default for name in VIEW}  # what a link omits
         self._look_up(selection, new | view, counted="states" in parse_qs(query.lstrip("?")))
@@ -170,6 +174,9 @@ class AppState(param.Parameterized):
         except InputError as error:
             self.work.message = str(error)
             return
+        self._request(selection, at_once)
+
+    def _request(self, selection: Selection, at_once: bool) -> None:
         # Announced together: a short `missing` would move the page.
         with as_one(self.work, self):
             self.param.update(selection=selection, missing=True)
@@ -185,7 +192,7 @@ class AppState(param.Parameterized):
             matching = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
         else:
             cells = [cell for cell in self.catalogue if cell.series == series]
-            matching = cells and [nearest_cell(cells, self.cell.mu)]
+            matching = cells and [nearest_cell(cells, self.selection.mu)]
         if matching:
             self.comparison.keep(matching[0].selection)
             self.show(matching[0])
@@ -198,12 +205,31 @@ class AppState(param.Parameterized):
         return [c for c in self.catalogue if current is not None and c.series == current.series]
 
     def show(self, cell: Cell) -> None:
-        """Show a cell: at once if it is in memory, otherwise after reading it."""
-        shown = self.library.shown_in_memory(cell)
+        """Show a cell: at once if it is in memory, otherwise after reading it.
+
+        If it cannot be read, its states are computed again.
+        """
+        library = self.library
+        shown = library.shown_in_memory(cell)
+
+        def read(job: Job) -> Shown | None:
+            try:
+                return library.shown(cell)
+            except InputError:
+                library.cells()
+                return None
+
+        def done(shown: Shown | None) -> None:
+            if shown is not None:
+                self._show_and_read_ahead(shown)
+            else:
+                self._list(library.catalogue)
+                self._request(cell.selection, at_once=True)
+
         if shown is not None:
             self._show_and_read_ahead(shown)
         else:
-            self.work.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
+            self.work.reader.start(read, done)
 
     def read_ahead(self) -> None:
         """Read the cells with the nearest μ in advance: they are the likeliest next."""
@@ -220,47 +246,52 @@ class AppState(param.Parameterized):
         """counted: whether exactly this many states are required, not any stored number."""
         library = self.library
 
-        def resolved(cells: list[Cell]) -> Selection | None:
-            return requested if requested is None or counted else with_states(cells, requested)
+        def found(
+            cells: list[Cell], requested: Selection | None
+        ) -> tuple[Selection | None, Cell | None]:
+            if requested is None:
+                return None, best_cell(cells)
+            selection = requested if counted else with_states(cells, requested)
+            return selection, cell_of(cells, selection)
 
-        def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
+        def read(job: Job) -> tuple[Selection | None, Shown | None, str]:
             damage = ""
             while True:
-                cells = library.cells()
-                cell = best_cell(cells, resolved(cells))
+                named = requested and library.as_imported(requested)
+                selection, cell = found(library.cells(), named)
                 try:
-                    return cells, cell and library.shown(cell), damage
+                    return selection, cell and library.shown(cell), damage
                 except InputError as error:
-                    if cell in library.cells():
+                    damage = str(error)
+                    still = cell in library.cells()
+                    if selection is not None:
+                        return selection, None, damage
+                    if still:
                         raise
-                    damage = str(error)  # use the next best
 
-        def done(result: tuple[list[Cell], Shown | None, str]) -> None:
-            cells, shown, damage = result
-            message, selection = damage or self.work.message, resolved(cells)
-            self._list(cells)
+        def done(result: tuple[Selection | None, Shown | None, str]) -> None:
+            selection, shown, damage = result
+            message = damage or self.work.message
+            self._list(library.catalogue)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
-            available = shown is not None and (
-                selection is None or shown.cell.selection.names(selection)
-            )
             # The old view stays until the requested states exist; Cancel returns to it.
-            if shown is not None and (available or self.cell is None):
+            if shown is not None:
                 self._show(shown, view)
-            if selection is not None and not available:
+            elif selection is not None:
+                self._linked = selection, view
                 dear = LIMITS.shared and selection.dear
-                self._ask(selection, at_once=not dear)
-                if dear and self.missing:
+                self._request(selection, at_once=not dear)
+                if dear:
                     self.work.message = (
                         "this link needs a long computation, which a link does not start on this "
                         "server: press Compute"
                     )
             self.work.message = self.work.message or message
 
-        wished = resolved(library.catalogue)
-        at_hand = best_cell(library.catalogue, wished)
-        shown = at_hand and library.shown_in_memory(at_hand)
-        if shown and (wished is None or shown.cell.selection.names(wished)):
-            done((library.catalogue, shown, ""))  # the first picture needs no thread
+        selection, cell = found(library.catalogue, requested)
+        shown = cell and library.shown_in_memory(cell)
+        if shown:
+            done((selection, shown, ""))  # the first picture needs no thread
             self.refresh()
         else:
             self.work.reader.start(read, done)
@@ -274,6 +305,9 @@ class AppState(param.Parameterized):
 
     def _show(self, shown: Shown, view: View | None = None) -> None:
         cell, replay, exact = shown
+        if view is None and self._linked and cell.selection.names(self._linked[0]):
+            view = self._linked[1]
+        self._linked = None
         fresh = self._unseen
         # A walk that was replaced may have reached numbers that the replay does not have.
         if (self.shown is replay and view is None) or self._is_grown(replay):
@@ -371,9 +405,11 @@ class AppState(param.Parameterized):
         }
 
     def _bring_back(self, event: Any) -> None:
-        """Return to the view before a request that was cancelled."""
+        """Return to the view before a request that was cancelled or failed."""
         if event.new and self.missing and self.cell is not None:
+            message = self.work.message
             self.show(self.cell)
+            self.work.message = message
 
     def grow(self, replay: Replay) -> None:
         """Show the Replay of a walk that begins."""
@@ -397,12 +433,32 @@ class AppState(param.Parameterized):
     @property
     def requested(self) -> str:
         """The requested states that are not on screen yet, in words, or an empty string."""
-        if not self.missing or self.cell is None:
+        if not self.missing:
             return ""
         words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
         if self.work.computation.running:
             return f"requested: {words}"
-        return f"of μ = {self.cell.mu:g}; not computed: {words}"
+        shown = f"of μ = {self.cell.mu:g}; " if self.cell else ""
+        return f"{shown}not computed: {words}"
+
+    @property
+    def unsaved(self) -> str:
+        """Why nothing on screen can be saved, or an empty string."""
+        if self.replay is None:
+            return "Nothing is on screen yet."
+        if self.missing:
+            return (
+                f"What is on screen, of μ = {self.cell.mu:g}, is not what was requested: wait for "
+                "the requested networks, or cancel, before saving."
+            )
+        return ""
+
+    @property
+    def packing(self) -> Any:
+        """The parameters of the packing on screen, or None."""
+        if self.growing:
+            return self.work.live.selection.packing
+        return self.cell and self.cell.selection.packing
 
     def compute_exact(self) -> None:
         """Compute the exact intervals of the packing on screen, in the background."""

@@ -8,8 +8,9 @@ from granforce.records import InputError, friction
 
 from ..results.selection import typed
 
-FIRST, MANY, OWN = "groove", "many", "own"
-LARGE = (MANY, "arch", "wall")  # shown by Explore
+FIRST, MANY, OWN, IMPORTED = "groove", "many", "own", "imported"
+BLOCKS = ("arch", "wall")
+LARGE = (MANY, *BLOCKS, IMPORTED)  # shown by Explore
 SMALL = (*(name for name in scenes.SCENES if name != MANY), "ladder", "stones")
 LONGEST = 4000  # characters of a built scene in a link
 
@@ -38,14 +39,17 @@ def request_of(query: str) -> Request:
         mu = friction(typed(given["mu"]))
     except (KeyError, InputError):
         mu = None
-    if "scene" in given and name not in LARGE[1:]:
+    if "scene" in given and name not in BLOCKS:
         others = [pair for pair in pairs if pair[0] != "scene"]
+        if name == IMPORTED:  # which packing is in a link's `packing`
+            others.append(("tab", "upload"))
         query = f"?{urlencode(others)}" if others else ""
     return Request(name, mu, given.get("built", "")[:LONGEST], query)
 
 
 def titles() -> list[list[str]]:
     """[name, title, the page that shows it] of every scene, for the list on the page."""
-    named = [(name, "Learn") for name in SMALL] + [(name, "Explore") for name in LARGE]
-    listed = [[name, scenes.EVERY[name].title, door] for name, door in named]
-    return [*listed, [OWN, "Build your own", "Learn"]]
+    listed = [[name, scenes.EVERY[name].title, "Learn"] for name in SMALL]
+    listed += [[name, scenes.EVERY[name].title, "Explore"] for name in (MANY, *BLOCKS)]
+    own = [OWN, "Build your own", "Learn"], [IMPORTED, "Your packing", "Explore"]
+    return [*listed, *own]

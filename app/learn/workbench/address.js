@@ -26,7 +26,4 @@ export class Address {
   query(given) {
     return new URLSearchParams(Object.entries(given).filter(([, value]) => value !== "" && value !== undefined))
   }
-
-  /** Leave for another page, with the friction if it was chosen by the visitor. */
-  leave(scene, mu) { window.location.assign(`?${this.query({ scene, mu: mu === null ? "" : String(Number(mu.toPrecision(6))) })}`) }
 }

@@ -2,7 +2,7 @@
 
 import { connectionBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
-import { sceneOptions } from "../../browser/scene_options.js"
+import { openScene, sceneOptions } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
 import { Bars } from "../drawing/bars.js"
 import { palette } from "../drawing/palette.js"
@@ -112,7 +112,7 @@ class Workbench {
     this.write("mend", `Set μ = ${hand.enough}`)
     this.part("mend").hidden = !hand.enough
     this.part("says").classList.toggle("bad", body.empty && !body.scene.idle)
-    this.part("undo").disabled = !hand.undos.length
+    this.tellUndo()
   }
 
   // Loading of scenes
@@ -270,7 +270,7 @@ class Workbench {
     else if (what === "pull") hand.pull(given.contact, given.normal, given.tangential)
     else if (what === "carry") this.carry(given.at)
     else if (what === "release" && this.builds) this.builder.release()
-    this.part("undo").disabled = !hand.undos.length
+    this.tellUndo()
     this.soon()
   }
 
@@ -328,9 +328,15 @@ class Workbench {
 
   undo() {
     this.walk.pause()
-    this.hand.undo()
-    this.part("undo").disabled = !this.hand.undos.length
+    if (this.hand.undos.length) this.hand.undo()
+    else if (this.rebuilds) this.builder.undo()
+    this.tellUndo()
   }
+
+  /** Whether Undo returns to the scene before the last change of bodies or walls. */
+  get rebuilds() { return this.builds && this.builder.undos.length > 0 }
+
+  tellUndo() { this.part("undo").disabled = !this.hand.undos.length && !this.rebuilds }
 
   // Controls
 
@@ -372,7 +378,7 @@ class Workbench {
     const { model, view, chosenMu, hand: { mu } } = this
     if (model.large.includes(scene)) {
       clearTimeout(this.resting)
-      return this.address.leave(scene, chosenMu ? mu : null)
+      return openScene(scene, chosenMu ? Number(mu.toPrecision(6)) : null)
     }
     if (!this.banner.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)

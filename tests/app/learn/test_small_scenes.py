@@ -25,6 +25,7 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
         ("?scene=groove", "groove", None),
         ("?scene=elsewhere", "groove", None),
         ("?scene=many", "many", None),
+        ("?scene=imported", "imported", None),
         ("?scene=ladder", "ladder", None),
         ("?mu=0.1&n=30", "many", 0.1),  # links from before there were scenes
         ("?scene=box&mu=steep", "box", None),
@@ -34,6 +35,7 @@ def test_links_name_a_scene(query, scene, mu):
     asked = scene_links.request_of(query)
     assert (asked.scene, asked.mu) == (scene, mu)
     assert "scene" not in asked.query
+    assert ("tab=upload" in asked.query) == (scene == "imported")  # where its files are dropped
 
 
 def test_every_scene_of_the_library_is_on_the_list():

@@ -149,8 +149,8 @@ class View:
 
     def _asked(self, key: str) -> None:
         state, kind = self.state, KINDS[key]
-        if state.replay is None:
-            state.work.message = "Nothing is on screen yet."
+        if state.unsaved:
+            state.work.message = state.unsaved
         elif kind.make is None:
             whole = stem(state.cell.selection)
             name = f"{shown_stem(state) if key in OF_THE_NETWORK else whole}.{key}"

@@ -25,7 +25,8 @@ def panel(state: AppState, tab: str) -> Any:
     """
 
     def make(kind: str) -> None:
-        if state.replay is not None:
+        state.work.message = state.unsaved
+        if not state.unsaved:
             name = f"{shown_stem(state)}_{tab}.{kind}"
             buttons.hand_over_picture(name, caption(state), width.value)
 
