@@ -1,6 +1,5 @@
 """The declared fields of records, and how records describe themselves with them."""
 
-import functools
 import typing
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
@@ -23,7 +22,8 @@ def record(kind: C) -> C:
     kind.__repr__ = _short  # type: ignore[assignment, method-assign]
     if hasattr(kind, "_fields"):
         kind.__eq__, kind.__ne__ = _same, _differ  # type: ignore[assignment, method-assign]
-    texts = {name: fields(kind)[name].text for name in _names(kind) if name in fields(kind)}
+    declared = fields(kind)
+    texts = {name: declared[name].text for name in _names(kind) if name in declared}
     if hasattr(kind, "_fields"):
         for name, text in texts.items():
             getattr(kind, name).__doc__ = text
@@ -45,8 +45,7 @@ def derived(field: Field) -> Callable[[F], F]:
     return declare
 
 
-@functools.cache
-def fields(kind: type) -> dict[str, Field]:
+def fields(kind: Any) -> dict[str, Field]:
     """The declared fields of a record, then its derived ones, by name."""
     hints = typing.get_type_hints(kind, None, {kind.__name__: kind}, include_extras=True)
     found = {name: _declared(getattr(hint, "__metadata__", ())) for name, hint in hints.items()}

@@ -43,7 +43,7 @@ class Field(NamedTuple):
         return self.meaning + components
 
 
-def _whole(dims: str, meaning: str) -> Field:
+def whole(dims: str, meaning: str) -> Field:
     """A quantity of whole numbers: counts, positions and flags."""
     return Field(dims, "", meaning, dtype="int64")
 
@@ -58,8 +58,8 @@ QUANTITIES = {
     "mu": Field("", "", "friction coefficient μ"),
     "pressure": Field("", "force/length", "pressure P0, NaN where not prescribed"),
     "load": Field("grain load_component", "force; force*length", "load F_x, F_y; torque"),
-    "contact_i": _whole("contact", "first grain i of the contact"),
-    "contact_j": _whole("contact", "second grain j of the contact"),
+    "contact_i": whole("contact", "first grain i of the contact"),
+    "contact_j": whole("contact", "second grain j of the contact"),
     "normal": Field("contact axis", "", "unit normal from i to j"),
     "length": Field("contact", LENGTH, "centre distance ℓ"),
     "gap": Field("contact", LENGTH, "gap ℓ − r_i − r_j"),
@@ -69,19 +69,19 @@ QUANTITIES = {
     "friction_ratio": Field("contact", "", "friction coefficient over μ"),
     "forces": Field("contact component", FORCE, "original force network"),
     "corners": Field("corner axis", LENGTH, "corners of all polygons, body by body"),
-    "sides": _whole("grain", "number of corners of the body, 0 for a disk"),
+    "sides": whole("grain", "number of corners of the body, 0 for a disk"),
     "mass": Field("grain", "mass", "masses of the bodies"),
     "inertia": Field("grain", "mass*length**2", "moments of inertia of the bodies"),
     # states of the ensemble: the contact dimension is that of the backbone
-    "backbone": _whole("contact", "position of the contact in the packing")._replace(label=""),
+    "backbone": whole("contact", "position of the contact in the packing")._replace(label=""),
     "states": Field("state contact component", FORCE, "admissible networks"),
     "residual": Field("state", MEAN, "largest unbalance"),
     "violation": Field("state", MEAN, "largest cone violation"),
-    "sweeps": _whole("state", "solver sweeps or iterations spent"),
-    "attempts": _whole("state", "attempts until the state was accepted"),
+    "sweeps": whole("state", "solver sweeps or iterations spent"),
+    "attempts": whole("state", "attempts until the state was accepted"),
     "mean_sweeps": Field("", "", "solver sweeps per state, failures included"),
     "distance_to_centre": Field("state", MEAN, "distance from the centre of the ensemble"),
-    "chain": _whole("state", "chain that the state belongs to"),
+    "chain": whole("state", "chain that the state belongs to"),
     # whether chains mixed: NaN for components that cannot vary
     "r_hat": Field("contact component", "", "split R̂"),
     "bulk_size": Field("contact component", "", "bulk effective sample size"),
@@ -89,11 +89,11 @@ QUANTITIES = {
     "worst_r_hat": Field("", "", "largest split R̂ of any component"),
     "least_bulk_size": Field("", "", "smallest bulk effective sample size"),
     "least_tail_size": Field("", "", "smallest tail effective sample size"),
-    "reached": _whole("", "1 if the chains mixed and reached the requested effective size"),
-    "turns": _whole("", "reflections of the billiard walk"),
-    "refused": _whole("", "paths discarded because of too many reflections"),
-    "dropped": _whole("", "states discarded while the chains warmed up"),
-    "held": _whole("", "coordinates f_n ± f_t/μ that are zero in all of S"),
+    "reached": whole("", "1 if the chains mixed and reached the requested effective size"),
+    "turns": whole("", "reflections of the billiard walk"),
+    "refused": whole("", "paths discarded because of too many reflections"),
+    "dropped": whole("", "states discarded while the chains warmed up"),
+    "held": whole("", "coordinates f_n ± f_t/μ that are zero in all of S"),
     "setup_seconds": Field("", "s", "wall time before the first step"),
     "sampling_seconds": Field("", "s", "wall time of the steps"),
     # a measurement, and the inferred forces
@@ -102,7 +102,7 @@ QUANTITIES = {
         "region stress_component", "force/length", "stress xx, yy, xy by region"
     ),
     "regional_stress_error": Field("region stress_component", "force/length", "its standard error"),
-    "added": _whole("contact", "1 if the contact is not listed in the files"),
+    "added": whole("contact", "1 if the contact is not listed in the files"),
     "measured": Field("contact component", FORCE, "measured forces"),
     "sigma": Field("contact component", FORCE, "standard errors of measured forces"),
     "inferred": Field("contact component", FORCE, "likeliest admissible network"),
@@ -112,11 +112,11 @@ QUANTITIES = {
     "least_normal": Field(
         "contact", FORCE, "least f_n over all networks within 3 σ of the measured"
     ),
-    "suspect": _whole("beyond", "contacts in the packing beyond 3 σ"),
+    "suspect": whole("beyond", "contacts in the packing beyond 3 σ"),
     "chi_square": Field("", "", "χ² of the likeliest network"),
-    "freedom": _whole("", "degrees of freedom of χ²"),
+    "freedom": whole("", "degrees of freedom of χ²"),
     "unmeasured": Field("", MEAN, "standard error with which unmeasured forces count as 0"),
-    "bounded": _whole("", "1 if S is bounded, 0 if only `unmeasured` limits some forces"),
+    "bounded": whole("", "1 if S is bounded, 0 if only `unmeasured` limits some forces"),
     # results from a set of states: bounds seen, measures, cost
     "original": Field("contact component", FORCE, "the packing's own network"),
     "low": Field("contact component", FORCE, "smallest value"),
@@ -128,7 +128,7 @@ QUANTITIES = {
     "correlation_low": Field("", "", "smallest corr(f_n, ΔF_n) of any state"),
     "correlation_high": Field("", "", "largest corr(f_n, ΔF_n) of any state"),
     "interval_gap": Field("contact component side", MEAN, "duality gap of the bounds"),
-    "cluster": _whole("contact", "cluster of undetermined contacts, −1 where determined"),
+    "cluster": whole("contact", "cluster of undetermined contacts, −1 where determined"),
     "position": Field("contact", "", "place of the original f_n in its interval, 0 to 1"),
     # which measurement is most informative
     "part_expected": Field(
@@ -145,14 +145,14 @@ QUANTITIES = {
     "load_violation": Field("contact", MEAN, "cone violation under the largest load at rest"),
     "motion_breach": Field("contact", "", "violation of Coulomb's law by the first motion"),
     "pair_opening": Field("contact", "", "opening of the contact, rms |u| = 1"),
-    "opened": _whole("contact", "contacts that the first motion opens"),
-    "slid": _whole("contact", "contacts that slide in the first motion"),
-    "kept": _whole("contact", "contacts that stick in the first motion"),
-    "loads_at_rest": _whole("contact", "loads that ended at rest"),
-    "loads_moving": _whole("contact", "loads that ended in steady motion"),
-    "loads_undecided": _whole("contact", "loads that ended in unsteady motion"),
-    "flow_steps": _whole("contact", "implicit steps of the flow"),
-    "linear_systems": _whole("contact", "linear systems solved"),
+    "opened": whole("contact", "contacts that the first motion opens"),
+    "slid": whole("contact", "contacts that slide in the first motion"),
+    "kept": whole("contact", "contacts that stick in the first motion"),
+    "loads_at_rest": whole("contact", "loads that ended at rest"),
+    "loads_moving": whole("contact", "loads that ended in steady motion"),
+    "loads_undecided": whole("contact", "loads that ended in unsteady motion"),
+    "flow_steps": whole("contact", "implicit steps of the flow"),
+    "linear_systems": whole("contact", "linear systems solved"),
     "contact_seconds": Field("contact", "s", "wall time of the critical force"),
     "displacement": Field("contact grain axis", "", "first motion u, rms 1; NaN for rattlers"),
     "shell_radius": Field("shell", LENGTH, "middle of the shell"),
@@ -186,33 +186,36 @@ QUANTITIES = {
     "friction_bound": Field(
         "", "", "certified upper bound on the largest shear stress over pressure"
     ),
-    "programs": _whole("", "linear programs solved"),
+    "programs": whole("", "linear programs solved"),
     "max_gap": Field("", MEAN, "largest duality gap"),
     "packing_fraction": Field("", "", "packing fraction φ, rattlers included"),
     "coordination": Field("", "", "mean coordination number z of the backbone"),
-    "dimension": _whole("", "dimension h of the ensemble"),
-    "flat_directions": _whole("", "directions too narrow to be resolved, taken as pinned"),
+    "dimension": whole("", "dimension h of the ensemble"),
+    "flat_directions": whole("", "directions too narrow to be resolved, taken as pinned"),
     "resolution": Field("", MEAN, "width up to which directions are taken as pinned"),
     "force_scale": Field("", FORCE, "mean normal force ⟨f_n⟩"),
     "original_distance": Field("", MEAN, "distance of the original network from the centre"),
     "acceptance": Field("", "", "fraction of attempts that were accepted"),
-    "accepted": _whole("", "number of accepted attempts"),
-    "rejected": _whole("", "attempts that found no equilibrium"),
-    "unconverged": _whole("", "attempts that ran out of iterations"),
-    "skipped": _whole("", "states that needed no relaxation (h = 0)"),
-    "rattlers": _whole("", "grains outside the backbone"),
-    "unloaded_contacts": _whole("", "contacts that cannot carry force"),
-    "tangential_unknowns": _whole("", "tangential unknowns dropped at μ = 0"),
+    "accepted": whole("", "number of accepted attempts"),
+    "rejected": whole("", "attempts that found no equilibrium"),
+    "unconverged": whole("", "attempts that ran out of iterations"),
+    "skipped": whole("", "states that needed no relaxation (h = 0)"),
+    "rattlers": whole("", "grains outside the backbone"),
+    "unloaded_contacts": whole("", "contacts that cannot carry force"),
+    "tangential_unknowns": whole("", "tangential unknowns dropped at μ = 0"),
     "seconds": Field("", "s", "wall time of the computation"),
 }
 
 
 def quantity(name: str, dims: str | None = None, **other: Any) -> Field:
-    """A quantity as the field of a record; there, dims, note, label or unit may be others."""
-    other |= {} if dims is None else {"dims": dims}
-    return QUANTITIES[name]._replace(stored=name, **other)
+    """A quantity as the field of a record; there, dims, note, label or unit may be others.
+
+    With other dims it is not the stored one.
+    """
+    other = {"stored": name} | other if dims is None else {"dims": dims} | other
+    return QUANTITIES[name]._replace(**other)
 
 
-def of_one_contact(name: str, **other: Any) -> Field:
+def of_one_contact(name: str, dims: str = "", **other: Any) -> Field:
     """A quantity of contacts as the field of a record of one of them."""
-    return quantity(name, "", **{"label": name, "each": True, **other})
+    return quantity(name, dims, **{"label": name, "stored": name, "each": True, **other})

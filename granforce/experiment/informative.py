@@ -10,10 +10,10 @@ import numpy as np
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import UniformSample, sample_uniform
-from granforce.fields import record
+from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
-from granforce.quantities import quantity
+from granforce.quantities import Field, quantity
 from granforce.records import InputError, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP, TWINS
@@ -40,6 +40,7 @@ class Informative(NamedTuple):
     ]
 
     @property
+    @derived(Field("contact", "", "fraction by which the mean interval of f_n shortens"))
     def reduction(self) -> Floats:
         """(k,) fraction by which the mean interval shortens with f_n of that contact known."""
         return 1 - self.after / self.before

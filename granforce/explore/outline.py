@@ -16,12 +16,12 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.fields import record
+from granforce.fields import derived, record
 from granforce.forces.contact_problem import cone_costs, forces_of, known_part, make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.quantities import quantity
+from granforce.quantities import MEAN, Field, quantity
 from granforce.records import Cancelled, InputError, float_array, moderate, positive, takes
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask, Progress
@@ -54,6 +54,18 @@ class Outline(NamedTuple):
     def shortfall(self) -> str:
         """Why the outline is less accurate than requested, and what to do; empty if it is not."""
         return "" if self.converged else "the outline is less accurate than requested: see its gap"
+
+    @property
+    @derived(Field("corner direction", MEAN, "corners of both polygons"))
+    def corners(self) -> Floats:
+        """Corners (k + m, 2) of the inner polygon, then of the outer one."""
+        return np.concatenate([self.inner, self.outer])
+
+    @property
+    @derived(Field("corner", "", "inner or outer"))
+    def polygon(self) -> npt.NDArray[Any]:
+        """The polygon (k + m,) of each of the `corners`."""
+        return np.repeat(np.array(["inner", "outer"], object), [len(self.inner), len(self.outer)])
 
 
 class _Support(NamedTuple):

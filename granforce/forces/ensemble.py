@@ -71,7 +71,7 @@ class Ensemble:
     A: Annotated[sparse.csr_matrix, "(rows, unknowns): forces and torque/r by grain, then stress"]
     b: Annotated[Floats, "(rows,) force"]
     force_scale: Annotated[float, quantity("force_scale")]
-    original: Annotated[Floats, quantity("original")]
+    original: Annotated[Floats, quantity("original", label="")]
     frozen: Annotated[
         Integers, "contacts held at their original forces, as positions in packing.contacts"
     ]

@@ -32,7 +32,7 @@ from granforce.motion.flow import Outcome, Push
 from granforce.motion.inertia import grain_velocities, make_step
 from granforce.motion.step import Step, relative_velocities
 from granforce.motion.works import follow, relax
-from granforce.quantities import FORCE, Field, of_one_contact, quantity
+from granforce.quantities import FORCE, Field, of_one_contact
 from granforce.records import (
     InputError,
     Packing,
@@ -116,14 +116,14 @@ class Response(NamedTuple):
 
     contact: Annotated[int, "its number in the packing"]
     force: Annotated[float, Field("", FORCE, "the load")]
-    displacement: Annotated[Floats, quantity("displacement", "grain axis")]
+    displacement: Annotated[Floats, of_one_contact("displacement", "grain axis")]
     rotation: Annotated[Floats, Field("grain", "", "rotation times radius; NaN for rattlers")]
     dilation: Annotated[float, "of the box, ΔL/L per unit of u, 1/length"]
     opening: Annotated[Floats, Field("contact", "", "normal relative displacement")]
     opened: Annotated[Mask, Field("contact", "", "contacts without force")]
     slid: Annotated[Mask, Field("contact", "", "pressed contacts at |f_t| = μ f_n")]
     kept: Annotated[Mask, Field("contact", "", "sticking contacts")]
-    breach: Annotated[float, quantity("motion_breach", "", note="relative to the fastest contact")]
+    breach: Annotated[float, of_one_contact("motion_breach", label="")]
     fastest: Annotated[float, "largest relative displacement at a contact"]
     converged: Annotated[bool, "breach ≤ 0.001"]
 
