@@ -27,7 +27,10 @@ COMPONENTS = ["f_n", "f_t"]
 _FOREIGN = "the result belongs to another ensemble"
 # The word for a unit of force in the name of a column, and its name in attributes.
 UNITS = {"packing": FORCE, "mean": MEAN}
-_WORDS = {unit: word for word, unit in UNITS.items()}
+# Units in the names of columns; others, of lengths and numbers, are not.
+WORDS = {unit: word for word, unit in UNITS.items()} | {
+    unit: unit for unit in ("sigma", "rad", "pressure")
+}
 # Labels of dimensions; those of contacts and grains are their numbers.
 _LABELS = {
     "component": COMPONENTS,
@@ -83,7 +86,10 @@ def to_dataset(
         packing = None
     scalars = _scalars(result, ensemble)
     if unit == "mean":
-        declared, scalars = _in_mean_forces(declared, scalars, ensemble)
+        _check_unit(declared, ensemble)
+        assert ensemble is not None
+        declared = in_mean_forces(declared, ensemble.force_scale)
+        scalars = in_mean_forces(scalars, ensemble.force_scale)
     try:
         dataset = labelled_dataset(declared, packing, contacts)
     except ValueError as error:
@@ -143,29 +149,28 @@ def to_dataframe(
     along each direction. Arguments and errors as for `to_dataset`.
     """
     dataset = to_dataset(result, ensemble, unit=unit)
-    if "contact" in dataset.dims:
-        return contact_table(dataset)
+    if "contact" in dataset.dims or "angle" in dataset.dims:
+        return table(dataset)
     if "corner" in dataset.dims:
         u = dataset["corners"].values
         return pd.DataFrame({"polygon": dataset["polygon"].values, "u1": u[:, 0], "u2": u[:, 1]})
-    if "angle" in dataset.dims:
-        table = dataset.to_dataframe().reset_index()
-        return table.rename(columns=lambda name: column_name(None, name, dataset[name].units))
     return dataset.to_dataframe()
 
 
-def contact_table(dataset: xr.Dataset) -> pd.DataFrame:
-    """The variables of contacts as a table: a row for each contact, or in each state."""
+def table(dataset: xr.Dataset) -> pd.DataFrame:
+    """The variables of contacts, or of angles, with a row for each, or for each in each state."""
+    rows = "contact" if "contact" in dataset.dims else "angle"
     columns: dict[str, xr.DataArray] = {}
     for name, values in dataset.data_vars.items():
-        if "contact" in values.dims and "side" not in values.dims[1:]:
+        if rows in values.dims and "side" not in values.dims[1:]:
             columns |= _columns(str(name), values)
     order = [name for name in _RUNNING if any(name in values.dims for values in columns.values())]
-    table = xr.Dataset(columns).to_dataframe([*order, "contact"]).reset_index()
-    named = {name: column_name(None, name, _word(dataset[name])) for name in order}
-    first = [*named.values(), "contact", "i", "j", "x", "y"]
-    table = table.rename(columns=named)
-    return table[[*first, *(name for name in columns if name not in first)]]
+    frame = xr.Dataset(columns).to_dataframe([*order, rows]).reset_index()
+    named = {name: column_name(None, name, _word(dataset[name])) for name in (*order, rows)}
+    labels = ("i", "j", "x", "y") if rows == "contact" else ()
+    first = [*named.values(), *labels]
+    frame = frame.rename(columns=named)
+    return frame[[*first, *(name for name in columns if name not in first)]]
 
 
 def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
@@ -180,9 +185,37 @@ def _columns(name: str, values: xr.DataArray) -> dict[str, xr.DataArray]:
 
 
 def _word(values: xr.DataArray) -> str | None:
-    """The unit in the name of a column, of forces and of deviations."""
-    unit = values.attrs.get("units", "")
-    return "sigma" if unit == "sigma" else _WORDS.get(unit)
+    """The unit in the name of a column."""
+    return WORDS.get(values.attrs.get("units", ""))
+
+
+def from_store(kind: type, stored: xr.Dataset, *labels: str) -> Declared:
+    """Fields of a record in its stored dataset, by their labels, by default all that are there."""
+    declared: Declared = {}
+    for name, field in fields(kind).items():
+        label = _label(name, field)
+        if label and field.stored in stored and label in (labels or (label,)):
+            field = field._replace(dims="contact") if field.each else field
+            declared[label] = field, stored[field.stored].values
+    return declared
+
+
+def in_mean_forces(declared: Declared, scale: float) -> Declared:
+    """The same with all forces divided by ⟨f_n⟩, which is `scale`."""
+    return declared | {
+        name: (field._replace(unit=field.unit.replace(FORCE, MEAN)), values / scale)
+        for name, (field, values) in declared.items()
+        if _is_force(field)
+    }
+
+
+def _is_force(field: Field) -> bool:
+    return field.unit.split(";")[0] == FORCE
+
+
+def _label(name: str, field: Field) -> str:
+    """The name of a field in datasets and tables, by default of arrays only; empty: not there."""
+    return field.label if field.label is not None else name if field.dims else ""
 
 
 def _dimensions(field: Field) -> list[str]:
@@ -205,7 +238,7 @@ def _declared(result: Any, ensemble: Ensemble | None) -> Declared:
         return _several(result)
     declared: Declared = {}
     for name, field in fields(type(result)).items():
-        label = field.label if field.label is not None else name if field.dims else ""
+        label = _label(name, field)
         value = getattr(result, name, None) if label else None  # no mean without draws
         if value is not None:
             declared[label] = (field, value)
@@ -256,28 +289,15 @@ def _scalars(result: Any, ensemble: Ensemble | None) -> Declared:
     return scalars
 
 
-def _in_mean_forces(
-    declared: Declared, scalars: Declared, ensemble: Ensemble | None
-) -> tuple[Declared, Declared]:
-    """The same with all forces divided by ⟨f_n⟩; InputError without an ensemble or forces."""
+def _check_unit(declared: Declared, ensemble: Any) -> None:
+    """InputError for ⟨f_n⟩ as the unit without an ensemble, or without forces."""
     if not isinstance(ensemble, Ensemble):
         raise InputError('unit="mean" needs S as the second argument: (result, S, unit="mean")')
-    if not any(field.unit.split(";")[0] == FORCE for field, _ in declared.values()):
+    if not any(_is_force(field) for field, _ in declared.values()):
         raise InputError(
             'unit="mean" changes nothing here, as no variable is known to be a force; leave it '
             "out (a force divided by S.force_scale is in units of ⟨f_n⟩)"
         )
-
-    scale = ensemble.force_scale
-
-    def divided(variables: Declared) -> Declared:
-        return variables | {
-            name: (field._replace(unit=field.unit.replace(FORCE, MEAN)), value / scale)
-            for name, (field, value) in variables.items()
-            if field.unit.split(";")[0] == FORCE
-        }
-
-    return divided(declared), divided(scalars)
 
 
 def _numbers(result: Any, ensemble: Ensemble) -> Integers:

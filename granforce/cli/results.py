@@ -321,13 +321,3 @@ _WORK = ("turns", "refused", "dropped", "held")
 def without_work(lines: Mapping[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
     """The lines of a report; those on the samplers' work only for --json."""
     return {name: v for name, v in lines.items() if arguments.json or name not in _WORK}
-
-
-def contact_labels(
-    arguments: argparse.Namespace, parameters: Parameters, dataset: xr.Dataset
-) -> dict[str, Any]:
-    """Columns contact, i, j, x and y of a result per contact."""
-    packing, _ = get_packing(arguments.store, parameters["packing"])
-    numbers = dataset["backbone"].values
-    contacts, at = packing.contacts.picked(numbers), packing.contact_points[numbers]
-    return {"contact": numbers, "i": contacts.i, "j": contacts.j, "x": at[:, 0], "y": at[:, 1]}

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from granforce.cli.report_lines import CRITICAL, FEW
 from granforce.cli.results import (
     StoredResult,
     conditions,
-    contact_labels,
     different,
     extension,
     extents,
@@ -23,15 +21,17 @@ from granforce.cli.results import (
     stored_result,
     unit,
 )
-from granforce.cli.tables import write_columns
-from granforce.explore.intervals import uncertified
-from granforce.explore.stress_outline import stress_inside
+from granforce.cli.tables import columns, of_contacts, write_table
+from granforce.explore.intervals import Intervals, LimitLoads, uncertified
+from granforce.explore.stress_outline import StressOutline, stress_inside
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
+from granforce.labelled import from_store, labelled_dataset
 from granforce.motion import rest as motion
 from granforce.packing import importers
 from granforce.perturb import grain_loads
-from granforce.perturb.critical_force import COUNTS
+from granforce.perturb.critical_force import COUNTS, CriticalForce
+from granforce.quantities import quantity
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.system.terminal import print_notes, print_report, report_after
@@ -39,10 +39,10 @@ from granforce.system.terminal import print_notes, print_report, report_after
 LOADS = COUNTS[:3]  # by outcome; then comes the work done
 
 
-def listed(columns: Mapping[str, Any]) -> dict[str, list[Any]]:
+def listed(dataset: xr.Dataset) -> dict[str, list[Any]]:
     """Columns of a result per contact for the report, which lists at most FEW contacts."""
-    few = len(columns["contact"]) <= FEW
-    return {name: values.tolist() for name, values in columns.items()} if few else {}
+    few = dataset.sizes["contact"] <= FEW
+    return {name: values.tolist() for name, values in columns(dataset).items()} if few else {}
 
 
 def solved(dataset: xr.Dataset) -> dict[str, int]:
@@ -69,9 +69,9 @@ def perturb(arguments: argparse.Namespace) -> None:
         "mean_critical_force": dataset["critical_force"].item() * scale,
         "mean_limit_load": float(dataset["limit_load"].mean()),
     }
-    columns = contact_labels(arguments, parameters, dataset)
-    columns |= forces.named({name: dataset[name].values for name in CRITICAL})
-    few, (inner, outer) = listed(columns), json.loads(dataset.attrs["fit_range"])
+    declared = from_store(CriticalForce, dataset, *CRITICAL)
+    few = listed(of_contacts(arguments, parameters, dataset, declared))
+    inner, outer = json.loads(dataset.attrs["fit_range"])
     if not few:
         reported["critical_force_deciles"] = np.quantile(load, np.linspace(0, 1, 11))
     lines = {
@@ -88,7 +88,8 @@ def perturb(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, few):
         if arguments.out is not None:
             names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
-            write_columns(arguments.out, columns | {name: dataset[name].values for name in names})
+            declared |= {name: (quantity(name), dataset[name].values) for name in names}
+            write_table(arguments.out, of_contacts(arguments, parameters, dataset, declared))
     if undecided := lines["loads_undecided"]:
         print_notes([f"{undecided} loads ended in unsteady motion: F_crit may be larger"])
 
@@ -132,21 +133,13 @@ def intervals(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    bounds = {
-        f"{part}_{side}": dataset[side].values[:, k]
-        for side in ("low", "high")
-        for k, part in enumerate(("f_n", "f_t"))
-    }
-    columns = contact_labels(arguments, parameters, dataset) | forces.named(bounds)
-    columns |= {"cluster": cluster}
-    certificate = xr.Dataset(
-        {"gap": dataset["interval_gap"].variable},
-        {"side": ["low", "high"]},
-        {"max_gap": dataset["max_gap"].item(), "converged": int(certified.all())},
+    declared = from_store(Intervals, dataset) | {"cluster": (quantity("cluster"), cluster)}
+    bounds = of_contacts(arguments, parameters, dataset, declared).assign_attrs(
+        max_gap=dataset["max_gap"].item(), converged=int(certified.all())
     )
-    with report_after(lines, arguments.json, listed(columns)):
+    with report_after(lines, arguments.json, listed(bounds)):
         if arguments.out is not None:
-            write_columns(arguments.out, columns, certificate)
+            write_table(arguments.out, bounds)
     if len(left):
         print_notes([uncertified(left)])
 
@@ -183,10 +176,11 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
-    columns = contact_labels(arguments, parameters, dataset) | forces.named({"limit_load": load})
-    with report_after(lines, arguments.json, listed(columns)):
+    declared = from_store(LimitLoads, dataset, "limit_load")
+    loads = of_contacts(arguments, parameters, dataset, declared)
+    with report_after(lines, arguments.json, listed(loads)):
         if arguments.out is not None:
-            write_columns(arguments.out, columns)
+            write_table(arguments.out, loads)
     if len(left):
         print_notes([uncertified(left)])
 
@@ -250,5 +244,4 @@ def stress(arguments: argparse.Namespace) -> None:
     }
     with report_after(lines, arguments.json):
         if arguments.out is not None:
-            names = {"angle [rad]": "stress_angle", "largest [pressure]": "stress_support"}
-            write_columns(arguments.out, {k: dataset[v].values for k, v in names.items()})
+            write_table(arguments.out, labelled_dataset(from_store(StressOutline, dataset)))

@@ -10,14 +10,19 @@ from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.cli.report_lines import MIXING
 from granforce.cli.results import (
     conditions,
-    contact_labels,
     sample_notes,
     stored_result,
     unit,
     without_work,
 )
-from granforce.cli.tables import write_columns
+from granforce.cli.tables import columns, of_contacts, write_table
+from granforce.experiment.carrying import Carrying
+from granforce.experiment.infer import Inference
+from granforce.experiment.informative import Informative
 from granforce.experiment.measurements import read_measurement
+from granforce.fields import fields
+from granforce.labelled import from_store
+from granforce.quantities import FORCE, whole
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.system.terminal import print_notes, report_after
@@ -39,19 +44,21 @@ def informative(arguments: argparse.Namespace) -> None:
     now, after = dataset["mean_before"].item(), dataset["mean_after"].values
     forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
     twins = [[int(c) for c in others] for others in json.loads(dataset.attrs["twins"])]
-    columns = contact_labels(arguments, parameters, dataset) | {
-        "expected_reduction": dataset["part_expected"].values,
-        "reduction": 1 - after / now,
-        **forces.named({"mean_interval_after": scale * after}),
-        "number_of_twins": np.array([len(others) for others in twins]),
-    }
+    declared = from_store(Informative, dataset, "expected_reduction")
+    of_one = fields(Informative)
+    declared["reduction"] = of_one["reduction"], 1 - after / now
+    declared["mean_interval_after"] = of_one["after"]._replace(unit=FORCE), scale * after
+    count = np.array([len(others) for others in twins], dtype=int)
+    declared["number_of_twins"] = whole("contact", "contacts that give the same"), count
+    table = of_contacts(arguments, parameters, dataset, declared)
     lines = {"entry": entry, **forces.reported({"mean_interval_now": scale * now}), **ends}
-    ranked = {name: values.tolist() for name, values in columns.items()} | {"twins": twins}
+    ranked = {name: values.tolist() for name, values in columns(table).items()}
+    ranked["twins"] = twins
     del ranked["number_of_twins"]
     worded = [" ".join(map(str, others)) or "none" for others in twins]
     with report_after(lines, arguments.json, ranked, twins=worded):
         if arguments.out is not None:
-            write_columns(arguments.out, columns)
+            write_table(arguments.out, table)
 
 
 def infer(arguments: argparse.Namespace) -> int | None:
@@ -97,17 +104,12 @@ def infer(arguments: argparse.Namespace) -> int | None:
     }
     if "unmeasured" in dataset:  # entries of earlier versions lack it
         lines["unmeasured_spread"] = dataset["unmeasured"].item()
-    columns = contact_labels(arguments, parameters, dataset)
-    for k, part in enumerate(("f_n", "f_t")):
-        columns |= forces.named({part: dataset["inferred"].values[:, k]})
-        columns |= {f"{part}_deviation [sigma]": dataset["deviation"].values[:, k]}
     if arguments.certain:
         least = dataset["least_normal"].values
         certain = np.flatnonzero(least > CARRYING * scale)
         order = certain[np.argsort(-least[certain], kind="stable")]
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
-        lines |= {"carry_for_certain": columns["contact"][order].tolist()}
-        columns |= forces.named({"f_n_least": least})
+        lines |= {"carry_for_certain": dataset["backbone"].values[order].tolist()}
     if states and "bounded" in dataset and not dataset["bounded"].item():
         note = (
             "S is unbounded: error bars of forces that the measurements do not bound depend on "
@@ -119,12 +121,10 @@ def infer(arguments: argparse.Namespace) -> int | None:
         lines |= {"states": dataset.sizes["state"]}
         lines |= forces.reported({"mean_standard_error": error.mean()})
         lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
-        for k, part in enumerate(("f_n", "f_t")):
-            expected = dataset["expected"].values[:, k]
-            columns |= forces.named({f"{part}_mean": expected, f"{part}_error": error[:, k]})
     with report_after(without_work(lines | ends, arguments), arguments.json):
         if arguments.out is not None:
-            write_columns(arguments.out, columns)
+            declared = from_store(Inference, dataset) | from_store(Carrying, dataset)
+            write_table(arguments.out, of_contacts(arguments, parameters, dataset, declared))
     if states and not arguments.again:  # those draws are independent
         print_notes(sample_notes(dataset))
     return None

@@ -11,7 +11,6 @@ from granforce.cli.report_lines import MIXING
 from granforce.cli.results import (
     check_outputs,
     conditions,
-    contact_labels,
     different,
     extension,
     extents,
@@ -22,9 +21,11 @@ from granforce.cli.results import (
     walked,
     without_work,
 )
-from granforce.cli.tables import write_columns, write_csv, write_states
+from granforce.cli.tables import of_contacts, write_csv, write_states, write_table
 from granforce.explore.random_walk import UNBOUNDED_WALK
 from granforce.explore.volume import inaccurate
+from granforce.labelled import Declared
+from granforce.quantities import quantity
 from granforce.records import InputError, whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -149,9 +150,11 @@ def measure(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json):
         if arguments.out is not None:
             sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
-            columns = {name: dataset[source].values[:, 0] for name, source in sources.items()}
-            labels = contact_labels(arguments, parameters, dataset)
-            write_columns(arguments.out, labels | forces.named(columns))
+            declared: Declared = {
+                name: (quantity(source, "contact"), dataset[source].values[:, 0])
+                for name, source in sources.items()
+            }
+            write_table(arguments.out, of_contacts(arguments, parameters, dataset, declared))
 
 
 def scan(arguments: argparse.Namespace) -> int:
