@@ -27,7 +27,7 @@ from granforce.records import Contacts, InputError, Packing, make_contacts, make
 from granforce.study import entries, keys
 from granforce.study.keys import canonical
 from granforce.study.schema import VARIABLES, dataset_packing, labelled, packing_dataset
-from granforce.study.store import default_path, open_store
+from granforce.study.store import Verdict, default_path, open_store
 
 PARAMS = {"mu": 0.1, "grains": 400, "seed": 3}
 
@@ -187,7 +187,7 @@ def test_walk_round_trip_and_labels(store):
     assert attrs["numpy_version"] == np.__version__ and attrs["zarr_version"] == zarr.__version__
     assert {"granforce_version", "numba_version", "xarray_version", "created"} <= attrs.keys()
     assert store.load("walk", PARAMS, version="a2") is None
-    assert store.verify() == [(name, True, "")]
+    assert store.verify() == [Verdict(name, True, "")]
 
 
 def test_states_can_be_stored_with_fewer_bits(store):
@@ -196,7 +196,7 @@ def test_states_can_be_stored_with_fewer_bits(store):
     loaded = store.load("walk", PARAMS, version=1)
     assert loaded["states"].dtype == np.float32 and loaded["residual"].dtype == np.float64
     np.testing.assert_array_equal(loaded["states"], saved["states"].astype(np.float32))
-    assert store.verify() == [(name, True, "")]
+    assert store.verify() == [Verdict(name, True, "")]
 
 
 def test_checksum_is_that_of_the_result(tmp_path):
@@ -429,7 +429,7 @@ def test_a_file_where_an_entry_belongs_is_told_at_once_and_left(store, put):
     ):
         with pytest.raises(InputError, match=f"{name} is a file where an entry"):
             use()
-    assert store.verify() == [(name, False, "it is a file, not a folder")]
+    assert store.verify() == [Verdict(name, False, "it is a file, not a folder")]
     with pytest.warns(UserWarning, match="metadata"):
         assert store.find("walk") == []
     now = (store.path / name).lstat()
@@ -510,7 +510,7 @@ def test_damage_is_reported_and_replaced(store, damage):
     saved = walk_dataset().assign_attrs(note="first note")
     name = store.save("walk", PARAMS, saved, version=1)
     before = (store.path / name / "zarr.json").read_bytes()
-    assert store.verify() == [(name, True, "")]
+    assert store.verify() == [Verdict(name, True, "")]
     damage(store.path / name)
     with pytest.warns(UserWarning, match=f"{name}.*damaged"):
         assert store.load("walk", PARAMS, version=1) is None

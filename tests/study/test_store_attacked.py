@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from granforce.study.schema import labelled
-from granforce.study.store import open_store
+from granforce.study.store import Verdict, open_store
 
 PARAMS = {"mu": 0.1, "grains": 400, "seed": 3}
 
@@ -65,6 +65,6 @@ def test_a_clock_that_goes_backwards_takes_nothing_from_writers(tmp_path):
         os.utime(made, (time.time() + 1e6,) * 2)
     assert store.clean() == 0
     name = store.save("walk", PARAMS, dataset(), version=1)
-    assert store.verify() == [(name, True, "")]
+    assert store.verify() == [Verdict(name, True, "")]
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), dataset())
     assert ours.is_dir() and elsewhere.is_dir()
