@@ -66,14 +66,15 @@ def role(name: str, content: bytes) -> str:
         if b"ITEM: ENTRIES" in content:
             return "contacts"
         raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
-    columns = _columns(content)
+    columns, measured = _columns(content), _photoelastic(content)
+    if measured and "frame" in columns:
+        return measured
     if {"body", "x", "y"} <= columns or content.lstrip()[:1] == b"{":
         return "bodies"
     if {"x", "y", "r"} <= columns:
         return "grains"
     if {"i", "j"} <= columns:
         return "joined"
-    measured = _photoelastic(content)
     if measured:
         return measured
     raise InputError(
@@ -128,6 +129,10 @@ def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMIT
     """
     for name, content in new:
         part = role(name, content)
+        if part == "grains" and "adjacency" in files and _photoelastic(content):
+            part = "positions"
+        if part == "adjacency" and "grains" in files and _photoelastic(files["grains"][1]):
+            files = {"positions": files["grains"]}
         files = {k: v for k, v in files.items() if family([k]) == family([part])}
         files[part] = (name, content)
     size = sum(len(content) for _, content in files.values())

@@ -37,6 +37,34 @@ def test_files_are_known_by_their_numbers():
             uploads.role("p.txt", content)
 
 
+HEADERS = (
+    (b"", b"frame,i,j,ft,fn\n"),
+    (b"frame,id,x,y,r,flag\n", b""),
+    (b"frame,id,x,y,r,flag\n", b"frame,i,j,ft,fn\n"),
+    (b"n,id,x,y,r,flag\n", b""),
+)
+
+
+@pytest.mark.parametrize("headers", HEADERS)
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_header_line_does_not_turn_a_frame_into_a_table(headers, order):
+    """Whichever file comes first: names such as x, y, r and i, j are also those of tables."""
+    new, _ = files()
+    named = [(name, head + content) for (name, content), head in zip(new, headers, strict=True)]
+    given = {}
+    for one in named[::order]:
+        given = uploads.added(given, [one])
+    assert set(given) == {"positions", "adjacency"} and not uploads.missing(given)
+
+
+def test_what_is_still_to_be_dropped_says_as_what_the_others_were_read(state):
+    view = dropped(state, files()[0][1:])
+    assert view.waiting.title == (
+        "adjacency.txt was read as the adjacency list with the forces. Now drop the positions of "
+        "the disks."
+    )
+
+
 def dropped(state, new):
     view = View(state)
     drop(view.dropper, new)

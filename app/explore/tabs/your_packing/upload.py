@@ -130,7 +130,11 @@ class View:
             return
         self._ask()
         absent = [uploads.WORDS[part] for part in uploads.missing(self.files)]
-        self._wait(f"Now drop the {' and the '.join(absent)}." if absent else "")
+        taken = "; ".join(
+            f"{name} was read as the {uploads.WORDS[part]}"
+            for part, (name, _) in self.files.items()
+        )
+        self._wait(f"{taken}. Now drop the {' and the '.join(absent)}." if absent else "")
         if not absent:
             self._read()
 
