@@ -29,6 +29,8 @@ class Replay(NamedTuple):
     bodies: int  # geometry.bodies
     inviting: int  # row of links suggested for dragging, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
+    contact_normals: Floats  # (N_c, 2) n, from grain i to j
+    contact_points: Floats  # (N_c, 2) at their image in the cell, length
     friction: Floats  # (N_c,) friction coefficients
     force_scale: float  # ⟨f_n⟩, force
     given: bool  # whether the original network came with the packing; otherwise it was computed
@@ -141,6 +143,8 @@ def _replay(
         bodies=geometry.bodies(packing),
         inviting=geometry.inviting(links, frames[0, :, 0], window),
         backbone=backbone,
+        contact_normals=packing.contacts.normal[backbone],
+        contact_points=packing.contact_points[backbone],
         friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
         force_scale=scale,
         given=packing.info.get("forces") != "found",

@@ -592,6 +592,19 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     place = column["contact"].astype(int)
     np.testing.assert_array_equal(column["i"], packing.contacts.i[place])
     np.testing.assert_array_equal(column["j"], packing.contacts.j[place])
+    for name, values in (("n", packing.contacts.normal), ("", packing.contact_points)):
+        for k, axis in enumerate("xy"):
+            written = column[f"{name}_{axis}" if name else axis]
+            np.testing.assert_allclose(written, values[place, k], rtol=1e-8, atol=1e-8)
+    assert "wall" not in column
+
+
+def test_the_table_of_contacts_says_which_j_are_walls():
+    packing = gf.scene("box")
+    S = gf.ensemble(packing)
+    columns = files.contacts(first_replay(S, 1), None, 0)
+    np.testing.assert_array_equal(columns["wall"], packing.contacts.j[S.index] >= 2)
+    assert columns["wall"].any() and "wall" in files.COLUMNS
 
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])
@@ -994,6 +1007,7 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
     assert b"bk-" in page and b"ofAnotherPage" not in page
+    assert not re.search(rb"<script[^>]* src=|<link [^>]*href=", page)  # files of the server
 
 
 def test_a_page_as_a_file_opens_at_the_network_on_screen(state, monkeypatch):

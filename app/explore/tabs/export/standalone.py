@@ -113,7 +113,11 @@ def html(
     left = len(replay.normal) - len(thinned_replay.normal)
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
-        bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+        # Not render(), which also names files of all of Panel's models.
+        bokeh="".join(
+            f"<script>{text}</script>"
+            for text in Resources(mode="inline", components=["bokeh"]).js_raw
+        ),
         words=explanation.summary_html(replay) + explanation.more(replay),
         plots="".join(plots),
         script=script,
