@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from granforce.measures import statistics
 from granforce.paper import tables
 from granforce.paper.claims.groups import outside
@@ -56,20 +58,19 @@ def maxima() -> list[dict[str, Any]]:
     ]
 
 
-def rows(*parts: str) -> list[dict[str, Any]]:
+def rows(*parts: str) -> pd.DataFrame:
     """Rows of parts of the study at its default number of disks; empty without a study."""
     table = study()
-    return [] if table is None else table.part(*parts, n=table.plan["n"])
+    return pd.DataFrame() if table is None else table.part(*parts, n=table.plan["n"])
 
 
-def in_force_space(part: str) -> list[dict[str, Any]]:
+def in_force_space(part: str) -> pd.DataFrame:
     """Rows of a part, without the μ at which its states exceed S by more than its extent.
 
     Sweeps that end early leave such networks, whose spread is not indeterminacy.
     """
-    table = study()
-    beyond = [] if table is None else outside(table, part)
-    return [row for row in rows(part) if row["mu"] not in beyond]
+    table, some = study(), rows(part)
+    return some if table is None else some[~some["mu"].isin(outside(table, part))]
 
 
 def against_friction(measure: str) -> list[tuple[float, float]]:

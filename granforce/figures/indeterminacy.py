@@ -8,13 +8,15 @@ from typing import Any
 
 import holoviews as hv
 import numpy as np
+import pandas as pd
 
 from granforce.figures import style
 from granforce.measures import statistics
+from granforce.measures.statistics import Table
 from granforce.records import InputError, brief, real
 from granforce.study.cells import scan_rows
 from granforce.study.store import Store
-from granforce.types import Floats, Rows
+from granforce.types import Floats
 
 _MEASURES = (
     *(("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)),
@@ -23,10 +25,10 @@ _MEASURES = (
 
 
 def indeterminacy(
-    rows: Rows | Store,
+    rows: Table | Store,
     *,
-    compare: Mapping[str, Rows] | None = None,
-    outside: Rows = (),
+    compare: Mapping[str, Table] | None = None,
+    outside: Table = (),
     backend: str = "bokeh",
 ) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
@@ -77,25 +79,23 @@ def indeterminacy(
     return style.page(frames, backend)
 
 
-def _checked(rows: Any) -> Rows:
-    """The rows as dicts; InputError with what to give for paths and other values."""
+def _checked(rows: Any) -> pd.DataFrame:
+    """The rows as a pandas table; InputError with what to give for paths and other values."""
     give = 'dicts, a pandas table, or the store of a scan: gf.open_store("scan.zarr")'
     if isinstance(rows, (str, Path)):
         raise InputError(f"rows must be {give}; got {brief(str(rows))}")
-    if hasattr(rows, "iterrows"):
-        rows = rows.to_dict("records")
     try:
-        rows = list(rows)
-    except TypeError:
+        table = pd.DataFrame(rows if isinstance(rows, pd.DataFrame) else list(rows))
+    except (TypeError, ValueError):
         raise InputError(f"rows must be {give}; got {brief(rows)}") from None
-    if not all(isinstance(row, Mapping) for row in rows):
+    if not all(isinstance(name, str) for name in table):
         raise InputError(f"rows must be {give}")
-    for row in rows:
-        real(row.get("mu", np.nan), "mu")
-    return rows
+    for mu in table.get("mu", ()):
+        real(mu, "mu")
+    return table
 
 
-def _crosses(rows: Rows, backend: str, *, logarithmic: bool = False) -> list[Any]:
+def _crosses(rows: Table, backend: str, *, logarithmic: bool = False) -> list[Any]:
     """Means of the measures of states outside of S."""
     points = [
         (mu, mean)
@@ -180,9 +180,9 @@ def _densities(
 
 
 def correlations(
-    rows: Rows,
+    rows: Table,
     *,
-    compare: Mapping[str, Rows] | None = None,
+    compare: Mapping[str, Table] | None = None,
     chance: Mapping[float, float] | None = None,
     walk: str = "walk",
     backend: str = "bokeh",

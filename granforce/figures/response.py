@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import holoviews as hv
-import numpy as np
+import pandas as pd
 
 from granforce.figures import style
 from granforce.measures import statistics
-from granforce.types import Rows
+from granforce.measures.statistics import Table
 
 
-def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> hv.Layout:
+def perturbation(rows: Table, *, limit: bool = False, backend: str = "bokeh") -> hv.Layout:
     """Figure 2: ⟨F_crit⟩/⟨f_n⟩ and the decay exponent α against η2, joined in order of μ.
 
     rows: dicts with mu, eta2, critical_force (mean over contacts, in ⟨f_n⟩) and decay_exponent, one
@@ -31,7 +31,7 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
         (forces, title, label),
         (exponents, "Decay of displacements", "α of |u| ~ r^−α"),
     ]
-    looks = style.looks(sorted({row["mu"] for row in rows}))
+    looks = style.looks(sorted(pd.DataFrame(rows)["mu"].unique()))
     frames = []
     for names, title, label in panels:
         drawn: list[Any] = []
@@ -42,9 +42,9 @@ def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> 
     return style.page(frames, backend, columns=2)
 
 
-def _points(rows: Rows, name: str) -> list[tuple[float, ...]]:
+def _points(rows: Table, name: str) -> list[tuple[float, ...]]:
     """[(μ, η2, value, standard error of η2, standard error of value)], means over packings."""
-    rows = [row for row in rows if np.isfinite(row.get(name, np.nan))]
+    rows = pd.DataFrame(rows).dropna(subset=[name])
     across, up = statistics.means(rows, "eta2"), statistics.means(rows, name)
     return [(mu, x, y, dx, dy) for (mu, x, dx), (_, y, dy) in zip(across, up, strict=True)]
 

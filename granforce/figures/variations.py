@@ -7,17 +7,18 @@ from typing import Any
 
 import holoviews as hv
 import numpy as np
+import pandas as pd
 
 from granforce.figures import style
 from granforce.figures.style import Points
 from granforce.measures import statistics
-from granforce.types import Rows
+from granforce.measures.statistics import Table
 
 _DISTANCES = (("original_ratio", "original"), ("walk_ratio", "nearest-network walk"))
 _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
 
 
-def samplers(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
+def samplers(groups: Mapping[str, Table], *, backend: str = "bokeh") -> hv.Layout:
     """η1, η2 and 0.15 η3 against μ, one frame each, for states from several samplers.
 
     groups: {name: rows}, dicts with mu and any of eta1, eta2, eta3.
@@ -26,7 +27,7 @@ def samplers(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout
     return _frames(sources, backend, _MEASURES, "right", columns=3)
 
 
-def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
+def effort(groups: Mapping[str, Table], *, backend: str = "bokeh") -> hv.Layout:
     """Acceptance of attempts and sweeps per state against μ, for walks by sweeps alone.
 
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
@@ -36,21 +37,21 @@ def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
-def sizes(rows: Rows, *, exact: Rows = (), backend: str = "bokeh") -> hv.Layout:
+def sizes(rows: Table, *, exact: Table = (), backend: str = "bokeh") -> hv.Layout:
     """η1, η2 and 0.15 η3 against the number of disks, one frame for each μ.
 
     rows: dicts with n, mu, eta1, eta2, eta3; exact: with n, mu and the eta3 of exact intervals.
     """
     style.ready(backend)
-    frames, frictions = [], sorted({row["mu"] for row in rows})
+    rows, exact = pd.DataFrame(rows), pd.DataFrame(exact, columns=["n", "mu", "eta3"])
+    frames, frictions = [], sorted(rows["mu"].unique())
     for mu in frictions:
-        chosen = [row for row in rows if row["mu"] == mu]
+        chosen, of_exact = rows[rows["mu"] == mu], exact[exact["mu"] == mu]
         series = [
             (statistics.means(chosen, name, "n", factor), label, style.COLOURS[k], "solid", k)
             for k, (name, label, factor) in enumerate(_MEASURES)
         ]
-        of_exact = [row for row in exact if row["mu"] == mu]
-        if of_exact:
+        if len(of_exact):
             points = statistics.means(of_exact, "eta3", "n", 0.15)
             series.append((points, "0.15 η3, exact", style.COLOURS[2], "dashed", 2))
         words: dict[str, Any] = {"title": f"μ = {mu:g}", "x": "N", "y": "η"}
@@ -59,7 +60,7 @@ def sizes(rows: Rows, *, exact: Rows = (), backend: str = "bokeh") -> hv.Layout:
     return style.page(frames, backend, columns=2)
 
 
-def opened(rows: Rows, packed: Rows, *, backend: str = "bokeh") -> hv.Layout:
+def opened(rows: Table, packed: Table, *, backend: str = "bokeh") -> hv.Layout:
     """η2 and 0.15 η3 of frictionless packings whose cones are opened to μ.
 
     rows: dicts with mu (of the cones), eta2, eta3; packed: the same for packings made at that μ.
@@ -69,7 +70,9 @@ def opened(rows: Rows, packed: Rows, *, backend: str = "bokeh") -> hv.Layout:
     return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
 
 
-def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
+def frozen(
+    periodic: Table, inner: Table, larger: Table = (), *, backend: str = "bokeh"
+) -> hv.Layout:
     """Fraction of contacts without a unique force, and their clusters, against μ.
 
     periodic: rows (dicts with mu, undetermined_part, clusters) with only the pressure prescribed;
@@ -77,13 +80,14 @@ def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bok
     of more disks, with their number n.
     """
     sources = [("periodic", periodic, "solid"), ("frozen boundary", inner, "dashed")]
-    if larger:
-        sources.append((f"the same, N = {larger[0]['n']}", larger, "dotted"))
+    larger = pd.DataFrame(larger)
+    if len(larger):
+        sources.append((f"the same, N = {larger['n'].iloc[0]}", larger, "dotted"))
     names = (("undetermined_part", "undetermined fraction", 1.0), ("clusters", "clusters", 1.0))
     return _frames(sources, backend, names, "right")
 
 
-def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
+def distances(rows: Table, *, backend: str = "bokeh") -> hv.Overlay:
     """Distance from the centre of S of original, walk and uniform states, against μ.
 
     rows: dicts with mu, original_ratio and walk_ratio: mean distances from the mean of uniform
@@ -109,7 +113,7 @@ def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
     )
 
 
-def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
+def stresses(rows: Table, uniform: Table, *, backend: str = "bokeh") -> hv.Layout:
     """Shear stress over pressure against μ: the largest in S and that of the original network.
 
     A second frame shows those of the original network and of uniform states as fractions of the
@@ -117,12 +121,8 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     the original network); uniform: with mu, seed, mean_shear and largest_shear of uniform states.
     """
     original, states = (
-        [
-            {"mu": row["mu"], **{name: row[name] / most["friction"] for name in names}}
-            for row, most in statistics.paired(some, rows)
-            if most["friction"]
-        ]
-        for some, names in ((rows, ("own_shear",)), (uniform, ("mean_shear", "largest_shear")))
+        _fractions(some, rows, names)
+        for some, names in ((rows, ["own_shear"]), (uniform, ["mean_shear", "largest_shear"]))
     )
     style.ready(backend)
     panels = (
@@ -145,7 +145,7 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
             (statistics.means(some, name), words[name], style.COLOURS[k], "solid", k)
             for k, name in enumerate(words)
             for shown, some in drawn
-            if shown == name and some
+            if shown == name and len(some)
         ]
         # In the left frame there is room above the curves at small μ.
         legend = (
@@ -158,7 +158,16 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     return style.page(frames, backend, columns=2)
 
 
-def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
+def _fractions(rows: Table, largest: Table, names: list[str]) -> pd.DataFrame:
+    """Numbers of rows over the friction of the largest in the same packing, if it has any."""
+    columns = ["mu", "seed"]
+    some = pd.DataFrame(rows, columns=[*columns, *names]).astype(float)
+    pairs = statistics.paired(some, pd.DataFrame(largest, columns=[*columns, "friction"]))
+    pairs = pairs[pairs["friction_other"] != 0]
+    return pairs[names].div(pairs["friction_other"], axis="index").assign(mu=pairs["mu"])
+
+
+def volumes(rows: Table, larger: Table = (), *, backend: str = "bokeh") -> hv.Layout:
     """Width of S per free dimension against μ, and ln V per grain against N.
 
     rows: dicts with mu, n, extent and log_volume_per_grain; larger: rows for other numbers n.
@@ -168,15 +177,14 @@ def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layou
     width = [(statistics.means(rows, "extent"), label, style.COLOURS[0], "solid", 0)]
     axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "logy": True}
     frames = [style.graph(width, backend, title="Width of S", **axes)]
-    frictions = sorted({row["mu"] for row in larger})
+    larger = pd.DataFrame(larger, columns=["mu", "n", "log_volume_per_grain"])
+    of_mu = pd.concat([pd.DataFrame(rows), larger]).groupby("mu")
     series = [
         (
-            statistics.means(
-                [row for row in (*rows, *larger) if row["mu"] == mu], "log_volume_per_grain", "n"
-            ),
+            statistics.means(of_mu.get_group(mu), "log_volume_per_grain", "n"),
             *(f"μ = {mu:g}", style.COLOURS[k], "solid", k),
         )
-        for k, mu in enumerate(frictions)
+        for k, mu in enumerate(sorted(larger["mu"].unique()))
     ]
     if series:
         axes = {"x": "N", "y": "ln V / grain", "logx": True, "legend": "right"}
@@ -214,7 +222,7 @@ def tails(groups: Mapping[str, Mapping[float, Points]], *, backend: str = "bokeh
 
 
 def _frames(
-    sources: Sequence[tuple[str, Rows, str]],
+    sources: Sequence[tuple[str, Table, str]],
     backend: str,
     names: Sequence[tuple[str, str, float]],
     legend: str,

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from scipy import optimize, stats
 
-from granforce.types import Floats, Rows
+from granforce.types import Floats
 
 T = TypeVar("T")
+Table: TypeAlias = pd.DataFrame | Sequence[Mapping[str, Any]]  # or rows as dicts
 
 LEVEL = 0.95  # of every confidence interval
 RESAMPLES = 999
@@ -86,28 +88,28 @@ def jackknife_error(statistic: Callable[[list[T]], float], items: Sequence[T]) -
     return float(np.sqrt((count - 1) * without.var()))
 
 
-def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dict[float, Floats]:
+def grouped(rows: Table, name: str, by: str = "mu") -> dict[float, Floats]:
     """{μ: array of the values of one name over packings}, in order of μ, without NaN.
 
-    rows: dicts with μ (or another key to group by) and the name; rows without it are skipped.
+    rows: a table, or dicts, with μ (or another key to group by); rows without the name are skipped.
     """
-    groups: dict[Any, list[float]] = {}
-    for row in rows:
-        value = row.get(name)
-        if value is not None and np.isfinite(value):
-            groups.setdefault(row[by], []).append(value)
-    return {key: np.array(groups[key]) for key in sorted(groups)}
+    table = pd.DataFrame(rows)
+    if name not in table:
+        return {}
+    values = table[name].astype(float)
+    known = values[np.isfinite(values)]
+    return {key: group.to_numpy() for key, group in known.groupby(table[by])}
 
 
-def paired(rows: Rows, others: Rows) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Rows with a match of the same μ and seed among the others, each with its match."""
-    known = {(row["mu"], row["seed"]): row for row in others}
-    keys = [(row, (row["mu"], row["seed"])) for row in rows]
-    return [(row, known[key]) for row, key in keys if key in known]
+def paired(rows: Table, others: Table) -> pd.DataFrame:
+    """Rows with a match of the same μ and seed among the others, whose columns end in "_other"."""
+    others = pd.DataFrame(others).add_suffix("_other")
+    on = ["mu", "seed"], ["mu_other", "seed_other"]
+    return pd.DataFrame(rows).merge(others, left_on=on[0], right_on=on[1])
 
 
 def means(
-    rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu", factor: float = 1.0
+    rows: Table, name: str, by: str = "mu", factor: float = 1.0
 ) -> list[tuple[float, float, float]]:
     """Points [(μ, mean, standard error over packings)] of one name, times a factor."""
     points = []

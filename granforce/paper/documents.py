@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
 from granforce.measures import statistics
@@ -33,6 +34,7 @@ from granforce.paper.claims.groups import (
     drawn,
     excesses,
     outside,
+    positive,
 )
 from granforce.paper.claims.outcomes import (
     OUTCOMES,
@@ -57,7 +59,7 @@ from granforce.paper.highlights import highlights
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
 from granforce.system import markdown
-from granforce.types import Rows
+from granforce.types import Floats, Rows
 
 KIND = "study"
 
@@ -205,7 +207,7 @@ def walks(table: StudyTable) -> str:
 def _against_friction(table: StudyTable, columns: Sequence[tuple[Any, ...]]) -> str:
     """A table of columns (head, rows, name, factor, form), with a line for each μ."""
     exact = table.part(SAMPLERS["exact"])
-    every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
+    every = exact.groupby("mu")["seed"].unique()
     swept_part = SAMPLERS["gauss_seidel"]
     beyond, known = outside(table, swept_part), excesses(table, swept_part)
     lines = []
@@ -215,7 +217,7 @@ def _against_friction(table: StudyTable, columns: Sequence[tuple[Any, ...]]) -> 
             if mu in beyond and head.startswith("paper's walk"):
                 line.append(_OUTSIDE)
                 continue
-            chosen = [row for row in rows if row["mu"] == mu and row["seed"] in seeds]
+            chosen = rows[(rows["mu"] == mu) & rows["seed"].isin(seeds)]
             line.append(_cell(chosen, name, factor, form, len(seeds)))
             if head == _SWEPT_EXTENT and mu in known and known[mu][0] > _FAR * known[mu][1]:
                 line[-1] += f", excess {_excess(*known[mu])}"
@@ -240,17 +242,14 @@ def others(table: StudyTable) -> str:
 
     Means ± standard errors over packings; ratios are of the same packing.
     """
-    answers = [
-        row | {"part": row["critical_force"] / row["limit_load"]}
-        for row in table.responses()
-        if row.get("limit_load", 0) > 0
-    ]
+    answers = positive(table.part("response"), "limit_load")
+    answers = answers.assign(part_of_load=answers["critical_force"] / answers["limit_load"])
     walk, uniform, exact = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform", "exact"))
     columns = (
         ("nearest-network walk/exact η3", _over(walk, exact, "eta3"), "ratio"),
         ("uniform/exact η3", _over(uniform, exact, "eta3"), "ratio"),
         ("F_crit, ⟨f_n⟩", answers, "critical_force"),
-        ("F_crit/limit load", answers, "part"),
+        ("F_crit/limit load", answers, "part_of_load"),
         ("α", answers, "decay_exponent"),
         ("width of S, ⟨f_n⟩", table.part("volume"), "extent"),
     )
@@ -268,13 +267,13 @@ def further(table: StudyTable) -> str:
     return _measured_at_each(columns)
 
 
-def _measured_at_each(columns: Sequence[tuple[str, Rows, str]]) -> str:
+def _measured_at_each(columns: Sequence[tuple[str, pd.DataFrame, str]]) -> str:
     """A table of columns (head, rows, name) with a line for each μ."""
-    grouped = [_by_friction(rows) for _, rows, _ in columns]
-    most = max((len(rows) for groups in grouped for rows in groups.values()), default=0)
+    counts = [count for _, rows, _ in columns for count in rows.groupby("mu").size()]
+    most = max(counts, default=0)
     lines = []
-    for mu in sorted(set().union(*grouped)):
-        of_mu = [groups.get(mu, []) for groups in grouped]
+    for mu in sorted(set().union(*(rows["mu"] for _, rows, _ in columns))):
+        of_mu = [rows[rows["mu"] == mu] for _, rows, _ in columns]
         cells = [
             _cell(rows, name, 1.0, None, most)
             for rows, (_, _, name) in zip(of_mu, columns, strict=True)
@@ -284,13 +283,11 @@ def _measured_at_each(columns: Sequence[tuple[str, Rows, str]]) -> str:
     return _counted(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
+def _over(rows: pd.DataFrame, others: pd.DataFrame, name: str) -> pd.DataFrame:
     """Rows with the "ratio" of a number to that of another row of the same packing."""
-    return [
-        row | {"ratio": row[name] / other[name]}
-        for row, other in statistics.paired(rows, others)
-        if name in row and other.get(name, 0) > NOTHING
-    ]
+    pairs = statistics.paired(rows.dropna(subset=[name]), others)
+    pairs = pairs[pairs[f"{name}_other"] > NOTHING]
+    return pairs.assign(ratio=pairs[name] / pairs[f"{name}_other"])
 
 
 def sweeps(table: StudyTable) -> str:
@@ -299,7 +296,7 @@ def sweeps(table: StudyTable) -> str:
     Sweeps per network; excess: how far the intervals of states exceed the exact ones, over the
     length of those, as means over packings; η2 over that of the nearest-network walk.
     """
-    swept = [part for part in plans.SWEEPS if table.part(part)]
+    swept = [part for part in plans.SWEEPS if len(table.part(part))]
     if not swept:
         return _swept(table)
     columns: list[tuple[str, dict[float, str]]] = []
@@ -311,46 +308,42 @@ def sweeps(table: StudyTable) -> str:
     if len(swept) > 1:  # for a single residual, other tables have η2
         for part in swept:
             columns.append((f"η2, {_power(plans.SWEEPS[part])}", _eta2_over_nearest(table, part)))
-    frictions = sorted({row["mu"] for row in table.part(*swept)})
+    frictions = sorted(table.part(*swept)["mu"].unique())
     lines = [[f"{mu:g}", *(cells.get(mu, "") for _, cells in columns)] for mu in frictions]
     return f"{_swept(table)}\n{markdown.table(['μ', *(head for head, _ in columns)], lines)}"
 
 
 def _sweeps_of(table: StudyTable, part: str) -> dict[float, str]:
     """{μ: sweeps per network}."""
-    every = _by_friction([row for row in table.part(part) if row.get("mean_sweeps")])
-    return {mu: _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)) for mu, rows in every.items()}
+    every = positive(table.part(part), "mean_sweeps").groupby("mu")
+    return {mu: _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)) for mu, rows in every}
 
 
 def _eta2_over_nearest(table: StudyTable, part: str) -> dict[float, str]:
     """{μ: η2 over that of the nearest-network walk in the same packings}."""
     beyond = outside(table, part)
-    ratios = _by_friction(_over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2"))
-    cells = {mu: _cell(rows, "ratio", 1.0, None, len(rows)) for mu, rows in ratios.items()}
+    ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2").groupby("mu")
+    cells = {mu: _cell(rows, "ratio", 1.0, None, len(rows)) for mu, rows in ratios}
     return cells | dict.fromkeys(beyond, _OUTSIDE)
 
 
 def _swept(table: StudyTable) -> str:
     """Which residuals there are, and whether walks have all their states, in sentences."""
-    words = [_power(residual) for part, residual in plans.SWEEPS.items() if table.part(part)]
-    if not words:
+    swept = [part for part in plans.SWEEPS if len(table.part(part))]
+    if not swept:
         return "No walk by sweeps is part of this study.\n"
+    words = [_power(plans.SWEEPS[part]) for part in swept]
     text = f"Sweeps end at {listed(words)} ⟨f_n⟩; verdicts use the first. "
     rows = table.part(*plans.SWEEPS)
     if len(words) > 1:
-        most = [
-            max(len(some) for some in _by_friction(table.part(part)).values())
-            for part in plans.SWEEPS
-            if table.part(part)
-        ]
+        most = [table.part(part).groupby("mu").size().max() for part in swept]
         text += f"At each μ, there are up to {listed([str(count) for count in most])} packings. "
-    least = min(row["reached_part"] for row in rows)
-    if least >= 1:
+    if rows["reached_part"].min() >= 1:
         return (
             text + "Every walk has as many networks as requested; attempts that ended without one "
             "were repeated.\n"
         )
-    where = sorted({row["mu"] for row in rows if row["reached_part"] < 1})
+    where = sorted(rows["mu"][rows["reached_part"] < 1].unique())
     return (
         text + "Some walks have fewer networks than requested, at μ = "
         f"{listed([f'{mu:g}' for mu in where])}; "
@@ -379,23 +372,22 @@ def preparation(table: StudyTable) -> str:
     """
     names = [part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")]
     variants = list(dict.fromkeys(names))
-    varied = {(row["mu"], row["seed"]) for row in table.part(*variants)}
-    frictions = sorted({mu for mu, _ in varied})
+    varied = table.part(*variants)[["mu", "seed"]].drop_duplicates()
+    frictions = sorted(varied["mu"].unique())
     heads = ["options", *(f"μ = {mu:g}" for mu in frictions)]
     text, differences = "", []
     for quantity, suffix, measure in _PREPARED:
-        usual = [
-            row
-            for row in table.part("exact" if suffix else "walk", n=table.plan["n"])
-            if measure in row and (row["mu"], row["seed"]) in varied
-        ]
+        usual = table.part("exact" if suffix else "walk", n=table.plan["n"])
+        usual = statistics.paired(usual, varied).dropna(subset=[measure])[usual.columns]
         means = statistics.grouped(usual, measure)
         lines = [
             [_VARIANTS[""], *(with_error(means[mu]) if mu in means else "" for mu in frictions)]
         ]
         for variant in variants:
-            rows = [row for row in table.part(variant + suffix) if measure in row]
-            apart = {mu: _apart(rows, usual, measure, mu) for mu in frictions}
+            pairs = statistics.paired(table.part(variant + suffix), usual)
+            pairs = pairs.assign(apart=pairs[measure] - pairs[f"{measure}_other"])
+            differences_at = statistics.grouped(pairs, "apart")
+            apart = {mu: _apart(differences_at.get(mu, np.zeros(0))) for mu in frictions}
             differences += [(_word(variant), one) for one in apart.values() if one is not None]
             cells = [one.text if one else "" for one in apart.values()]
             lines.append([_word(variant), *cells])
@@ -446,10 +438,8 @@ def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
     )
 
 
-def _apart(rows: Rows, others: Rows, name: str, mu: float) -> _Apart | None:
-    """The paired difference of a number in the same packings at one μ; None if it is unknown."""
-    pairs = statistics.paired([row for row in rows if row["mu"] == mu], others)
-    apart = np.array([row[name] - other[name] for row, other in pairs])
+def _apart(apart: Floats) -> _Apart | None:
+    """The mean of the differences of some pairs; None for fewer than two."""
     if len(apart) < 2:
         return None
     text = f"{'+' if apart.mean() > 0 else ''}{with_error(apart)}"
@@ -537,13 +527,10 @@ def counts(table: StudyTable) -> str:
         parts.setdefault(_content(part), []).append(part)
     lines = []
     for content, names in parts.items():
-        seeds: dict[tuple[Any, ...], set[int]] = {}  # by part, disks, and μ of cones and packing
-        for row in table.part(*names):
-            place = row["part"], row["n"], row["mu"], row.get("packing_mu")
-            seeds.setdefault(place, set()).add(row["seed"])
-        disks = _span([n for _, n, *_ in seeds])
-        frictions = len({place[2:] for place in seeds})
-        lines.append([content, disks, str(frictions), _span(list(map(len, seeds.values())))])
+        rows = table.part(*names)
+        made = rows.groupby(["part", "n", "mu", "packing_mu"], dropna=False)["seed"].nunique()
+        frictions = rows[["mu", "packing_mu"]].drop_duplicates()
+        lines.append([content, _span(rows["n"]), str(len(frictions)), _span(made)])
     return markdown.table(("content", "disks", "values of μ", "packings at each"), lines)
 
 
@@ -558,22 +545,15 @@ def _span(numbers: Sequence[int]) -> str:
     return f"{low}" if low == high else f"{low} to {high}"
 
 
-def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
-    groups: dict[float, list[dict[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(row["mu"], []).append(row)
-    return dict(sorted(groups.items()))
-
-
-def _drawn_by(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
+def _drawn_by(table: StudyTable, sampler: str) -> pd.DataFrame:
     """Rows of a sampler with drawn states, without those where S is known to be one point."""
-    return [row for row in drawn(table, sampler) if not skipped(row)]
+    rows = drawn(table, sampler)
+    return rows[~skipped(rows)]
 
 
-def _cell(rows: Rows, name: str, factor: float, form: str | None, expected: int) -> str:
+def _cell(rows: pd.DataFrame, name: str, factor: float, form: str | None, expected: int) -> str:
     """Mean ± standard error over rows, and their number if it is not the expected one."""
-    numbers = np.array([row[name] for row in rows if name in row], dtype=float)
-    values = factor * numbers[np.isfinite(numbers)]
+    values = factor * rows[name][np.isfinite(rows[name])].to_numpy()
     if not len(values):
         return ""
     mean = values.mean()
@@ -583,21 +563,20 @@ def _cell(rows: Rows, name: str, factor: float, form: str | None, expected: int)
 
 def certificates(table: StudyTable) -> str:
     """The largest gap of the exact bounds, and how well uniform samples converged, in sentences."""
-    bounded = [row for row in table.rows if "max_gap" in row]
-    if not bounded:
+    bounded = table.rows.dropna(subset=["max_gap"])
+    if not len(bounded):
         return ""
     text = (
         f"In {len(bounded)} computations of exact intervals, each for all contacts of a packing, "
-        f"the largest duality gap is {max(row['max_gap'] for row in bounded):.3g} ⟨f_n⟩."
+        f"the largest duality gap is {bounded['max_gap'].max():.3g} ⟨f_n⟩."
     )
-    uniform = [row for row in table.part(SAMPLERS["uniform"]) if "worst_r_hat" in row]
-    if uniform:
+    uniform = table.part(SAMPLERS["uniform"]).dropna(subset=["worst_r_hat"])
+    if len(uniform):
         text += (
             f" Where S is more than one point, the {len(uniform)} uniform samples have "
             f"{table.plan['states']} networks each; over all their force components, the largest "
-            "split R̂ is "
-            f"{max(row['worst_r_hat'] for row in uniform):.3f}, and the smallest bulk effective "
-            f"size {min(row['least_bulk_size'] for row in uniform):.0f}."
+            f"split R̂ is {uniform['worst_r_hat'].max():.3f}, and the smallest bulk effective size "
+            f"{uniform['least_bulk_size'].min():.0f}."
         )
     return text + "\n"
 

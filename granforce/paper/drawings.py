@@ -5,13 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce import figures
+from granforce.measures import statistics
 from granforce.paper import tails
-from granforce.paper.claims.groups import SAMPLERS, drawn, outside
+from granforce.paper.claims.groups import SAMPLERS, drawn, outside, positive
 from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder
-from granforce.types import Floats, Progress, Rows
+from granforce.types import Floats, Progress
 
 SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions shown in Figure 4, if the study has them
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
@@ -104,7 +106,7 @@ _RELAXED = {
 
 def paper_sampler(table: StudyTable) -> str:
     """Sampler of Figures 1 to 6: the paper's if the table has it at every μ of its plan."""
-    known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
+    known = set(table.part(SAMPLERS["gauss_seidel"])["mu"])
     frictions = set(table.plan.get("frictions", ()))
     return "gauss_seidel" if frictions and frictions <= known else "nearest"
 
@@ -154,7 +156,7 @@ def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
     sampler, drawings = paper_sampler(table), {}
     part = SAMPLERS[sampler]
     walk = drawn(table, sampler)
-    if walk:
+    if len(walk):
         drawings["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
         words = _WALKS[sampler]
         drawings["figure6"] = _later(figures.correlations, walk, chance=_chance(walk), walk=words)
@@ -163,12 +165,9 @@ def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
         options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
         drawings["figure4"] = _later(figures.extents, groups, **options)
     beyond = outside(table, part)
-    answers = [
-        row
-        for row in table.answers(part)
-        if np.isfinite(row.get("decay_exponent", np.nan)) and row["mu"] not in beyond
-    ]
-    if answers:
+    answers = table.answers(part).dropna(subset=["decay_exponent"])
+    answers = answers[~answers["mu"].isin(beyond)]
+    if len(answers):
         drawings["figure2"] = _later(figures.perturbation, answers)
         drawings["figure2_limit"] = _later(figures.perturbation, answers, limit=True)
     forces, places = _shown_forces(table, part), _shown_places(table, part)
@@ -185,10 +184,10 @@ def _in_S(table: StudyTable, part: str) -> dict[float, list[Floats]]:
     return {mu: group for mu, group in table.extents(part).items() if mu not in beyond}
 
 
-def _beyond_S(table: StudyTable, part: str) -> list[dict[str, Any]]:
+def _beyond_S(table: StudyTable, part: str) -> pd.DataFrame:
     """Rows of a part whose states exceed S by more than its extent."""
-    beyond = outside(table, part)
-    return [row for row in table.part(part) if row["mu"] in beyond]
+    rows = table.part(part)
+    return rows[rows["mu"].isin(outside(table, part))]
 
 
 def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
@@ -196,22 +195,22 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, drawings = SAMPLERS[paper_sampler(table)], {}
     sources = {_DRAWN.get(name, name): drawn(table, name) for name in SAMPLERS}
-    packings = {name: len({row["seed"] for row in rows}) for name, rows in sources.items()}
+    packings = {name: rows["seed"].nunique() for name, rows in sources.items()}
     enough = max(1, ENOUGH * max(packings.values()))
     sources = {name: rows for name, rows in sources.items() if packings[name] >= enough}
     if len(sources) > 1:
         drawings["samplers"] = _later(figures.samplers, sources)
-    efforts = {words: table.part(p) for p, words in _SWEPT.items() if table.part(p)}
+    efforts = {words: table.part(p) for p, words in _SWEPT.items() if len(table.part(p))}
     if efforts:
         drawings["effort"] = _later(figures.effort, efforts)
-    if walk and exact:
+    if len(walk) and len(exact):
         sources = {"exact": exact, "volume": table.part("volume")}
         drawings["figure1_exact"] = _later(figures.indeterminacy, walk, compare=sources)
-        both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
+        both = {"exact": exact} | ({"uniform": uniform} if len(uniform) else {})
         drawings["figure6_exact"] = _later(
             figures.correlations, walk, compare=both, walk=_WALKS["nearest"]
         )
-    if walk and uniform:
+    if len(walk) and len(uniform):
         drawings["figure1_uniform"] = _later(
             figures.indeterminacy, walk, compare={"uniform": uniform}
         )
@@ -225,22 +224,22 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     places = _shown_places(table, part)
     if places:
         drawings["places"] = _later(figures.places, places)
-    if table.part("size"):
+    if len(table.part("size")):
         drawings["sizes"] = _later(
             figures.sizes, _with_sizes(table), exact=table.part("size_exact", "exact")
         )
-    if table.part("opened"):
+    if len(table.part("opened")):
         drawings["opened"] = _later(figures.opened, table.part("opened"), walk)
-    if table.part("frozen"):
-        periodic = [row for row in exact if row["mu"] > 0]
+    if len(table.part("frozen")):
+        periodic = positive(exact, "mu")
         inner = table.part("frozen"), table.part("frozen_large")
         drawings["frozen"] = _later(figures.frozen, periodic, *inner)
-    if any("walk_ratio" in row for row in uniform):
+    if uniform["walk_ratio"].notna().any():
         drawings["distances"] = _later(figures.distances, uniform)
-    if table.part("stress"):
+    if len(table.part("stress")):
         stress = table.part("stress"), table.part("stress_uniform")
         drawings["stresses"] = _later(figures.stresses, *stress)
-    if table.part("volume"):
+    if len(table.part("volume")):
         drawings["volumes"] = _later(
             figures.volumes, table.part("volume"), table.part("volume_size")
         )
@@ -257,14 +256,11 @@ def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, flo
     }
 
 
-def _chance(rows: Rows) -> dict[float, float]:
+def _chance(rows: pd.DataFrame) -> dict[float, float]:
     """{μ: two standard deviations of the mean correlation for shuffled forces}."""
-    free: dict[Any, Any] = {}
-    for row in rows:
-        if row["mu"] > 0 and row.get("contacts"):
-            free.setdefault(row["mu"], []).append(row["contacts"] - 1)
+    contacts = statistics.grouped(positive(rows, "mu", "contacts"), "contacts")
     # Each of k packings has a variance of 1/(N_c − 1), and their mean 1/k of that.
-    return {mu: 2 * np.sqrt(np.mean(1 / np.array(n)) / len(n)) for mu, n in free.items()}
+    return {mu: 2 * np.sqrt(np.mean(1 / (n - 1)) / len(n)) for mu, n in contacts.items()}
 
 
 def _loose(groups: dict[float, list[Floats]]) -> dict[float, list[Floats]]:
@@ -281,31 +277,30 @@ def _some(groups: dict[float, Any]) -> dict[float, Any]:
     return few or groups
 
 
-def _with_sizes(table: StudyTable) -> list[dict[str, Any]]:
-    frictions = {row["mu"] for row in table.part("size")}
-    return [row for row in table.part("size", "walk") if row["mu"] in frictions]
+def _with_sizes(table: StudyTable) -> pd.DataFrame:
+    rows = table.part("size", "walk")
+    return rows[rows["mu"].isin(table.part("size")["mu"])]
 
 
-def _shown_contacts(table: StudyTable, part: str) -> Iterator[tuple[Any, ...]]:
-    """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks to show."""
-    contacts = {id(row): arrays for row, *arrays in table.contacts(part)}
-    for k in sorted({k for k, _ in table.shown}):
-        row = table.rows[k]
-        if row["part"] == part:
-            yield k, row, *contacts[id(row)]
+def _shown_contacts(table: StudyTable, part: str) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Each row of a walk to show, and {name: array} of the samples of its contacts."""
+    shown = {k for k, _ in table.shown}
+    for row, contacts in table.contacts(part):
+        if row.Index in shown:
+            yield row, {name: contacts[name].to_numpy() for name in contacts}
 
 
 def _shown_forces(table: StudyTable, part: str) -> dict[float, tuple[Any, ...]]:
     counts = dict(table.shown)
     return {
-        row["mu"]: (normal, counts[k], least, extent)
-        for k, row, _, normal, least, extent in _shown_contacts(table, part)
+        row.mu: (some["normal"], counts[row.Index], some["least"], some["extent"])
+        for row, some in _shown_contacts(table, part)
     }
 
 
 def _shown_places(table: StudyTable, part: str) -> dict[float, tuple[Any, ...]]:
     return {
-        row["mu"]: (table.packings[k], contacts, normal, extent)
-        for k, row, contacts, normal, _, extent in _shown_contacts(table, part)
-        if row["mu"] in (0.1, 10)
+        row.mu: (table.packings[row.Index], some["contact"], some["normal"], some["extent"])
+        for row, some in _shown_contacts(table, part)
+        if row.mu in (0.1, 10)
     }

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper import tails
@@ -23,6 +24,7 @@ from granforce.paper.claims.groups import (
     drawn,
     each,
     items,
+    positive,
     sampled,
     within,
 )
@@ -38,7 +40,7 @@ from granforce.paper.claims.verdicts import (
     too_wide,
 )
 from granforce.paper.tables import StudyTable
-from granforce.types import Floats, Rows
+from granforce.types import Floats
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
 WORDS = {
@@ -77,13 +79,13 @@ def measure(table: StudyTable) -> Iterator[Claim]:
             ratios = _ratios(drawn(table, sampler), table.part("uniform"), name)
             statement = f"{label} of {WORDS[sampler]} over {label} of {WORDS['uniform']}"
             yield from _by_range(ratios, statement)
-    rows = [row for row in table.part("uniform") if "walk_ratio" in row]
+    rows = table.part("uniform").dropna(subset=["walk_ratio"])
     for name, label in (
         ("original_ratio", "the original network"),
         ("walk_ratio", WORDS["nearest"]),
     ):
         statement = f"distance of {label} from the centre over that of {WORDS['uniform']}"
-        yield from _by_range(_values(rows, name), statement)
+        yield from _by_range(statistics.grouped(rows, name), statement)
 
 
 def correlations(table: StudyTable) -> Iterator[Claim]:
@@ -101,7 +103,7 @@ def correlations(table: StudyTable) -> Iterator[Claim]:
 def exact_shape(table: StudyTable) -> Iterator[Claim]:
     """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
-        groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
+        groups = {mu: v for mu, v in statistics.grouped(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
             yield _trend(f"μ where {label} is largest", peak, groups, POSITIVE)
         yield from _growth(groups, label)
@@ -129,7 +131,7 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
 
 def opened(table: StudyTable) -> Iterator[Claim]:
     """Growth of η with the friction of the cones alone, in frictionless packings."""
-    groups = _values(table.part("opened_exact"), "eta3")
+    groups = statistics.grouped(table.part("opened_exact"), "eta3")
     yield from _growth(groups, "exact η3, packings made at μ = 0,")
 
 
@@ -145,8 +147,8 @@ def _growth(groups: Values, label: str) -> Iterator[Claim]:
 def size(table: StudyTable) -> Iterator[Claim]:
     """Whether exact η3 depends on N."""
     rows = table.part("size_exact", "exact")
-    for mu in sorted({row["mu"] for row in table.part("size_exact")}):
-        groups = statistics.grouped([row for row in rows if row["mu"] == mu], "eta3", "n")
+    for mu in sorted(table.part("size_exact")["mu"].unique()):
+        groups = statistics.grouped(rows[rows["mu"] == mu], "eta3", "n")
         if len(groups) > 1:
             yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
 
@@ -154,12 +156,10 @@ def size(table: StudyTable) -> Iterator[Claim]:
 def strength(table: StudyTable) -> Iterator[Claim]:
     """The critical force relative to the limit load, and its dependence on the protocol."""
     usual = table.part("response")
-    rows = [
-        row | {"part_of_load": row["critical_force"] / row["limit_load"]}
-        for row in table.responses()
-        if row["limit_load"] > 0
-    ]
-    yield from _by_range(_values(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
+    rows = positive(usual, "limit_load")
+    part_of_load = rows["critical_force"] / rows["limit_load"]
+    values = statistics.grouped(rows.assign(part_of_load=part_of_load), "part_of_load")
+    yield from _by_range(values, "⟨F_crit⟩ over ⟨limit load⟩")
     for part, word in (
         ("response_long", "with 600 implicit steps over that with 150"),
         ("response_fine", "with load steps a quarter as long over that with the usual ones"),
@@ -168,60 +168,56 @@ def strength(table: StudyTable) -> Iterator[Claim]:
             ratios = _ratios(table.part(part), usual, name)
             yield from _by_range(ratios, f"{label} {word}")
     # Loads inside and outside the pressure differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
-    factors = [
-        {
-            "mu": row["mu"],
-            "n": row["n"],
-            "factor": 1 / (1 - row["critical_force"] / walk["contacts"]),
-        }
-        for row, walk in statistics.paired(rows, table.part("walk"))
-        if walk["contacts"]
-    ]
+    pairs = positive(statistics.paired(rows, table.part("walk")), "contacts_other")
+    factor = 1 / (1 - pairs["critical_force"] / pairs["contacts_other"])
     statement = "⟨F_crit⟩ with the pair excluded from the pressure over that with it included"
-    yield from _by_range(_values(factors, "factor"), statement)
+    yield from _by_range(statistics.grouped(pairs.assign(factor=factor), "factor"), statement)
 
 
 def shear(table: StudyTable) -> Iterator[Claim]:
     """The shear stress that the contacts can carry, and the fraction that networks have."""
     rows, uniform = table.part("stress"), table.part("stress_uniform")
-    groups = _values(rows, "friction")
+    groups = statistics.grouped(rows, "friction")
     if len(groups) > 2:
         yield _trend("μ where the largest shear stress is largest", peak, groups, POSITIVE)
     statement = "shear stress over pressure"
     yield from _by_range(groups, f"largest {statement}")
-    yield from _by_range(_values(rows, "own_shear"), f"{statement} of the original network")
+    yield from _by_range(
+        statistics.grouped(rows, "own_shear"), f"{statement} of the original network"
+    )
     for some, name, word in (
         (rows, "own_shear", "shear stress of the original network"),
         (uniform, "mean_shear", "mean shear stress of uniform networks"),
         (uniform, "largest_shear", "largest shear stress in uniform networks"),
     ):
-        parts = _quotients(statistics.paired(some, rows), name, "friction")
+        parts = _quotients(statistics.paired(some, rows), name, "friction_other")
         yield from _by_range(parts, f"{word}, {SHEARED}", FRACTION)
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
     """The width of S, and whether ln V per grain depends on N; it is not comparable between μ."""
     rows = table.part("volume")
-    groups = _values(rows, "extent")
+    groups = statistics.grouped(rows, "extent")
     if len(groups) > 2:
         yield _trend("μ where S is widest", peak, groups, POSITIVE)
     yield from _by_range(groups, "width of S, in ⟨f_n⟩")
-    walked = statistics.paired(rows, table.part("walk"))
-    wide = [(row, walk) for row, walk in walked if row.get("extent")]
+    walked = statistics.paired(positive(rows, "extent"), table.part("walk"))
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
-        yield from _by_range(_quotients(wide, "extent", name), f"width of S over {label}")
-    pairs = [(row["extent"], walk["eta2"]) for row, walk in wide if "eta2" in walk]
+        parts = _quotients(walked, "extent", f"{name}_other")
+        yield from _by_range(parts, f"width of S over {label}")
+    pairs = walked[["extent", "eta2_other"]].dropna().to_numpy()
     if len(pairs) > 2:
         yield _finding(
             "rank correlation of the width of S with η2, over packings of all μ",
             lambda some: statistics.rank_correlation(*np.transpose(some)),
             [pairs],
         )
-    for mu in sorted({row["mu"] for row in table.part("volume_size")}):
-        sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
-        largest = max(row["n"] for row in sized)
+    for mu in sorted(table.part("volume_size")["mu"].unique()):
+        sized = table.part("volume", "volume_size")
+        sized = sized[sized["mu"] == mu]
+        largest = sized["n"].max()
         large, small = (
-            np.array([r["log_volume_per_grain"] for r in sized if (r["n"] == largest) == last])
+            sized["log_volume_per_grain"][(sized["n"] == largest) == last].to_numpy()
             for last in (True, False)
         )
         if min(len(large), len(small)) > 1:
@@ -268,23 +264,16 @@ TOPICS = {
 }
 
 
-def _values(rows: Rows, name: str) -> Values:
-    return {mu: [v for _, v in group] for mu, group in items(rows, name).items()}
-
-
-def _ratios(rows: Rows, others: Rows, name: str) -> Values:
+def _ratios(rows: pd.DataFrame, others: pd.DataFrame, name: str) -> Values:
     """{μ: ratios of one number in the same packings}, for packings with rows of both."""
-    rows = [r for r in rows if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
-    return _quotients(statistics.paired(rows, others), name, name)
+    rows = rows[(rows["dimension"] > 0) & (rows["reached_part"].fillna(1) > 0)]
+    return _quotients(statistics.paired(rows, others), name, f"{name}_other")
 
 
-def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Values:
-    """{μ: one number of a row over one of its paired row}, if both exist."""
-    ratios: dict[Any, Any] = {}
-    for row, other in pairs:
-        if above in row and other.get(below):
-            ratios.setdefault(row["mu"], []).append(row[above] / other[below])
-    return ratios
+def _quotients(pairs: pd.DataFrame, above: str, below: str) -> Values:
+    """{μ: one number over another}, where both exist."""
+    pairs = pairs[pairs[below] != 0]
+    return statistics.grouped(pairs.assign(quotient=pairs[above] / pairs[below]), "quotient")
 
 
 def _mean_width(_: Floats, moments: Floats) -> float:

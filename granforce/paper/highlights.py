@@ -92,7 +92,7 @@ class _Numbers:
     @property
     def frictions(self) -> list[float]:
         """All μ with exact intervals."""
-        return sorted({row["mu"] for row in self.table.part(SAMPLERS["exact"])})
+        return sorted(self.table.part(SAMPLERS["exact"])["mu"].unique())
 
 
 def _quoted(row: dict[str, Any]) -> str:
@@ -206,11 +206,10 @@ def _later_eta2(of: _Numbers) -> str:
 
 def _later(of: _Numbers, sampler: str, part: str, name: str) -> dict[float, Floats]:
     """{μ: a number by default and with late drag, in the same packings}, for FEWEST or more."""
-    known: dict[float, list[list[float]]] = {}
-    for usual, late in statistics.paired(of.table.part(SAMPLERS[sampler]), of.table.part(part)):
-        if name in usual and name in late:
-            known.setdefault(usual["mu"], []).append([usual[name], late[name]])
-    return {mu: np.array(pairs) for mu, pairs in known.items() if len(pairs) >= FEWEST}
+    pairs = statistics.paired(of.table.part(SAMPLERS[sampler]), of.table.part(part))
+    names = [name, f"{name}_other"]
+    known = pairs.dropna(subset=names).groupby("mu")[names]
+    return {mu: group.to_numpy() for mu, group in known if len(group) >= FEWEST}
 
 
 def _coverage(of: _Numbers) -> Highlight:
@@ -318,7 +317,8 @@ def _critical(of: _Numbers) -> Highlight:
 def _from_to(of: _Numbers) -> str:
     """F_crit over the limit load at both ends of intermediate μ."""
     forces, loads = (
-        statistics.grouped(of.table.responses(), name) for name in ("critical_force", "limit_load")
+        statistics.grouped(of.table.part("response"), name)
+        for name in ("critical_force", "limit_load")
     )
     ends = [mu for mu in sorted(forces) if MIDDLE[0] <= mu <= MIDDLE[1]]
     ratios = [f"{forces[mu].mean() / loads[mu].mean():.2f} at {mu:g}" for mu in (ends[0], ends[-1])]
@@ -327,13 +327,11 @@ def _from_to(of: _Numbers) -> str:
 
 def _within_precision(of: _Numbers) -> str:
     """That F_crit may be the limit load at small μ, if they differ by less than its precision."""
-    apart = [
-        row["limit_load"] - row["critical_force"]
-        for row in of.table.responses()
-        if SMALL[0] <= row["mu"] <= SMALL[1]
-    ]
+    rows = of.table.part("response")
+    rows = rows[rows["mu"].between(*SMALL)]
+    apart = (rows["limit_load"] - rows["critical_force"]).to_numpy()
     precision = Protocol().precision
-    if not apart or np.mean(apart) > precision:
+    if not len(apart) or np.mean(apart) > precision:
         return ""
     return (
         f" There, the difference is within the error of F_crit, up to {precision:g} ⟨f_n⟩, so the "

@@ -2,12 +2,13 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.spatial.distance import pdist
 
@@ -21,9 +22,9 @@ from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, Packing, friction
 from granforce.study import cells, kinds
 from granforce.study.cells import packing_version
-from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
+from granforce.study.schema import ROW_SCALARS, VARIABLES, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
-from granforce.types import Floats, Integers, Rows
+from granforce.types import Floats, Integers
 
 VERSION = 1
 
@@ -34,16 +35,23 @@ WALKED = (*plans.SWEEPS, "walk")
 TAILED = ("tails", "tails_stress")
 FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
+COLUMNS = [name.removeprefix("row_") for name in VARIABLES if name.startswith("row_")]
+
+
+def make_rows(rows: statistics.Table) -> pd.DataFrame:
+    """A table with a column for every number of the schema's row_…, NaN where a row has none."""
+    table = pd.DataFrame(rows).reindex(columns=COLUMNS)
+    kinds = dict.fromkeys(COLUMNS, float) | {"part": str, "n": int, "seed": int}
+    return table.astype(kinds).copy()  # as one block
 
 
 class StudyTable(NamedTuple):
     """The reduced study."""
 
     plan: dict[str, Any]  # fields of `plans.Plan`
-    # part, n, mu, seed, and the applicable columns of the schema's row_…
-    rows: list[dict[str, Any]]
-    # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
-    samples: dict[str, Any]
+    rows: pd.DataFrame  # of cells, see `make_rows`: part, n, mu, seed, and their numbers
+    # columns SAMPLES, in order of row: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
+    samples: pd.DataFrame
     # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
     shown: list[tuple[int, Integers]]
     packings: dict[int, Packing]  # {row: Packing} of those walks
@@ -53,41 +61,32 @@ class StudyTable(NamedTuple):
     # {row: (shells, 2) radii in mean diameters and mean |u| in the range of the fit of α}
     decays: Mapping[int, Floats] = MappingProxyType({})
 
-    def part(self, *names: str, n: int | None = None) -> list[dict[str, Any]]:
+    def part(self, *names: str, n: int | None = None) -> pd.DataFrame:
         """Rows of some parts; n: only of this number of disks."""
-        return [r for r in self.rows if r["part"] in names and n in (None, r["n"])]
+        chosen = self.rows["part"].isin(names)
+        return self.rows[chosen if n is None else chosen & (self.rows["n"] == n)]
 
     def parts(self) -> list[str]:
         """Names of its parts, in order of their first rows."""
-        return list(dict.fromkeys(row["part"] for row in self.rows))
+        return list(self.rows["part"].unique())
 
-    def contacts(self, part: str) -> list[tuple[Any, ...]]:
-        """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
-        contacts = []
-        # Samples are sorted by row.
+    def contacts(self, part: str) -> Iterator[tuple[Any, pd.DataFrame]]:
+        """Each row of a sampled part, and the samples of its contacts."""
         edges = np.searchsorted(self.samples["row"], np.arange(len(self.rows) + 1))
-        for k, row in enumerate(self.rows):
-            chosen = slice(edges[k], edges[k + 1])
-            if row["part"] == part:
-                contacts.append((row, *(self.samples[name][chosen] for name in SAMPLES[1:])))
-        return contacts
+        for row in self.part(part).itertuples():
+            yield row, self.samples[edges[row.Index] : edges[row.Index + 1]]
 
     def extents(self, part: str) -> dict[float, list[Floats]]:
         """{μ: list of ΔF_n (N_c,) of each packing} of a sampled part."""
-        extents: dict[Any, Any] = {}
-        for row, *_, extent in self.contacts(part):
-            extents.setdefault(row["mu"], []).append(extent)
+        extents: dict[float, list[Floats]] = {}
+        for row, contacts in self.contacts(part):
+            extents.setdefault(row.mu, []).append(contacts["extent"].to_numpy())
         return extents
 
-    def responses(self) -> list[dict[str, Any]]:
-        """Rows of the critical forces and first motions of random contacts."""
-        return self.part("response")
-
-    def answers(self, part: str = "walk", eta: str = "eta2") -> list[dict[str, Any]]:
+    def answers(self, part: str = "walk", eta: str = "eta2") -> pd.DataFrame:
         """Rows of the perturbation, each with the η of a part in the same packing."""
-        known = [row for row in self.part(part) if eta in row]
-        pairs = statistics.paired(self.responses(), known)
-        return [row | {eta: other[eta]} for row, other in pairs]
+        pairs = statistics.paired(self.part("response"), self.part(part).dropna(subset=[eta]))
+        return pairs.assign(**{eta: pairs[f"{eta}_other"]})
 
 
 def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> StudyTable:
@@ -97,7 +96,7 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     """
     store = open_store(path, readonly=True)
     rows: list[dict[str, Any]] = []
-    samples: list[dict[str, Any]] = []
+    samples: list[pd.DataFrame] = []
     shown: list[tuple[int, Integers]] = []
     packings: dict[int, Packing] = {}
     centres: dict[tuple[float, int], tuple[Floats, dict[str, Any]]] = {}
@@ -131,21 +130,15 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     _compare_distances(store, every, centres)
     if not rows:
         raise InputError(f"the store at {path} has no results of this study")
-    joined = {
-        name: np.concatenate([part[name] for part in samples]) if samples else np.zeros(0)
-        for name in SAMPLES
-    }
-    wanted = every if wanted is None else wanted
-    known = {_name(row) for row in rows}
-    missing = sum(_name(_named(task)) not in known for task in wanted)
-    skipped = {"missing_cells": missing}
+    table = make_rows(rows)
+    missing = (~_names(_tasks_named(every if wanted is None else wanted)).isin(_names(table))).sum()
     return StudyTable(
         plan=plan._asdict(),
-        rows=rows,
-        samples=joined,
+        rows=table,
+        samples=pd.concat([no_samples(), *samples], ignore_index=True),
         shown=shown,
         packings=packings,
-        skipped=skipped,
+        skipped={"missing_cells": int(missing)},
         tails=tails,
         decays=decays,
     )
@@ -250,16 +243,23 @@ def _pair_spread(states: Floats) -> float:
     return float(apart.std() / apart.mean())
 
 
-def _samples(k: int, dataset: xr.Dataset) -> dict[str, Any]:
+def _samples(k: int, dataset: xr.Dataset) -> pd.DataFrame:
     scale = dataset["force_scale"].item()
     extent = measures.normal_extent(dataset["low"].values, dataset["high"].values)
-    return {
-        "row": np.full(len(extent), k),
+    columns = {
+        "row": k,
         "contact": dataset["backbone"].values,
         "normal": dataset["original"].values[:, 0] / scale,
         "least": dataset["low"].values[:, 0] / scale,
         "extent": extent / scale,
     }
+    return pd.DataFrame(columns)
+
+
+def no_samples() -> pd.DataFrame:
+    """Samples of no contact."""
+    whole = dict.fromkeys(("row", "contact"), int)
+    return pd.DataFrame(columns=SAMPLES, dtype=float).astype(whole)
 
 
 def _counted(dataset: xr.Dataset) -> Floats:
@@ -268,19 +268,12 @@ def _counted(dataset: xr.Dataset) -> Floats:
     return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
 
 
-def seeds_at(rows: Rows) -> dict[float, set[int]]:
-    """{μ at which packings were made: their seeds}; packings may share the friction of cones."""
-    seeds: dict[float, set[int]] = {}
-    for row in rows:
-        mu = row["packing_mu"] if "packing_mu" in row else row["mu"]
-        seeds.setdefault(mu, set()).add(row["seed"])
-    return seeds
-
-
-def packings_at_each(rows: Rows) -> str:
+def packings_at_each(rows: pd.DataFrame) -> str:
     """The number of packings at each μ, in words: "10", or "10 to 30"."""
-    counts = sorted(map(len, seeds_at(rows).values())) or [0]
-    return f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
+    made_at = rows["packing_mu"].fillna(rows["mu"])  # packings may share the friction of cones
+    counts = rows.groupby(made_at)["seed"].nunique()
+    low, high = (counts.min(), counts.max()) if len(counts) else (0, 0)
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def merged(new: StudyTable, old: StudyTable) -> StudyTable:
@@ -290,32 +283,20 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
     values if those cells no longer exist. Raises InputError if rows have other versions than those
     that the plan has now.
     """
-    tasks = {_name(_named(task)): task for task in plans.tasks(plans.Plan(**new.plan))}
-    planned = tasks.keys()
-    for row in old.rows:
-        task = tasks.get(_name(row))
-        if task is not None and _versions(row) != _versions(_named(task)):
-            raise InputError(
-                f"the older table has {row['part']} {_version_words(row)}, which cannot be "
-                f"combined with {_version_words(_named(task))}: leave --table out"
-            )
-    known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
-    old_rows = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
-    place = {k: len(new.rows) + at for at, k in enumerate(old_rows)}
-    lacked = np.isin(old.samples["row"], old_rows)
-    samples = {
-        field: np.concatenate([new.samples[field], values[lacked]])
-        for field, values in old.samples.items()
-    }
-    moved = [place[k] for k in old.samples["row"][lacked].astype(int)]
-    samples["row"][len(new.samples["row"]) :] = moved
+    planned = _tasks_named(plans.tasks(plans.Plan(**new.plan))).set_index(_KEYS)
+    ours, theirs = _names(new.rows), _names(old.rows)
+    _check_same_versions(old.rows, planned.reindex(theirs))
+    lacked = theirs.isin(planned.index) & ~theirs.isin(ours)
+    place = {k: len(new.rows) + at for at, k in enumerate(np.flatnonzero(lacked).tolist())}
+    known = old.rows.set_axis(theirs).reindex(ours).set_axis(new.rows.index)
+    added = old.samples[old.samples["row"].isin(place)]
+    added = added.assign(row=added["row"].map(place))
     return new._replace(
-        rows=[older.get(_name(row), {}) | row for row in new.rows]
-        + [old.rows[k] for k in old_rows],
-        samples=samples,
+        rows=pd.concat([new.rows.fillna(known), old.rows[lacked]], ignore_index=True),
+        samples=pd.concat([new.samples, added], ignore_index=True),
         shown=new.shown + [(place[k], counts) for k, counts in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
-        skipped={"missing_cells": new.skipped["missing_cells"] - len(old_rows)},
+        skipped={"missing_cells": new.skipped["missing_cells"] - len(place)},
         tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
         decays=dict(new.decays) | {place[k]: d for k, d in old.decays.items() if k in place},
     )
@@ -330,35 +311,61 @@ def _named(task: Task) -> dict[str, Any]:
     return row | {"version": task.cell.kind.version, "packing_version": packing}
 
 
-def _name(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return row["part"], row["n"], row["mu"], row["seed"], row.get("packing_mu", row["mu"])
+# What names a row. Packings may be made at another μ than that of their cones.
+_KEYS = ["part", "n", "mu", "seed", "packing_mu"]
 
 
-def _versions(row: Mapping[str, Any]) -> tuple[Any, Any]:
-    return row.get("version"), row.get("packing_version")
+def _tasks_named(tasks: Iterable[Task]) -> pd.DataFrame:
+    """The rows that tasks will have, without numbers, and with every packing_mu."""
+    rows = make_rows(map(_named, tasks))
+    return rows.assign(packing_mu=rows["packing_mu"].fillna(rows["mu"]))
+
+
+def _names(rows: pd.DataFrame) -> pd.MultiIndex:
+    full = rows.assign(packing_mu=rows["packing_mu"].fillna(rows["mu"]))
+    return pd.MultiIndex.from_frame(full[_KEYS])
+
+
+def _check_same_versions(rows: pd.DataFrame, planned: pd.DataFrame) -> None:
+    """InputError if a row has another version than the row of the plan, if there is one, below it.
+
+    planned: as many rows, NaN where the plan has none.
+    """
+    wanted = planned[_VERSIONS].set_axis(rows.index)
+    differ = wanted["version"].notna() & (rows[_VERSIONS] != wanted).any(axis=1)
+    for k in rows.index[differ][:1]:
+        raise InputError(
+            f"the older table has {rows.loc[k, 'part']} {_version_words(rows.loc[k])}, which "
+            f"cannot be combined with {_version_words(wanted.loc[k])}: leave --table out"
+        )
+
+
+_VERSIONS = ["version", "packing_version"]
 
 
 def _version_words(row: Mapping[str, Any]) -> str:
-    version, packing = ("unknown" if v is None else f"{v:g}" for v in _versions(row))
+    version, packing = ("unknown" if np.isnan(row[v]) else f"{row[v]:g}" for v in _VERSIONS)
     return f"of version {version} in packings of version {packing}"
 
 
-def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
+def check_versions(rows: pd.DataFrame) -> None:
     """InputError if rows of one part differ in version, or packings made by one algorithm.
 
     Rows of an older table without a version count as one version.
     """
-    first: dict[Any, Any] = {}
-    for row in rows:
-        # Packings of small friction, and large ones, are made by algorithms with other versions.
-        made_by = packing_version(row.get("packing_mu", row["mu"]), row["n"])
-        for group, version in zip((row["part"], made_by), _versions(row), strict=True):
-            other = first.setdefault(group, (row, version))
-            if other[1] != version:
-                raise InputError(
-                    f"the study mixes {row['part']} {_version_words(row)} with {other[0]['part']} "
-                    f"{_version_words(other[0])}: reduce it again from cells of one version"
-                )
+    made_at = rows["packing_mu"].fillna(rows["mu"])
+    # Packings of small friction, and large ones, are made by algorithms with other versions.
+    made_by = [packing_version(mu, n) for mu, n in zip(made_at, rows["n"], strict=True)]
+    for group, name in zip((rows["part"], pd.Series(made_by, rows.index)), _VERSIONS, strict=True):
+        versions = rows[name].fillna(0)
+        mixed = rows[versions != versions.groupby(group).transform("first")]
+        if len(mixed):
+            other = mixed.iloc[0]
+            one = rows[group == group[other.name]].iloc[0]
+            raise InputError(
+                f"the study mixes {other['part']} {_version_words(other)} with {one['part']} "
+                f"{_version_words(one)}: reduce it again from cells of one version"
+            )
 
 
 def save(table: StudyTable, path: str | Path) -> None:
@@ -367,7 +374,7 @@ def save(table: StudyTable, path: str | Path) -> None:
     dataset = _dataset(table)
     store.clear("study")
     store.clear("packing")  # those of an older table, made otherwise, would be found first
-    digest = hashlib.sha256(json.dumps(table.rows).encode()).hexdigest()[:16]
+    digest = hashlib.sha256(table.rows.to_json().encode()).hexdigest()[:16]
     single = ("sample_normal", "sample_least", "sample_extent")
     store.save(
         "study",
@@ -377,8 +384,8 @@ def save(table: StudyTable, path: str | Path) -> None:
         dtypes=dict.fromkeys(single, "float32"),
     )
     for k, packing in table.packings.items():
-        row = table.rows[k]
-        named = kinds.PACKING.parameters(row["n"], row["mu"], row["seed"])
+        row = table.rows.loc[k, ["n", "mu", "seed"]]
+        named = kinds.PACKING.parameters(int(row["n"]), float(row["mu"]), int(row["seed"]))
         kinds.keep_packing(store, named, packing)
 
 
@@ -393,13 +400,11 @@ def load(path: str | Path) -> StudyTable:
 
 
 def _dataset(table: StudyTable) -> xr.Dataset:
-    names = sorted({name for row in table.rows for name in row} - {"part"})
-    parts = sorted({row["part"] for row in table.rows})
-    arrays: dict[str, Any] = {
-        f"row_{name}": [_number(row.get(name)) for row in table.rows] for name in names
-    }
-    arrays["row_part"] = [parts.index(row["part"]) for row in table.rows]
-    arrays |= {f"sample_{name}": values for name, values in table.samples.items()}
+    known = table.rows.dropna(axis="columns", how="all")
+    parts, codes = np.unique(known["part"].to_numpy(str), return_inverse=True)
+    arrays: dict[str, Any] = {f"row_{name}": known[name] for name in sorted(known)}
+    arrays["row_part"] = codes
+    arrays |= {f"sample_{name}": table.samples[name] for name in SAMPLES}
     if table.shown:
         arrays["shown_row"] = np.concatenate([np.full(len(s), k) for k, s in table.shown])
         arrays["shown_count"] = np.concatenate([s for _, s in table.shown])
@@ -411,27 +416,22 @@ def _dataset(table: StudyTable) -> xr.Dataset:
         arrays["decay_row"] = np.repeat(list(table.decays), shells)
         both = np.concatenate(list(table.decays.values())).T
         arrays["decay_radius"], arrays["decay_size"] = both
-    return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
-
-
-def _number(value: Any) -> Any:
-    return np.nan if value is None else value
+    return labelled(
+        arrays, {"parts": json.dumps(parts.tolist()), "skipped": json.dumps(table.skipped)}
+    )
 
 
 def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
-    parts = json.loads(dataset.attrs["parts"])
+    parts = np.array(json.loads(dataset.attrs["parts"]))
     columns = {
         name.removeprefix("row_"): dataset[name].values
         for name in map(str, dataset)
         if name.startswith("row_")
     }
-    rows = []
-    for k in range(dataset.sizes["row"]):
-        row = {name: values[k].item() for name, values in columns.items()}
-        row |= {"part": parts[row["part"]], "n": int(row["n"]), "seed": int(row["seed"])}
-        rows.append({name: value for name, value in row.items() if value == value})
+    columns["part"] = parts[columns["part"]]
+    rows = make_rows(pd.DataFrame(columns))
     check_versions(rows)
-    samples = {name: dataset[f"sample_{name}"].values for name in SAMPLES}
+    samples = pd.DataFrame({name: dataset[f"sample_{name}"].values for name in SAMPLES})
     shown, packings = [], {}
     if "shown_row" in dataset:
         for k in np.unique(dataset["shown_row"]).tolist():
@@ -439,9 +439,9 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
             if "shown_count" in dataset:
                 shown.append((k, dataset["shown_count"].values[chosen]))
             else:  # as in former tables: some states
-                original = samples["normal"][samples["row"] == k]
+                original = samples["normal"][samples["row"] == k].to_numpy()
                 shown.append((k, ratio_counts(original, dataset["shown_normal"].values[:, chosen])))
-            packings[k] = _packing(store, rows[k])
+            packings[k] = _packing(store, rows.loc[k])
     tails = {}
     if "tail_row" in dataset:
         counts = dataset["tail_count"].values
@@ -456,7 +456,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
     return StudyTable(plan, rows, samples, shown, packings, skipped, tails, decays)
 
 
-def _packing(store: Store, row: dict[str, Any]) -> Packing:
+def _packing(store: Store, row: pd.Series) -> Packing:
     """The Packing of a row, of the algorithm's version in the table's store."""
-    named = {"n": row["n"], "mu": friction(row["mu"]), "seed": row["seed"]}
+    named = {"n": int(row["n"]), "mu": friction(row["mu"]), "seed": int(row["seed"])}
     return dataset_packing(store[store.find("packing", **named)[0].name])

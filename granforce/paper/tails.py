@@ -38,7 +38,7 @@ def counts(table: StudyTable) -> dict[str, dict[float, list[Floats]]]:
     """{words: {μ: [counts of f_n in the bins with edges FORCES, of each packing]}}."""
     counts_by_part: dict[Any, Any] = {}
     for k, counted in table.tails.items():
-        row = table.rows[k]
+        row = table.rows.loc[k]
         known = counts_by_part.setdefault(PRESCRIBED[row["part"]], {})
         known.setdefault(row["mu"], []).append(counted)
     return {word: dict(sorted(known.items())) for word, known in counts_by_part.items()}

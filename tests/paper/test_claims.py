@@ -1,6 +1,7 @@
 """Claims: those of the paper are reproduced by what it describes; at a knife edge none is."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from granforce.paper import claims, findings, tables, tails
@@ -40,8 +41,28 @@ def synthetic(eta, **options):
         answer |= {"critical_force": 1 + eta(row["mu"]), "decay_exponent": 0.5 + eta(row["mu"])}
         answer |= {name: f(row["mu"]) for name, f in options.items() if name in answer}
         rows.append(answer | {"limit_load": 2 * answer["critical_force"]})
-    joined = {name: np.concatenate(parts) for name, parts in samples.items()}
-    return tables.StudyTable({}, rows, joined, [], {}, {})
+    return study(rows, {name: np.concatenate(parts) for name, parts in samples.items()})
+
+
+def study(rows=(), samples=None, plan=None, **more):
+    """A table of some rows."""
+    samples = tables.no_samples() if samples is None else pd.DataFrame(samples)
+    return tables.StudyTable(plan or {}, tables.make_rows(rows), samples, [], {}, {}, **more)
+
+
+def with_rows(table, *more):
+    """A table with more rows at its end."""
+    rows = pd.concat([table.rows, *more], ignore_index=True)
+    return table._replace(rows=tables.make_rows(rows))
+
+
+def changed(table, part, mu=None, **columns):
+    """A table with other numbers in a part, at one μ or at all."""
+    rows = table.rows.copy()
+    chosen = (rows["part"] == part) & (True if mu is None else rows["mu"] == mu)
+    for name, values in columns.items():
+        rows.loc[chosen, name] = values(rows[chosen]) if callable(values) else values
+    return table._replace(rows=rows)
 
 
 SWEEPS = groups.SAMPLERS["gauss_seidel"]
@@ -254,13 +275,12 @@ def test_what_a_figure_is_said_to_show_can_fail(family, statement, options, verd
 def test_a_power_law_and_an_exponential_are_told_apart(rng):
     r = 0.25 + 0.5 * np.arange(3, 17)
     for law, verdict in ((r**-0.7, verdicts.REPRODUCED), (np.exp(-r / 4), verdicts.CONTRADICTED)):
-        table = synthetic(rise_and_fall)
-        decays = {}
-        for k, row in enumerate(table.rows):
-            if row["part"] == "response" and row["mu"] >= 0.01:
-                shells = len(r) - row["seed"] % 2  # boxes differ
-                noise = np.exp(0.05 * rng.normal(size=shells))
-                decays[k] = np.column_stack([r[:shells], law[:shells] * noise])
+        table, decays = synthetic(rise_and_fall), {}
+        answers = table.part("response")
+        for row in answers[answers["mu"] >= 0.01].itertuples():
+            shells = len(r) - row.seed % 2  # boxes differ
+            noise = np.exp(0.05 * rng.normal(size=shells))
+            decays[row.Index] = np.column_stack([r[:shells], law[:shells] * noise])
         (claim,) = figure2.law(table._replace(decays=decays), "")
         assert claim.verdict == verdict
     decays = {k: decay[:3] for k, decay in decays.items()}
@@ -273,13 +293,14 @@ def test_a_power_law_and_an_exponential_are_told_apart(rng):
 )
 def test_walks_are_repeated_in_the_same_packings(rng, scatter, longer, verdict):
     table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        if row["mu"] in (0.1, 10):
-            for k in (1, 2):
-                eta = row["eta2"] * np.exp(scatter * rng.normal())
-                table.rows.append(row | {"part": f"repeat_sweeps_{k}", "eta2": eta})
-            other = {name: row[name] * longer for name in ("eta2", "eta3")}
-            table.rows.append(row | {"part": "repeat_sweeps_long"} | other)
+    rows = table.part(SWEEPS)
+    rows = rows[rows["mu"].isin((0.1, 10))]
+    longer = {name: rows[name] * longer for name in ("eta2", "eta3")}
+    more = [rows.assign(part="repeat_sweeps_long", **longer)]
+    for k in (1, 2):
+        eta = rows["eta2"] * np.exp(scatter * rng.normal(size=len(rows)))
+        more.append(rows.assign(part=f"repeat_sweeps_{k}", eta2=eta))
+    table = with_rows(table, *more)
     found = judged(table, [claims.reproducible])
     assert len(found) == 3
     assert set(found.values()) == {verdict}
@@ -287,32 +308,42 @@ def test_walks_are_repeated_in_the_same_packings(rng, scatter, longer, verdict):
 
 def test_cones_and_contacts_are_judged_each_by_itself():
     table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        mu, row = row["mu"], row | {"part": "exact", "eta3": 5.0 if row["mu"] == 10 else 1.0}
-        if mu > 0:
-            opened = {"packing_mu": 0, "eta3": 30 * mu**0.3 + 0.01 * row["seed"]}
-            table.rows.append(row | {"part": "opened_exact"} | opened)
-            table.rows.append(row)
-        if 0 < mu < 10:
-            wide = {"packing_mu": mu, "mu": 10, "eta3": 18 - np.log(mu) + 0.01 * row["seed"]}
-            table.rows.append(row | {"part": "widest_exact"} | wide)
+    exact = table.part(SWEEPS).assign(part="exact")
+    exact = exact.assign(eta3=np.where(exact["mu"] == 10, 5.0, 1.0))[exact["mu"] > 0]
+    some = exact[exact["mu"] < 10]
+    table = with_rows(
+        table,
+        exact.assign(
+            part="opened_exact", packing_mu=0, eta3=30 * exact["mu"] ** 0.3 + 0.01 * exact["seed"]
+        ),
+        exact,
+        some.assign(
+            part="widest_exact",
+            packing_mu=some["mu"],
+            mu=10,
+            eta3=18 - np.log(some["mu"]) + 0.01 * some["seed"],
+        ),
+    )
     opened, contacts = claims.causes(table, "exact")
     assert opened.verdict == verdicts.REPRODUCED
     # Packings with the most friction are those of exact bounds, those without were opened.
     assert contacts.verdict == verdicts.REPRODUCED
     assert contacts.value == pytest.approx(-1)
-    for row in table.part("opened_exact"):
-        row["eta3"] = 30 - row["mu"]
+    table = changed(table, "opened_exact", eta3=lambda rows: 30 - rows["mu"])
     opened, contacts = claims.causes(table, "exact")
     assert opened.verdict == verdicts.STRONGLY
 
 
 def test_findings_compare_the_same_packings():
     table = synthetic(rise_and_fall)
-    for part, eta3, eta2 in (("walk", 1, 1), ("exact", 2, np.nan), ("uniform", 1, 0.5)):
-        for row in table.part(SWEEPS):
-            copied = row | {"part": part, "eta3": eta3 * row["eta3"], "eta2": eta2 * row["eta2"]}
-            table.rows.append(copied | {"walk_ratio": 1.5, "original_ratio": 0.5})
+    rows = table.part(SWEEPS).assign(walk_ratio=1.5, original_ratio=0.5)
+    table = with_rows(
+        table,
+        *(
+            rows.assign(part=part, eta3=eta3 * rows["eta3"], eta2=eta2 * rows["eta2"])
+            for part, eta3, eta2 in (("walk", 1, 1), ("exact", 2, np.nan), ("uniform", 1, 0.5))
+        ),
+    )
     told = {finding.statement: finding for finding in findings.measured(table)}
     for word in ("small", "intermediate", "large"):
         ratio = told[f"η3 of the nearest-network walk over exact η3, {word} μ"]
@@ -330,9 +361,7 @@ def test_findings_compare_the_same_packings():
         "⟨F_crit⟩ with the pair excluded from the pressure over that with it included, large μ"
     ]
     assert 1 < left_out.value < 1.01
-    table.rows[:] = table.part(SWEEPS)
-    for values in table.samples.values():
-        values.resize(0, refcheck=False)
+    table = table._replace(rows=table.part(SWEEPS), samples=tables.no_samples())
     assert not [f for f in findings.measured(table) if "sweeps_1e" not in f.statement]
 
 
@@ -362,10 +391,8 @@ def test_a_maximum_beyond_the_window_of_its_parabola_is_not_clipped():
 
 
 def test_negative_exponents_count():
-    table = synthetic(rise_and_fall)
-    for row in table.part("response"):
-        if row["mu"] == 0.1:
-            row["decay_exponent"] = -0.1 if row["seed"] < 5 else 0.1
+    signs = {"decay_exponent": lambda rows: np.where(rows["seed"] < 5, -0.1, 0.1)}
+    table = changed(synthetic(rise_and_fall), "response", 0.1, **signs)
     _, alpha = figure2.perturbation(table, "")
     assert alpha.value != pytest.approx(0.1, rel=0.5)
     rises = {c.statement: c for c in figure2.response(table, "gauss_seidel")}
@@ -394,9 +421,8 @@ def test_what_rises_to_the_end_is_monotonic(rng):
 
 def test_coordination_has_to_come_near_its_limit():
     for height, verdict in ((3.005, verdicts.REPRODUCED), (3.02, verdicts.CONTRADICTED)):
-        table = synthetic(rise_and_fall, coordination=lambda mu, height=height: height)
-        for row in table.part(SWEEPS):
-            row["coordination"] = height + 1e-4 * row["seed"]
+        near = {"coordination": lambda rows, height=height: height + 1e-4 * rows["seed"]}
+        table = changed(synthetic(rise_and_fall), SWEEPS, **near)
         assert judged(table, [claims.coordination])["z → 3 at the largest μ"] == verdict
 
 
@@ -489,31 +515,28 @@ def test_what_was_not_relaxed_was_not_measured():
     table = synthetic(rise_and_fall)
     (claim,) = figure1.vanishing(table, "gauss_seidel")
     assert claim.verdict == verdicts.REPRODUCED
-    for row in table.part(SWEEPS):
-        row["dimension"] = 5.0 * (row["mu"] > 0)
+    table = changed(table, SWEEPS, 0, dimension=0.0)
     (claim,) = figure1.vanishing(table, "gauss_seidel")
     assert claim.verdict == verdicts.UNMEASURED
-    for row in table.part(SWEEPS):
-        row |= {"skipped_part": 0.0, "eta2": 0.024}
+    table = changed(table, SWEEPS, skipped_part=0.0, eta2=0.024)
     (claim,) = figure1.vanishing(table, "gauss_seidel")
     assert (claim.verdict, claim.value) == (verdicts.CONTRADICTED, pytest.approx(0.024))
 
 
 def test_eta3_is_compared_with_the_exact_one_of_the_same_packing():
     table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        table.rows.append(row | {"part": "exact", "eta3": row["eta3"] * 2})
+    rows = table.part(SWEEPS)
+    table = with_rows(table, rows.assign(part="exact", eta3=rows["eta3"] * 2))
     (claim,) = figure1.measure(table, "gauss_seidel")
     assert (claim.verdict, claim.value) == (verdicts.STRONGLY, pytest.approx(0.5))
 
 
 def test_the_papers_own_walks_are_compared_over_sizes():
     table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        if row["mu"] == 0.1:
-            for n in (100, 1600):
-                larger = {"part": "size_sweeps", "n": n, "eta2": row["eta2"] * (n / 400) ** 0.5}
-                table.rows.append(row | larger)
+    rows = table.part(SWEEPS)
+    rows = rows[rows["mu"] == 0.1].assign(part="size_sweeps")
+    sized = (rows.assign(n=n, eta2=rows["eta2"] * (n / 400) ** 0.5) for n in (100, 1600))
+    table = with_rows(table, *sized)
     (claim,) = figure1.size(table, "gauss_seidel")
     assert claim.value == pytest.approx(0.5, abs=0.02)
     assert claim.verdict == verdicts.STRONGLY
@@ -521,33 +544,28 @@ def test_the_papers_own_walks_are_compared_over_sizes():
 
 def test_few_disks_decide_nothing():
     table = synthetic(rise_and_fall)
-    for row in table.rows:
-        row["n"] = 40
+    table = table._replace(rows=table.rows.assign(n=40))
     families = [claims.agreement, claims.maximum, claims.correlation, claims.counts, claims.pairs]
     assert set(judged(table, families).values()) == {verdicts.FEW}
 
 
 def test_a_walk_that_reached_few_states_is_not_judged():
-    table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        row["reached_part"] = 0.1 if row["mu"] == 10 else 1.0
+    table = changed(synthetic(rise_and_fall), SWEEPS, 10, reached_part=0.1)
     assert 10 not in groups.items(groups.drawn(table, "gauss_seidel"), "eta2")
     assert 10 not in groups.sampled(table, "gauss_seidel")
 
 
 def test_every_claim_names_its_sampler_and_its_source():
     table = synthetic(rise_and_fall)
-    table.rows[:] = [row for row in table.rows if row["mu"] < 0.01]
-    for values in table.samples.values():
-        values.resize(0, refcheck=False)
+    few = tables.make_rows(table.rows[table.rows["mu"] < 0.01].reset_index(drop=True))
+    table = table._replace(rows=few, samples=tables.no_samples())
     for claim in claims.judged(table):
         assert claim.sampler in {"", *groups.SAMPLERS}
         assert claim.source in {verdicts.PRE, verdicts.PRL}
 
 
 def test_without_data_there_is_no_verdict():
-    empty = tables.StudyTable({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
-    assert set(judged(empty).values()) == {verdicts.MISSING}
+    assert set(judged(study()).values()) == {verdicts.MISSING}
 
 
 @pytest.mark.parametrize("power", [1, 2])
@@ -562,7 +580,7 @@ def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
     assert tail.off <= right < 0.3 * wrong
     assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
     row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
-    table = tables.StudyTable({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
+    table = study([row], tails={0: counted.astype(float)})
     told = [finding.statement for finding in findings.forces(table)]
     assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
     assert tails.described(table).startswith("whole stress prescribed, μ = 0.1: b = ")
@@ -576,7 +594,7 @@ def test_volumes_tell_where_they_are_largest_and_what_they_follow():
             sized = {"extent": width + 0.001 * seed, "log_volume_per_grain": np.log(width)}
             rows.append(row | {"part": "volume"} | sized)
             rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
-    table = tables.StudyTable({}, rows, {}, [], {}, {})
+    table = study(rows)
     told = {finding.statement: finding.value for finding in findings.volume(table)}
     assert 0.03 < told["μ where S is widest"] < 0.5
     assert told["rank correlation of the width of S with η2, over packings of all μ"] > 0.6

@@ -10,6 +10,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 from heeding import heeding, interrupted, until_it_left
 
@@ -17,6 +18,7 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
+from granforce.measures import statistics
 from granforce.paper import claims, documents, drawings, findings, formatting, tables
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, outcomes, verdicts
@@ -61,6 +63,8 @@ WORDS = [
     *("--gauss-seidel-packings", "1", "--response-packings", "0", "--perturb-packings", "0"),
     *("--sizes", "12"),
 ]
+
+EMPTY = tables.StudyTable({}, tables.make_rows([]), tables.no_samples(), [], {}, {})
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +191,7 @@ def test_rows_are_the_numbers_of_their_cells(done, table):
     assert table.skipped == {"missing_cells": 0}
     assert len(table.rows) == len(plans.tasks(TINY))
     store = open_store(done / "cells.zarr")
-    for task, row in zip(plans.tasks(TINY), table.rows, strict=True):
+    for task, (_, row) in zip(plans.tasks(TINY), table.rows.iterrows(), strict=True):
         dataset = load(store, *task.cell)
         assert (row["part"], row["mu"], row["seed"]) == (task.part, task.mu, task.seed)
         if task.part == "sweeps_1e-6" and not dataset.sizes["state"]:
@@ -211,12 +215,13 @@ def test_rows_are_the_numbers_of_their_cells(done, table):
             assert row["undetermined"] == np.sum(dataset["cluster"] >= 0)
             assert row["max_gap"] <= 1e-8
     exact, walk = (table.part(part, n=20) for part in ("exact", "walk"))
-    for row in exact:
-        (beside,) = (w for w in walk if (w["mu"], w["seed"]) == (row["mu"], row["seed"]))
-        assert row["mean_extent"] >= beside["mean_extent"] - 1e-9
-    for row in table.part("uniform"):
-        assert ("walk_ratio" in row) == (row["dimension"] > 0)
-    for row, beside in zip(table.part("stress"), table.part("stress_uniform"), strict=True):
+    pairs = statistics.paired(exact, walk)
+    assert len(pairs) == len(exact) and len(exact)
+    assert (pairs["mean_extent"] >= pairs["mean_extent_other"] - 1e-9).all()
+    uniform = table.part("uniform")
+    assert (uniform["walk_ratio"].notna() == (uniform["dimension"] > 0)).all()
+    stressed = (table.part(part).iterrows() for part in ("stress", "stress_uniform"))
+    for (_, row), (_, beside) in zip(*stressed, strict=True):
         assert (row["mu"], row["seed"]) == (beside["mu"], beside["seed"])
         assert 0 < beside["mean_shear"] < beside["largest_shear"] < row["friction"]
         assert row["own_shear"] < row["friction"]
@@ -228,22 +233,22 @@ def test_rows_are_the_numbers_of_their_cells(done, table):
         np.testing.assert_allclose(
             [np.mean(shears), np.max(shears)], [beside["mean_shear"], beside["largest_shear"]]
         )
-    for row in table.part("sweeps_1e-3"):
-        assert row["reached_part"] == 1
-        assert row["acceptance"] > 0
-        # Distances of pairs by pairs.
-        assert ("pair_spread" in row) == (row["dimension"] > 0)
+    swept = table.part("sweeps_1e-3")
+    assert (swept["reached_part"] == 1).all() and (swept["acceptance"] > 0).all()
+    # Distances of pairs by pairs.
+    assert (swept["pair_spread"].notna() == (swept["dimension"] > 0)).all()
     task = next(t for t in plans.tasks(TINY) if (t.part, t.mu) == ("walk", 0.3))
     states = load(store, *task.cell)["states"].values
     apart = [np.linalg.norm(a - b) for k, a in enumerate(states) for b in states[:k]]
-    (row,) = (r for r in walk if (r["mu"], r["seed"]) == (0.3, task.seed))
-    assert row["pair_spread"] == pytest.approx(np.std(apart) / np.mean(apart), rel=1e-4)
+    (spread,) = walk["pair_spread"][(walk["mu"] == 0.3) & (walk["seed"] == task.seed)]
+    assert spread == pytest.approx(np.std(apart) / np.mean(apart), rel=1e-4)
 
 
 def test_a_table_survives_its_store(done, table, tmp_path):
     tables.save(table, tmp_path / "study.zarr")
     store = open_store(tmp_path / "study.zarr")
-    names = {tuple(table.rows[k][name] for name in ("n", "mu", "seed")) for k in table.packings}
+    made = table.rows.loc[list(table.packings), ["n", "mu", "seed"]]
+    names = set(made.itertuples(index=False, name=None))
     older = kinds.PACKING.parameters(*min(names), dt=0.5)
     kinds.keep_packing(store, older, next(iter(table.packings.values())))
     tables.save(table, tmp_path / "study.zarr")  # again: replaced, not doubled
@@ -251,11 +256,9 @@ def test_a_table_survives_its_store(done, table, tmp_path):
     assert len(store.find("packing")) == len(names)  # none that was made otherwise
     assert all(verdict.ok for verdict in store.verify())
     found = tables.load(tmp_path / "study.zarr")
-    known = [{name: value for name, value in row.items() if value == value} for row in table.rows]
-    assert found.rows == known
+    pd.testing.assert_frame_equal(found.rows, table.rows, rtol=0, atol=0)
     assert found.skipped == table.skipped
-    for name, values in table.samples.items():
-        np.testing.assert_allclose(found.samples[name], values, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(found.samples, table.samples, rtol=1e-6, atol=1e-7)
     for (one, counted), (other, counts) in zip(found.shown, table.shown, strict=True):
         assert one == other
         assert np.array_equal(counted, counts)
@@ -282,32 +285,33 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
     old = tables.reduce(done / "cells.zarr", TINY)
     few = plans.chosen(TINY, ["walk"])
     new = tables.reduce(done / "cells.zarr", TINY)
-    kept = [k for k, row in enumerate(new.rows) if row["part"] == "exact"]
+    rows = new.part("exact")
+    place = {k: at for at, k in enumerate(rows.index)}
+    samples = new.samples[new.samples["row"].isin(place)]
+    lost, rows = rows["dimension"].iloc[-1], rows.reset_index(drop=True)
+    rows.loc[0, "eta3"] = 7.0  # the newer row is the one that is taken
+    rows.loc[len(rows) - 1, "dimension"] = np.nan
     fewer = new._replace(
-        rows=[new.rows[k] for k in kept],
-        samples={
-            name: values[np.isin(new.samples["row"], kept)] for name, values in new.samples.items()
-        },
+        rows=rows,
+        samples=samples.assign(row=samples["row"].map(place)),
         shown=[],
         packings={},
         skipped={"missing_cells": len(few)},
     )
-    fewer.samples["row"][:] = np.searchsorted(kept, fewer.samples["row"])
-    fewer.rows[0]["eta3"] = 7.0  # the newer row is the one that is taken
-    old.rows.append({"part": "of another plan", "n": 20, "mu": 0.1, "seed": 1})
-    lost = fewer.rows[-1].pop("dimension")
+    other = tables.make_rows([{"part": "of another plan", "n": 20, "mu": 0.1, "seed": 1}])
+    old = old._replace(rows=pd.concat([old.rows, other], ignore_index=True))
     joined = tables.merged(fewer, old)
     assert len(joined.rows) == len(new.rows)
-    assert joined.rows[len(fewer.rows) - 1]["dimension"] == lost
-    assert joined.rows[0]["eta3"] == 7.0
+    assert joined.rows.loc[len(rows) - 1, "dimension"] == lost
+    assert joined.rows.loc[0, "eta3"] == 7.0
     for part in ("walk", "exact", "uniform"):
         for mu, group in joined.extents(part).items():
             for one, other in zip(group, new.extents(part)[mu], strict=True):
                 assert np.array_equal(one, other)
     for k, counts in joined.shown:
-        assert joined.rows[k]["part"] in plans.SHOWN_PARTS
+        assert joined.rows.loc[k, "part"] in plans.SHOWN_PARTS
         assert k in joined.packings
-        assert len(counts) == joined.rows[k]["contacts"]
+        assert len(counts) == joined.rows.loc[k, "contacts"]
 
 
 def test_every_figure_of_the_table_is_made(table):
@@ -422,33 +426,32 @@ def cells_of(text, mu):
 
 def test_a_column_of_fewer_packings_says_of_how_many(table):
     line = cells_of(documents.measures(table), 0.3)
-    walk = np.array([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
+    walk = statistics.grouped(table.part("walk"), "eta2")[0.3]
     assert line["packings"] == "2"
     error = walk.std(ddof=1) / np.sqrt(2)
     mean, _, told = line["nearest-network walk η2"].partition(" ± ")
     assert (float(mean), float(told)) == pytest.approx((walk.mean(), error), rel=0.06)
     # The paper's walk is of the first one: its ratio is to the other walk in the same packing.
     more = cells_of(documents.walks(table), 0.3)
-    phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
+    phi = statistics.grouped(table.part("exact"), "packing_fraction")[0.3].mean()
     assert more["φ"] == f"{phi:.4f}"
     ratio = more["paper's walk/nearest-network walk η2 (n = 1)"]
     assert line["paper's walk η2 (n = 1)"] == more["paper's walk η2 (n = 1)"]
-    (swept,) = (row for row in table.part("sweeps_1e-3") if row["mu"] == 0.3)
-    assert float(ratio.split()[0]) == pytest.approx(swept["eta2"] / walk[0], abs=2e-3)
+    (swept,) = statistics.grouped(table.part("sweeps_1e-3"), "eta2")[0.3]
+    assert float(ratio.split()[0]) == pytest.approx(swept / walk[0], abs=2e-3)
 
 
 def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     """At μ = 0 S is one point: sweeps end beside it, by more than its extent."""
     assert groups.outside(table, "walk") == []
     assert 0 in groups.outside(table, "sweeps_1e-3")
-    for row in table.part("sweeps_1e-3", "walk"):
-        assert row["excess"] >= 0
-    assert max(row["excess"] for row in table.part("walk") if row["mu"] > 0) < 1e-8
+    assert (table.part("sweeps_1e-3", "walk")["excess"] >= 0).all()
+    assert groups.positive(table.part("walk"), "mu")["excess"].max() < 1e-8
     line = cells_of(documents.measures(table), 0)
     more = cells_of(documents.walks(table), 0)
     assert set(more.values()) >= {"outside S"}
     assert line["paper's walk η2 (n = 1)"] == "outside S"
-    assert {row["mu"] for row in groups.drawn(table, "gauss_seidel")} <= {0.1, 0.3}
+    assert set(groups.drawn(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
     told = {(c.statement, c.sampler): c for c in claims.judged(table)}
     vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
     assert vanishing.verdict == verdicts.UNMEASURED
@@ -462,16 +465,20 @@ def test_sweeps_tell_how_far_outside_of_s_they_end(table):
     assert heads.endswith("| excess, 10⁻³ | η2, 10⁻³ | η2, 10⁻⁴ | η2, 10⁻⁶ |")
     assert first.startswith("| 0 | ") and "| all | outside S |" in first
     assert all("outside" not in line for line in others)
-    only = [row for row in table.rows if row["part"] not in ("sweeps_1e-4", "sweeps_1e-6")]
+    only = table.rows[~table.rows["part"].isin(("sweeps_1e-4", "sweeps_1e-6"))]
     assert "| μ | sweeps to 10⁻³ | excess, 10⁻³ |" in documents.sweeps(table._replace(rows=only))
-    for row, exact in zip(table.part("sweeps_1e-3"), table.part("exact"), strict=False):
-        row, exact = row | {"part": "sweeps_1e-4"}, exact | {"mean_length": 2.0}
-        for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "1.1"), (1e-9, "< 0.001")):
-            rows = [row | {"excess": excess, "mu": 0.1, "seed": 1}, exact | {"mu": 0.1, "seed": 1}]
-            *_, line = documents.sweeps(table._replace(rows=rows)).splitlines()
-            assert told in line
-        rows[0] |= {"part": "sweeps_1e-3", "excess": 0.5, "skipped_part": 0.0}
-        assert ", excess 0.25 |" in documents.walks(table._replace(rows=rows))
+    swept, exact = (table.part(part)[:1].assign(mu=0.1) for part in ("sweeps_1e-3", "exact"))
+    exact = exact.assign(mean_length=2.0)
+
+    def ends(part, excess, **more):
+        rows = [swept.assign(part=part, excess=excess, **more), exact]
+        return table._replace(rows=pd.concat(rows, ignore_index=True))
+
+    for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "1.1"), (1e-9, "< 0.001")):
+        *_, line = documents.sweeps(ends("sweeps_1e-4", excess)).splitlines()
+        assert told in line
+    part = ends("sweeps_1e-3", 0.5, skipped_part=0.0)
+    assert ", excess 0.25 |" in documents.walks(part)
 
 
 def test_what_packings_depend_on_is_told_by_paired_differences(table):
@@ -484,7 +491,7 @@ def test_what_packings_depend_on_is_told_by_paired_differences(table):
     }
     assert len(lines) == 1 + len(plans.variations(0.1))
     some, usual = (
-        np.array([row["dimension"] for row in table.part(part, n=20) if row["mu"] == 0.1])
+        statistics.grouped(table.part(part, n=20), "dimension")[0.1]
         for part in ("prepared_box_mass_30_exact", "exact")
     )
     assert lines["default"] == formatting.with_error(usual)
@@ -507,7 +514,7 @@ def test_differences_of_few_packings_are_judged_by_students_t():
         for seed, dimension in enumerate(dimensions)
     ]
     rows += [row | {"part": row["part"].removesuffix("_exact")} for row in rows[3:]]
-    text = documents.preparation(tables.StudyTable({"n": 20}, rows, {}, [], {}, {}))
+    text = documents.preparation(EMPTY._replace(plan={"n": 20}, rows=tables.make_rows(rows)))
     cells = {
         line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()[4:8]
     }
@@ -534,8 +541,7 @@ def test_a_variant_of_a_claim_shows_only_what_differs():
         one | first | {"verdict": verdicts.REPRODUCED},
         one | second | {"verdict": verdicts.UNDECIDED},
     ]
-    empty = tables.StudyTable({}, [], {}, [], {}, {})
-    above, below = table_of(documents.claim_table(empty, judged, 4))[2:]
+    above, below = table_of(documents.claim_table(EMPTY, judged, 4))[2:]
     assert above[0] == "it falls, beyond the median<br><small>b</small>"
     assert below[0] == "↳ beyond the decile"
     assert below[1] == "?\u00a0undecided (✓†)" and "†" not in above[1]
@@ -560,8 +566,7 @@ def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
         claim("c", "uniform", verdicts.MISSING, float("nan")),
         claim("d", "", verdicts.CONTRADICTED) | {"source": "PRL"},
     ]
-    empty = tables.StudyTable({}, [], {}, [], {}, {})
-    rows = table_of(documents.claim_table(empty, judged, 3))
+    rows = table_of(documents.claim_table(EMPTY, judged, 3))
     assert rows[0] == ["claim, and the number judged", "verdict", "value", "range", "others"]
     verdicts_shown = [
         "✓ reproduced",
@@ -605,20 +610,21 @@ def test_an_interval_has_enough_digits_to_show_its_ends(numbers, told):
 
 
 def test_versions_are_not_mixed(done, table, tmp_path, capsys):
-    for row, task in zip(table.rows, plans.tasks(TINY), strict=True):
+    for (_, row), task in zip(table.rows.iterrows(), plans.tasks(TINY), strict=True):
         assert row["version"] == task.cell.kind.version
         assert row["packing_version"] == task.cell.parameters["packing"]["version"]
-    old = table._replace(rows=[row | {"packing_version": 1} for row in table.rows])
+    old = table._replace(rows=table.rows.assign(packing_version=1.0))
     with pytest.raises(InputError, match="packings of version 1, which cannot be combined with"):
         tables.merged(table, old)
-    unknown = [{k: v for k, v in row.items() if "version" not in k} for row in table.rows]
+    unknown = table.rows.assign(version=np.nan, packing_version=np.nan)
     with pytest.raises(InputError, match="version unknown"):
         tables.merged(table, table._replace(rows=unknown))
-    kind = table._replace(rows=[row | {"version": 0} for row in table.rows])
+    kind = table._replace(rows=table.rows.assign(version=0.0))
     with pytest.raises(InputError, match="exact of version 0"):
         tables.merged(table, kind)
     # A table that mixes them, however it came about, is not read.
-    tables.save(table._replace(rows=[*table.rows[:-1], old.rows[-1]]), tmp_path / "mixed.zarr")
+    mixed = pd.concat([table.rows[:-1], old.rows[-1:]])
+    tables.save(table._replace(rows=mixed), tmp_path / "mixed.zarr")
     assert main(["study", "--table", str(tmp_path / "mixed.zarr"), "--out", str(tmp_path)]) == 2
     error = capsys.readouterr().err
     assert "the study mixes" in error and len(error.splitlines()) == 1
@@ -679,9 +685,8 @@ def test_a_killed_study_goes_on_where_it_was(done, tmp_path):
     for name, when in kept.items():
         assert (tmp_path / "cells.zarr" / name).stat().st_ctime_ns == when
     one, other = (tables.reduce(f / "cells.zarr", TINY) for f in (done, tmp_path))
-    assert [_timeless(row) for row in one.rows] == [_timeless(row) for row in other.rows]
-    for name, values in one.samples.items():
-        assert np.array_equal(values, other.samples[name])
+    pd.testing.assert_frame_equal(*(each.rows.drop(columns="seconds") for each in (one, other)))
+    pd.testing.assert_frame_equal(one.samples, other.samples, rtol=0, atol=0)
 
 
 @pytest.mark.slow
@@ -694,7 +699,3 @@ def test_an_interrupted_study_keeps_what_is_finished(tmp_path):
 
 def _entries(folder):
     return list(open_store(folder / "cells.zarr", readonly=True))
-
-
-def _timeless(row):
-    return {name: value for name, value in row.items() if name != "seconds" and value == value}

@@ -83,7 +83,7 @@ def judged(table: StudyTable) -> list[Claim]:
 
     Samplers without rows in the table are left out, except the paper's.
     """
-    known = [name for name, part in SAMPLERS.items() if table.part(part)]
+    known = [name for name, part in SAMPLERS.items() if len(table.part(part))]
     samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
     beyond = {name: outside(table, SAMPLERS[name]) for name in BY_SWEEPS}
     claims = []
@@ -91,7 +91,9 @@ def judged(table: StudyTable) -> list[Claim]:
         for family, takes in families.items():
             for sampler in [name for name in samplers if name in takes] if takes else [""]:
                 for claim in family(table, sampler):
-                    lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
+                    lacking = (
+                        claim.verdict == MISSING and len(table.rows) and sampler in ("", *known)
+                    )
                     verdict = FEW if lacking else claim.verdict
                     claim = claim._replace(sampler=sampler, verdict=verdict, figure=figure)
                     claims.append(without(claim, beyond.get(sampler, [])))

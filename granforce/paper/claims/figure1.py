@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper.claims.groups import (
@@ -17,6 +18,7 @@ from granforce.paper.claims.groups import (
     enough,
     items,
     outside,
+    positive,
     positive_friction,
 )
 from granforce.paper.claims.verdicts import (
@@ -47,9 +49,8 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ("eta1", "eta3", "η1/η3", "η1 ≈ 0.15 η3", 0.15),
         ("eta2", "eta3", "η2/η3", "η2 ≈ 0.15 η3", 0.15),
     ):
-        groups = items(
-            rows, lambda r, a=above, b=below: np.log(r[a] / r[b]), positive=(above, below)
-        )
+        known = positive(rows, above, below)
+        groups = items(known.assign(log_ratio=np.log(known[above] / known[below])), "log_ratio")
         yield over_all(
             f"{word} is nearly constant",
             f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
@@ -83,7 +84,7 @@ def maximum(table: StudyTable, sampler: str) -> Iterator[Claim]:
     rows = drawn(table, sampler)
     names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
     for name, label in names:
-        groups = positive_friction(items(rows, name, positive=(name,)))
+        groups = positive_friction(items(positive(rows, name), name))
         yield turns(f"{label}(μ) is not monotonic", groups)
         yield peaked(f"{label}(μ) is largest near μ = 0.1", groups)
 
@@ -96,7 +97,7 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η ∝ μ at small μ; not measured in a range in which a walk leaves S at any μ."""
     name, label = _measure_of(sampler)
     beyond = [mu for mu in outside(table, SAMPLERS[sampler]) if mu > 0]
-    groups = positive_friction(items(drawn(table, sampler), name, positive=(name,)))
+    groups = positive_friction(items(positive(drawn(table, sampler), name), name))
     for low, high, word in (
         (LEAST_DYNAMIC, SMALL[1], "packings made by contact dynamics"),
         (0, LEAST_DYNAMIC / 10, "packings finished by linear programs"),
@@ -121,12 +122,13 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
 def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
     """η vanishes at μ = 0, where S is one point: as measured, not assumed."""
     name, label = _measure_of(sampler)
-    at_rest = [row for row in table.part(SAMPLERS[sampler]) if row["mu"] == 0 and enough(row)]
-    measured = [row for row in at_rest if sampler == "exact" or not skipped(row)]
+    rows = table.part(SAMPLERS[sampler])
+    at_rest = rows[enough(rows) & (rows["mu"] == 0)]
+    measured = at_rest if sampler == "exact" else at_rest[~skipped(at_rest)]
     claim = at_each(
         "η vanishes at μ = 0 within 10⁻⁷",
         f"mean {label} at μ = 0",
-        items(measured, lambda row: abs(row[name])),
+        items(measured.assign(size=measured[name].abs()), "size"),
         good=(-np.inf, 1e-7),
         source=PRL,
         possible=POSITIVE,
@@ -134,28 +136,25 @@ def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
     if 0 in outside(table, SAMPLERS[sampler]):
         why = "S is one point there, and sweeps do not reach it"
         return [claim._replace(verdict=UNMEASURED, why=why)]
-    if at_rest and not measured:
+    if len(at_rest) and not len(measured):
         why = "S is one point there: no state was relaxed or drawn"
         return [claim._replace(verdict=UNMEASURED, why=why)]
     return [claim]
 
 
-def skipped(row: dict[str, Any]) -> bool:
-    """Whether a row's states are the only point of S, without any relaxation."""
-    return row.get("skipped_part", float(row["dimension"] == 0)) > 0
+def skipped(rows: pd.DataFrame) -> Any:
+    """Which rows have states that are the only point of S, without any relaxation."""
+    return rows["skipped_part"].fillna((rows["dimension"] == 0).astype(float)) > 0
 
 
 def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η3, from largest and smallest forces, does not depend on the sampler."""
-    rows = [
-        row | {"part_seen": row["eta3"] / exact["eta3"]}
-        for row, exact in statistics.paired(dynamic(drawn(table, sampler)), table.part("exact"))
-        if row.get("eta3", 0) > 0 and exact.get("eta3", 0) > 0
-    ]
+    pairs = statistics.paired(dynamic(drawn(table, sampler)), table.part("exact"))
+    pairs = positive(pairs, "eta3", "eta3_other")
     yield at_each(
         "η3 does not depend on how networks are sampled",
         f"η3 of the networks over that of the exact intervals, μ ≥ {LEAST_DYNAMIC:g}",
-        items(rows, "part_seen"),
+        items(pairs.assign(part_seen=pairs["eta3"] / pairs["eta3_other"]), "part_seen"),
         good=(0.9, 1.1),
         fair=(0.75, 1.25),
         possible=POSITIVE,
@@ -169,17 +168,12 @@ _AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
 def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η is the same for another walk, and for a longer one, in the same packing."""
     part, first = _AGAIN[sampler], drawn(table, sampler)
-    known = {(row["mu"], row["seed"]): row for row in first}
-    again: dict[Any, list[dict[str, Any]]] = {}
-    for row in table.part(*(p for p in table.parts() if p.startswith(f"{part}_"))):
-        key = row["mu"], row["seed"]
-        if key in known and row["part"] != f"{part}_long" and enough(row):
-            again.setdefault(key, [known[key]]).append(row)
-    scatter = [
-        {"mu": mu, "n": rows[0]["n"], "part": np.std(values, ddof=1) / np.mean(values)}
-        for (mu, _), rows in again.items()
-        for values in [[row["eta2"] for row in rows]]
-    ]
+    longer = table.part(f"{part}_long")
+    again = table.rows[table.rows["part"].str.startswith(f"{part}_")].drop(longer.index)
+    again = statistics.paired(again[enough(again)], first)[first.columns]
+    known = statistics.paired(first, again[["mu", "seed"]].drop_duplicates())
+    packings = pd.concat([known, again]).groupby(["mu", "seed"], as_index=False)
+    scatter = packings.agg(n=("n", "first"), part=("eta2", _scatter))
     yield at_each(
         "η is reproducible: other walks in the same packing give the same value",
         "standard deviation of η2 over walks, relative to its mean",
@@ -188,9 +182,9 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
         fair=(-np.inf, 0.1),
         possible=POSITIVE,
     )
-    longer = statistics.paired([r for r in table.part(f"{part}_long") if enough(r)], first)
+    pairs = statistics.paired(longer[enough(longer)], first)
     for name, label in (("eta2", "η2"), ("eta3", "η3")):
-        ratios = [row | {"ratio": row[name] / other[name]} for row, other in longer]
+        ratios = pairs.assign(ratio=pairs[name] / pairs[f"{name}_other"])
         yield at_each(
             f"{label} does not depend on the length of the walk",
             f"{label} of a walk several times as long over that of the shorter one",
@@ -201,13 +195,19 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
         )
 
 
+def _scatter(values: pd.Series) -> float:
+    """Standard deviation over mean."""
+    return values.to_numpy().std(ddof=1) / values.to_numpy().mean()
+
+
 def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Opening cones increase η, vanishing contacts decrease it: each separately."""
-    opened = [row for row in table.part("opened_exact")]
-    widest = max((row["mu"] for row in opened), default=np.nan)
-    ends = [row for row in [*opened, *table.part("exact")] if row["mu"] == widest]
-    wide = [row | {"made": row.get("packing_mu", row["mu"])} for row in table.part("widest_exact")]
-    wide += [row | {"made": row.get("packing_mu", row["mu"])} for row in ends] if wide else []
+    opened, wide = table.part("opened_exact"), table.part("widest_exact")
+    widest = opened["mu"].max()
+    if len(wide):
+        ends = pd.concat([opened, table.part("exact")])
+        wide = pd.concat([wide, ends[ends["mu"] == widest]])
+        wide = wide.assign(made=wide["packing_mu"].fillna(wide["mu"]))
     for statement, what, rows, by, good, fair in (
         (
             "η rises with the μ of the Coulomb condition, in the same packings",
@@ -221,7 +221,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
             "η is smaller in packings with fewer contacts, at the same μ in the Coulomb condition",
             f"the μ of preparation, μ = {widest:g} in the Coulomb condition",
             wide,
-            "made",
+            "made" if len(wide) else "mu",
             (-1, -0.95),
             (-1, -0.8),
         ),
@@ -241,7 +241,8 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """z falls from 4 towards 3."""
-    rows = table.part("exact") or table.part("walk") or drawn(table, "gauss_seidel")
+    sources = (table.part("exact"), table.part("walk"), drawn(table, "gauss_seidel"))
+    rows = next((rows for rows in sources if len(rows)), sources[0])
     groups = items(rows, "coordination")
     ends = ({mu: groups[mu]} for mu in (min(groups), max(groups))) if groups else ({}, {})
     for group, word, limit in zip(ends, ("smallest", "largest"), (4, 3), strict=True):
@@ -264,10 +265,10 @@ def size(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """η hardly depends on N."""
     name, label = _measure_of(sampler)
     part = {"exact": "size_exact", "nearest": "size", "gauss_seidel": "size_sweeps"}[sampler]
-    everywhere = table.part(part) + drawn(table, sampler)
-    for mu in sorted({row["mu"] for row in table.part(part)}) or (0.1, 1):
-        rows = [row for row in everywhere if row["mu"] == mu and table.part(part)]
-        groups = items(rows, name, by="n", positive=(name,))
+    sized = table.part(part)
+    for mu in sorted(sized["mu"].unique()) or (0.1, 1):
+        rows = pd.concat([sized, drawn(table, sampler)]) if len(sized) else sized
+        groups = items(positive(rows[rows["mu"] == mu], name), name, by="n")
         span = f", N = {min(groups)} … {max(groups)}" if groups else ""
         yield over_all(
             f"η hardly depends on N (μ = {mu:g})",

@@ -7,7 +7,7 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
-from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
+from granforce.paper.claims.groups import SAMPLERS, Groups, items, positive, positive_friction
 from granforce.paper.claims.verdicts import CORRELATION, POSITIVE, Claim, at_each, over_all
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
@@ -19,7 +19,7 @@ _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 def perturbation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """F_crit and α are largest near μ = 0.1."""
     for name, label in _ANSWERS:
-        groups = positive_friction(items(table.responses(), name))
+        groups = positive_friction(items(table.part("response"), name))
         yield peaked(f"{label} is largest near μ = 0.1", groups)
 
 
@@ -28,8 +28,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
     eta, word = ("eta3", "exact η3") if sampler == "exact" else ("eta2", "η2")
     rows = table.answers(SAMPLERS[sampler], eta)
     for name, label in _ANSWERS:
-        groups = items(rows, lambda r, name=name: (r[eta], r.get(name, np.nan)), positive=(eta,))
-        groups = positive_friction(groups)
+        groups = positive_friction(items(positive(rows, eta), eta, name))
         yield over_all(
             f"{label} rises with η",
             f"rank correlation of mean {label} with mean {word} over μ > 0",
@@ -55,12 +54,11 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The first motion falls with distance as a power law, not exponentially."""
-    groups: dict[float, list[tuple[int, Any]]] = {}
-    part = {row["part"] for row in table.responses()}
-    for k, decay in table.decays.items():
-        row = table.rows[k]
-        if row["part"] in part and len(decay) >= FEWEST_SHELLS:
-            groups.setdefault(row["mu"], []).append((row["n"], decay))
+    groups: Groups = {}
+    for row in table.part("response").itertuples():
+        decay = table.decays.get(row.Index, ())
+        if len(decay) >= FEWEST_SHELLS:
+            groups.setdefault(row.mu, []).append((row.n, decay))
     yield at_each(
         "the first motion |u|(r) decays as a power law, not exponentially",
         "misfit of the best power law over that of the best exponential, rms of ln |u|",

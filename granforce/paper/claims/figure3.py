@@ -3,17 +3,20 @@
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper.claims.groups import (
     DETERMINED,
     LEAST_DYNAMIC,
-    SAMPLERS,
     Groups,
     drawn,
     dynamic,
+    each,
+    free,
     items,
-    may_be_judged,
+    over_contacts,
+    positive,
     positive_friction,
     within,
 )
@@ -49,31 +52,29 @@ def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def relative_extents(table: StudyTable, sampler: str) -> tuple[Groups, Groups]:
     """Median ΔF_n/F_orig over contacts, and its rank correlation with F_orig, by μ > 0."""
-    judged = may_be_judged(table, sampler)
-    ratios: Groups = {}
-    ranks: Groups = {}
-    for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
-        carries = normal > DETERMINED
-        if judged(row) and row["mu"] > 0 and carries.sum() > 2 and extent.mean() > DETERMINED:
-            ratio = extent[carries] / normal[carries]
-            ratios.setdefault(row["mu"], []).append((row["n"], float(np.median(ratio))))
-            rank = statistics.rank_correlation(normal[carries], ratio)
-            ranks.setdefault(row["mu"], []).append((row["n"], rank))
-    return dict(sorted(ratios.items())), dict(sorted(ranks.items()))
+    both = positive_friction(over_contacts(table, sampler, _relative))
+    return each(both, lambda pair: pair[0]), each(both, lambda pair: pair[1])
+
+
+def _relative(contacts: pd.DataFrame) -> tuple[float, float]:
+    """Median ΔF_n/F_orig, and its rank correlation with F_orig; NaN without indeterminacy."""
+    carrying = contacts[contacts["normal"] > DETERMINED]
+    if len(carrying) < 3 or not free(contacts):
+        return np.nan, np.nan
+    normal = carrying["normal"].to_numpy()
+    ratio = carrying["extent"].to_numpy() / normal
+    return float(np.median(ratio)), statistics.rank_correlation(normal, ratio)
 
 
 def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The original network lies closer to the centre of S than sampled states."""
-    name = "original_ratio" if sampler == "uniform" else "centre_ratio"
-    rows = [
-        row | {"centre_ratio": row["original_distance"] / row["mean_distance"]}
-        for row in drawn(table, sampler)
-        if row["dimension"] > 0 and row.get("mean_distance", 0) > 0
-    ]
+    rows = positive(drawn(table, sampler), "dimension", "mean_distance")
+    ratio = rows["original_distance"] / rows["mean_distance"]
+    rows = rows.assign(ratio=rows["original_ratio"] if sampler == "uniform" else ratio)
     yield at_each(
         "the original network lies closer to the centre than sampled ones",
         "distance of the original network from the centre over the mean of the others",
-        positive_friction(items(rows, name)),
+        positive_friction(items(rows, "ratio")),
         good=(-np.inf, 1),
         source=PRL,
         possible=POSITIVE,

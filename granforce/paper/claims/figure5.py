@@ -1,17 +1,18 @@
 """Claims about the positions of strong and of undetermined contacts (Figure 5)."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce.paper.claims.groups import (
     BARELY_RIGID,
     MIDDLE,
-    SAMPLERS,
     Groups,
     items,
-    may_be_judged,
+    over_contacts,
+    positive,
+    positive_friction,
     span_text,
     within,
 )
@@ -23,16 +24,14 @@ ENRICHMENT = "share of ΔF_n > ⟨ΔF_n⟩ among the contacts with f_n > 2⟨f_n
 FROZEN_SMALL = 0.05  # μ up to which contacts with frozen surroundings are judged as at small μ
 
 
-def _marked(table: StudyTable, sampler: str, measure: Callable[..., Any]) -> Groups:
+def _marked(table: StudyTable, sampler: str, measure: Callable[[Mask, Mask], float]) -> Groups:
     """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
-    marked: dict[Any, Any] = {}
-    judged = may_be_judged(table, sampler)
-    for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
-        if judged(row) and row["mu"] > 0 and len(extent):
-            value = measure(normal > 2.0, extent > extent.mean())
-            if np.isfinite(value):
-                marked.setdefault(row["mu"], []).append((row["n"], value))
-    return dict(sorted(marked.items()))
+
+    def measured(contacts: pd.DataFrame) -> float:
+        normal, extent = contacts["normal"].to_numpy(), contacts["extent"].to_numpy()
+        return measure(normal > 2.0, extent > extent.mean())
+
+    return positive_friction(over_contacts(table, sampler, measured))
 
 
 def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -82,7 +81,7 @@ def _enriched(strong: Mask, loose: Mask) -> float:
 
 def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Indeterminacy is everywhere in a periodic packing."""
-    rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
+    rows = positive(table.part("exact"), "mu", "contacts")
     yield at_each(
         "with only the pressure prescribed, indeterminacy is everywhere",
         "undetermined fraction of the force-carrying contacts",
@@ -94,7 +93,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
     yield at_each(
         "with only the pressure prescribed, undetermined contacts form one cluster",
         "number of clusters of undetermined contacts",
-        items([row for row in rows if row["undetermined"]], "clusters"),
+        items(positive(rows, "undetermined"), "clusters"),
         good=(-np.inf, 1.1),
         fair=(-np.inf, 2),
         possible=POSITIVE,
@@ -115,7 +114,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         (
             f"at μ ≥ {BARELY_RIGID:g} most contacts are determined",
             "determined fraction of the contacts inside",
-            lambda row: 1 - row["undetermined_part"],
+            "determined_part",
             (BARELY_RIGID, np.inf),
             (0.5, np.inf),
             (0.25, np.inf),
@@ -123,15 +122,19 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
         (
             f"at μ ≥ {BARELY_RIGID:g} undetermined contacts form small clusters",
             "fraction of the contacts inside that are in the largest cluster",
-            lambda row: row["largest_cluster"] / row["contacts"],
+            "cluster_part",
             (BARELY_RIGID, np.inf),
             (-np.inf, 0.25),
             (-np.inf, 0.5),
         ),
     ):
         for part, usual in (("frozen", 400), ("frozen_large", 1600)):
-            rows = [row for row in table.part(part) if row.get("contacts")]
-            variant = f" (N = {rows[0]['n'] if rows else usual})"
+            rows = positive(table.part(part), "contacts")
+            rows = rows.assign(
+                determined_part=1 - rows["undetermined_part"],
+                cluster_part=rows["largest_cluster"] / rows["contacts"],
+            )
+            variant = f" (N = {rows['n'].iloc[0] if len(rows) else usual})"
             yield at_each(
                 f"with frozen boundary forces, {claim}{variant}",
                 f"{measured}, {span_text(span)}",

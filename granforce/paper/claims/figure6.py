@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from granforce import measures
 from granforce.measures import statistics
@@ -10,12 +11,13 @@ from granforce.paper.claims.groups import (
     DETERMINED,
     LARGE,
     MIDDLE,
-    SAMPLERS,
     SMALL,
     Ends,
     drawn,
+    free,
     items,
-    may_be_judged,
+    over_contacts,
+    positive,
     span_text,
     within,
 )
@@ -28,12 +30,10 @@ PERMUTATIONS = 40
 
 def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """corr(f_n, ΔF_n): significant at intermediate μ, weaker at small, vanishing at large μ."""
-    rows = [row for row in drawn(table, sampler) if row["mu"] > 0]
+    rows = positive(drawn(table, sampler), "mu")
     everywhere = items(rows, "correlation")
-    scores = items(
-        [row for row in rows if "correlation" in row],
-        lambda row: row["correlation"] * np.sqrt(row["contacts"] - 1),
-    )
+    score = rows["correlation"] * np.sqrt(rows["contacts"] - 1)
+    scores = items(rows.assign(score=score), "score")
     strong, none = ((0.1, np.inf), (0, np.inf)), ((-0.1, 0.1), (-0.2, 0.2))
     significant, chance = ((3, np.inf), (2, np.inf)), ((-2, 2), (-3, 3))
     for word, span, (good, fair), (limits, wider) in (
@@ -67,35 +67,32 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The correlation comes from intervals alone: the position of f_n in them does not matter."""
-    judged = may_be_judged(table, sampler)
-    groups: dict[float, list[tuple[int, float]]] = {}
-    for row, _, normal, least, extent in table.contacts(SAMPLERS[sampler]):
-        if judged(row) and len(extent) > 1 and extent.mean() > DETERMINED:
-            apart = beyond_place(normal, least, extent)
-            if np.isfinite(apart):
-                groups.setdefault(row["mu"], []).append((row["n"], apart))
+    groups = over_contacts(table, sampler, beyond_place)
     yield at_each(
         "corr(f_n, ΔF_n) at intermediate μ is of statistical origin: unchanged if the relative "
         "positions of f_n in its interval are shuffled among contacts",
         "the correlation minus its mean for shuffled positions",
-        within({mu: groups[mu] for mu in sorted(groups)}, MIDDLE),
+        within(groups, MIDDLE),
         good=(-0.1, 0.1),
         fair=(-0.2, 0.2),
     )
 
 
-def beyond_place(normal: Floats, least: Floats, extent: Floats) -> float:
+def beyond_place(contacts: pd.DataFrame) -> float:
     """corr(f_n, ΔF_n) minus its mean over permutations of the positions of f_n in their intervals.
 
-    normal, least, extent (N_c,): f_n, its least value, ΔF_n. A contact without an interval keeps
-    its force. The permutations are always the same.
+    A contact without an interval keeps its force; NaN if none has one. The permutations are always
+    the same.
     """
-    free = extent > DETERMINED
-    place = (normal[free] - least[free]) / extent[free]
+    if len(contacts) < 2 or not free(contacts):
+        return np.nan
+    normal, least, extent = (contacts[name].to_numpy() for name in ("normal", "least", "extent"))
+    loose = extent > DETERMINED
+    place = (normal[loose] - least[loose]) / extent[loose]
     rng = np.random.default_rng(0)
     drawn, others = normal.astype(float), []
     for _ in range(PERMUTATIONS):
-        drawn[free] = least[free] + rng.permutation(place) * extent[free]
+        drawn[loose] = least[loose] + rng.permutation(place) * extent[loose]
         others.append(measures.correlation(drawn, extent))
     return measures.correlation(normal, extent) - float(np.mean(others))
 
@@ -108,19 +105,20 @@ def _mean_difference(keys: Floats, means: Floats, span: Ends) -> float:
 
 def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The paper's error bars: the range over all other networks of the walk."""
-    rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
+    rows = drawn(table, sampler).dropna(subset=["correlation"])
+    low, high = rows["correlation_low"], rows["correlation_high"]
     for word, span, test in (
-        ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),
+        ("excludes 0 at intermediate", MIDDLE, low > 0),
         (
             "includes 0 at large",
             LARGE,
-            lambda r: r["correlation_low"] <= 0 <= r["correlation_high"],
+            (low <= 0) & (high >= 0),
         ),
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
             "fraction of packings whose error bar does",
-            within(items(rows, lambda r, test=test: float(test(r))), span),
+            within(items(rows.assign(does=test.astype(float)), "does"), span),
             good=(0.9, np.inf),
             fair=(0.5, np.inf),
             interval=statistics.proportion_interval,

@@ -1,13 +1,13 @@
 """Data for claims: {μ: [(disks, value) of each packing]}, and the ranges of μ."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper.tables import StudyTable
-from granforce.types import Rows
 
 Ends = tuple[float, float]  # of a range or of an interval
 Groups = dict[float, list[tuple[int, Any]]]  # {μ: [(disks, value) of each packing]}
@@ -30,16 +30,10 @@ WHOLE_WALK = 0.3
 DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
-def drawn(table: StudyTable, sampler: str) -> list[dict[str, Any]]:
-    """Rows of a sampler that may be judged; see `may_be_judged`."""
-    judged = may_be_judged(table, sampler)
-    return [row for row in table.part(SAMPLERS[sampler]) if judged(row)]
-
-
-def may_be_judged(table: StudyTable, sampler: str) -> Callable[[dict[str, Any]], bool]:
-    """Whether a row has enough states, in S or close to it."""
-    beyond = outside(table, SAMPLERS[sampler])
-    return lambda row: enough(row) and row["mu"] not in beyond
+def drawn(table: StudyTable, sampler: str) -> pd.DataFrame:
+    """Rows of a sampler that may be judged: those with enough states, in S or close to it."""
+    rows = table.part(SAMPLERS[sampler])
+    return rows[enough(rows) & ~rows["mu"].isin(outside(table, SAMPLERS[sampler]))]
 
 
 def outside(table: StudyTable, part: str) -> list[float]:
@@ -57,50 +51,64 @@ def excesses(table: StudyTable, part: str) -> dict[float, tuple[float, float]]:
 
     Means over components and over the packings that have both, in ⟨f_n⟩.
     """
-    both = [
-        {"mu": row["mu"], "excess": row["excess"], "length": exact["mean_length"]}
-        for row, exact in statistics.paired(table.part(part), table.part(SAMPLERS["exact"]))
-        if "excess" in row and "mean_length" in exact
-    ]
-    excess, length = (statistics.grouped(both, name) for name in ("excess", "length"))
+    both = statistics.paired(table.part(part), table.part(SAMPLERS["exact"]))
+    both = both.dropna(subset=["excess", "mean_length_other"])
+    excess, length = (statistics.grouped(both, name) for name in ("excess", "mean_length_other"))
     return {mu: (float(excess[mu].mean()), float(length[mu].mean())) for mu in excess}
 
 
-def enough(row: dict[str, Any]) -> bool:
-    """Whether a row's walk, if it has one, has enough states to be judged."""
-    return row.get("reached_part", 1.0) >= WHOLE_WALK
+def enough(rows: pd.DataFrame) -> Any:
+    """Which rows have a walk with enough states to be judged, or none."""
+    return rows["reached_part"].fillna(1.0) >= WHOLE_WALK
 
 
-def dynamic(rows: Rows) -> list[dict[str, Any]]:
+def dynamic(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of packings made by contact dynamics."""
-    return [row for row in rows if row["mu"] >= LEAST_DYNAMIC]
+    return rows[rows["mu"] >= LEAST_DYNAMIC]
 
 
-def items(
-    rows: Rows, what: str | Callable[..., Any], by: str = "mu", positive: Collection[str] = ()
+def positive(rows: pd.DataFrame, *names: str) -> pd.DataFrame:
+    """Rows in which all these numbers are positive."""
+    return rows[(rows[list(names)] > 0).all(axis=1)]
+
+
+def items(rows: pd.DataFrame, *names: str, by: str = "mu") -> Groups:
+    """{μ: [(disks, number)]} in order of μ, of rows that have it; an array for several names."""
+    groups: Groups = {}
+    known = rows[np.isfinite(rows[list(names)]).all(axis=1)]
+    for key, group in known.groupby(by):
+        values = group[names[0]] if len(names) == 1 else group[list(names)].to_numpy()
+        groups[key] = list(zip(group["n"], values, strict=True))
+    return groups
+
+
+def over_contacts(
+    table: StudyTable, sampler: str, measure: Callable[[pd.DataFrame], Any]
 ) -> Groups:
-    """{μ: [(disks, value)]} in order of μ; what: a name, or a function of the row.
+    """{μ: [(disks, measure(contacts))]} of packings that may be judged, without NaN.
 
-    Rows with an unknown value, or without a positive value of given names, are left out.
+    contacts: a table with the f_n, least f_n and ΔF_n (normal, least, extent) of each, in ⟨f_n⟩.
     """
-    groups: dict[Any, Any] = {}
-    for row in rows:
-        if not all(row.get(name, 0) > 0 for name in positive):
-            continue
-        value = row.get(what, np.nan) if isinstance(what, str) else what(row)
-        if np.all(np.isfinite(value)):
-            groups.setdefault(row[by], []).append((row["n"], value))
-    return {key: groups[key] for key in sorted(groups)}
+    groups: Groups = {}
+    judged = set(drawn(table, sampler).index)
+    for row, contacts in table.contacts(SAMPLERS[sampler]):
+        if row.Index in judged and len(contacts):
+            value = measure(contacts)
+            if np.all(np.isfinite(value)):
+                groups.setdefault(row.mu, []).append((row.n, value))
+    return dict(sorted(groups.items()))
 
 
 def sampled(table: StudyTable, sampler: str) -> Groups:
     """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
-    groups: dict[Any, Any] = {}
-    judged = may_be_judged(table, sampler)
-    for row, *_, extent in table.contacts(SAMPLERS[sampler]):
-        if judged(row) and len(extent) and extent.mean() > DETERMINED:
-            groups.setdefault(row["mu"], []).append((row["n"], extent))
-    return {mu: groups[mu] for mu in sorted(groups)}
+    return over_contacts(
+        table, sampler, lambda contacts: contacts["extent"].to_numpy() if free(contacts) else np.nan
+    )
+
+
+def free(contacts: pd.DataFrame) -> bool:
+    """Whether the mean ΔF_n of contacts is more than rounding."""
+    return bool(contacts["extent"].to_numpy().mean() > DETERMINED)
 
 
 def each(groups: Groups, measure: Callable[..., Any]) -> Groups:

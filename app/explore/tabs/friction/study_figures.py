@@ -62,7 +62,7 @@ class Indeterminacy:
     def sentence(self) -> str:
         """The μ at which each η is largest, and why it falls again, as HTML."""
         walks = study_data.rows("walk")
-        if not walks:
+        if not len(walks):
             return "The finished study is not part of this installation."
         z = statistics.means(walks, "coordination")
         return (

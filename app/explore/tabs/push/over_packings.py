@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure as Figure
 
@@ -27,7 +28,7 @@ def responses(page_rows: list[Row]) -> tuple[list[Figure], str, str]:
     page_rows: rows of the page's packings, drawn as open symbols.
     """
     table = study_data.study()
-    study = [] if table is None else table.answers()
+    study = pd.DataFrame() if table is None else table.answers()
     force = figure("critical_force", None, ACROSS, "push, in mean forces", height=300)
     _against_eta2(force, study, LINES)
     alpha = figure("decay", None, ACROSS, "decay exponent α", height=280)
@@ -47,7 +48,7 @@ def responses(page_rows: list[Row]) -> tuple[list[Figure], str, str]:
     return [force, alpha], _lead(study), text
 
 
-def _lead(study: list[Row]) -> str:
+def _lead(study: pd.DataFrame) -> str:
     """The μ of the largest critical force, and whether η2 is largest there too, as HTML."""
     points = statistics.means(study, "critical_force")
     if not points:
@@ -60,11 +61,11 @@ def _lead(study: list[Row]) -> str:
     )
 
 
-def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
+def _against_eta2(fig: Figure, rows: pd.DataFrame, lines: dict[str, str]) -> None:
     """Lines {name: label} against η2, with μ next to the points of the first."""
     drawn = []
     for k, (name, label) in enumerate(lines.items()):
-        known = [row for row in rows if np.isfinite(row.get(name, np.nan))]
+        known = rows.dropna(subset=[name]) if len(rows) else rows
         across, up = statistics.means(known, "eta2"), statistics.means(known, name)
         if not up:
             continue
