@@ -7,9 +7,9 @@ against μ), "walks" (the paper's walk against μ), "others" and "further" (othe
 sampler), "outcomes" (how many claims on each figure have which outcome), "claims_1" to "claims_6"
 (a figure of the paper, and each claim on it with its verdict, those by other samplers, and the
 number behind it), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's
-walk, and its excess over S), "preparation" (how results depend on the packing), "counts" (number of
-packings of each kind of result), "certificates" (largest gap of the exact bounds, convergence of
-uniform samples).
+walk, and its excess over S), "preparation" (how results depend on the packing), "resting" (how h
+and η3 depend on when drag sets in), "counts" (number of packings of each kind of result),
+"certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
 import re
@@ -56,6 +56,7 @@ from granforce.paper.formatting import (
     with_error,
 )
 from granforce.paper.highlights import highlights
+from granforce.paper.resting import resting
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
 from granforce.system import markdown
@@ -102,6 +103,7 @@ _CONTENTS = {
     "response_fine": "critical forces, load steps a quarter as long",
     "sweeps_": "the paper's walk",
     "prepared_": "walks and exact intervals, packings made with other options",
+    "resting_": "exact intervals of small packings, drag setting in earlier or later",
     "opened": "walks and exact intervals, frictionless packings with a larger μ in the Coulomb "
     "condition",
     "widest_exact": "exact intervals, packings of smaller μ with the largest μ in the Coulomb "
@@ -152,6 +154,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         **{f"claims_{k}": partial(claim_table, table, claims, k) for k in TOPICS},
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
+        "resting": lambda: resting(table),
         "findings": lambda: finding_table(findings),
         "counts": lambda: counts(table),
         "certificates": lambda: certificates(table),

@@ -5,7 +5,8 @@ and "uniform" (uniform states of S), all three in the same packings; "response" 
 first motions of random contacts), "response_long" and "response_fine" (some of them with four times
 the implicit steps, or with load steps a quarter as long); "sweeps_1e-3"
 (walks by Gauss–Seidel sweeps alone, as in the paper, which end at that residual in ⟨f_n⟩);
-"prepared_…" (walks and, with "…_exact", intervals of packings made with other options); "opened"
+"prepared_…" (walks and, with "…_exact", intervals of packings made with other options);
+"resting_…" (intervals of small packings in which drag sets in earlier or later); "opened"
 and "opened_exact" (frictionless packings, cones opened to μ) and "widest_exact" (packings made at
 μ, cones opened to the largest μ); "stress" (outlines of the stresses that the contacts can carry)
 and "stress_uniform" (uniform states, for their stresses); "frozen" and "frozen_large" (exact
@@ -72,6 +73,14 @@ def variations(mu: float) -> dict[str, dict[str, Any]]:
         "sweeps": {"sweeps": 4 * sweeps},
         "late_drag": {"drag_below": NEARLY_BALANCED / 100},
     }
+
+
+# From this μ on, h depends on when drag replaces inertia: small packings, options of `pack`.
+DRAG_MATTERS = 0.5
+RESTING: dict[str, dict[str, Any]] = {
+    "resting_default": {},
+    **{f"resting_{k}": {"drag_below": NEARLY_BALANCED / k} for k in (100, 10_000)},
+}
 
 
 class Plan(NamedTuple):
@@ -340,6 +349,17 @@ def _prepared(plan: Plan, seed: int) -> list[Task]:
     return family
 
 
+def _resting(plan: Plan, seed: int) -> list[Task]:
+    frictions = plan.prepared_frictions if seed <= plan.prepared_packings else ()
+    return [
+        _exact(part, n, seed, mu, packing_options=options)
+        for n in plan.sizes[:1]
+        for part, options in RESTING.items()
+        for mu in frictions
+        if mu >= DRAG_MATTERS
+    ]
+
+
 def _opened(plan: Plan, seed: int) -> list[Task]:
     if seed > plan.opened_packings:
         return []
@@ -414,6 +434,7 @@ _PARTS = {
     "response": _responses,
     "sweeps": _sweeps,
     "prepared": _prepared,
+    "resting": _resting,
     "opened": _opened,
     "stress": _stresses,
     "frozen": _frozen,

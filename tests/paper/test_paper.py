@@ -95,7 +95,8 @@ def test_the_default_plan_is_the_papers():
     assert 10 * pushed["random"] >= 200
     assert {task.n for task in found} == {100, 200, 400, 800, 1600}
     assert all(task.cell.parameters["states"] == 1000 for task in walks)
-    names = [json.dumps([task.cell.kind.name, task.cell.parameters]) for task in found]
+    once = [task for task in found if task.part != "resting_default"]  # some are in "size_exact"
+    names = [json.dumps([task.cell.kind.name, task.cell.parameters]) for task in once]
     assert len(set(names)) == len(names)  # no cell twice
 
 

@@ -1,0 +1,38 @@
+"""h at large friction by the imbalance at which drag sets in."""
+
+from granforce.paper import plan as plans
+from granforce.paper import resting, tables
+
+
+def test_packings_differ_only_in_when_drag_sets_in():
+    tasks = plans.chosen(plans.Plan(), ["resting"])
+    assert {task.part for task in tasks} == set(plans.RESTING)
+    for task in tasks:
+        packed = dict(task.cell.parameters["packing"])
+        packed.pop("drag_below", None)
+        assert packed == plans.kinds.PACKING.parameters(100, task.mu, task.seed)
+    assert {task.mu for task in tasks} == {0.5, 1, 3, 10}
+
+
+def test_a_line_for_each_imbalance_and_how_many_packings_it_has():
+    rows = [
+        {"part": part, "n": 100, "mu": mu, "seed": seed, "dimension": h, "eta3": h / 4}
+        for part, mu, dimensions in (
+            ("resting_default", 1, (2, 4)),
+            ("resting_default", 10, (1, 1)),
+            ("resting_10000", 10, (3, 5)),
+        )
+        for seed, h in enumerate(dimensions)
+    ]
+    text = resting.resting(tables.StudyTable({"n": 400}, rows, {}, [], {}, {}))
+    lines = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in text.splitlines()
+        if line.startswith("| ") and "---" not in line
+    ]
+    assert lines[0] == ["h, drag below, ⟨f_n⟩", "μ = 1", "μ = 10"]
+    assert lines[1] == ["2·10⁻²", "3.0 ± 1.0", "1.000"]
+    assert lines[2] == ["2·10⁻⁶", "", "4.0 ± 1.0"]
+    assert lines[3][0].startswith("exact η3") and lines[5][-1] == "1.00 ± 0.25"
+    assert text.endswith("Packings at each μ: 2 for 2·10⁻² and 2 for 2·10⁻⁶.\n")
+    assert not resting.resting(tables.StudyTable({"n": 400}, rows[:0], {}, [], {}, {}))
