@@ -20,10 +20,7 @@ def resting(table: StudyTable) -> str:
         groups = {part: statistics.grouped(table.part(part), name) for part in known}
         frictions = sorted(set().union(*groups.values()))
         lines = [
-            [
-                f"{_below(part)}",
-                *(with_error(group[mu]) if mu in group else "" for mu in frictions),
-            ]
+            [_below(part), *(with_error(group[mu]) if mu in group else "" for mu in frictions)]
             for part, group in groups.items()
         ]
         heads = [f"{word}, drag below, ⟨f_n⟩", *(f"μ = {mu:g}" for mu in frictions)]
