@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 import warnings
@@ -94,6 +95,10 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
     except InputError as error:
         option = command.option_of(error.argument, error.value, arguments)
         return refused(option + str(error).removeprefix(error.argument) if option else str(error))
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        return refused("too many open files; use fewer --workers, or raise the limit (ulimit -n)")
     except MemoryError as error:
         return refused(f"not enough memory: {str(error) or 'ask for less'}")
     except Cancelled:

@@ -845,13 +845,26 @@ def add_cache(commands: Commands) -> None:
     command = subcommand(
         commands,
         "cache",
-        "list, clear or verify the store of results, or print its size or its path",
+        "list, clear or verify the store of results, or print its size or its path; also for the "
+        "built documentation and the compiled kernels",
         "granforce cache verify --cache scan.zarr",
     )
     command.add_argument("action", choices=["list", "size", "clear", "verify", "path"])
-    command.add_argument("--kind", type=str, help="only entries of this kind (packing, walk, …)")
+    command.add_argument(
+        "--kind",
+        type=str,
+        help="only entries of this kind (packing, walk, …); for size and clear also documentation "
+        "(built by granforce docs) or kernels (compiled on first use)",
+    )
+    command.add_argument("--yes", action="store_true", help="clear without asking, for scripts")
     add_store(command)
     command.leaves_out("with path", lambda arguments: arguments.action == "path", {"kind"})
+    command.leaves_out("without clear", lambda arguments: arguments.action != "clear", {"yes"})
+    command.leaves_out(
+        "with documentation or kernels",
+        lambda arguments: arguments.kind in ("documentation", "kernels"),
+        {"cache"},
+    )
 
 
 # In the order of the help text.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import holoviews as hv
 from holoviews.plotting.util import process_cmap
@@ -22,6 +23,7 @@ GREY = "#999999"
 MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
 # Points of a line: x, y and, with bars, the size of the error.
 Points = Sequence[Any] | Floats
+T = TypeVar("T")
 
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
@@ -159,18 +161,48 @@ def frame(
         options["hooks"] = [_legend_of(elements), _place_colour_bar]
     if legend is not None:
         options["legend_position"] = legend
+    options = _ranges_of_one_value(elements, options) | options
     words = {"title": title, "xlabel": x, "ylabel": y}
     words = {name: typeset(text, backend) for name, text in words.items()}
     options = words | {"padding": 0.05} | options
     # Ranges for each frame; by default HoloViews shares them across a layout by axis name.
     elements = [element.opts(axiswise=True, backend=backend) for element in elements]
-    return hv.Overlay(elements).opts(
+    drawn = hv.Overlay(elements).opts(
         backend=backend,
         show_legend=legend is not None,
         legend_limit=len(elements) + 1,
         axiswise=True,
         **options,
     )
+    return _displayed(drawn, backend)
+
+
+def _displayed(figure: T, backend: str) -> T:
+    """The figure, which notebooks display in this backend, whichever is the current one."""
+    figure._repr_mimebundle_ = partial(_display, figure, backend)  # type: ignore[attr-defined]
+    return figure
+
+
+def _display(figure: Any, backend: str, include: Any = None, exclude: Any = None) -> Any:
+    current = hv.Store.current_backend
+    hv.Store.set_current_backend(backend)
+    try:
+        return hv.Store.render(figure)
+    finally:
+        hv.Store.set_current_backend(current)
+
+
+def _ranges_of_one_value(
+    elements: Sequence[Any], options: Mapping[str, Any]
+) -> dict[str, tuple[float, float]]:
+    """Limits of logarithmic axes with a single value, which HoloViews would pad down to 0."""
+    limits = {}
+    for k, axis in enumerate("xy"):
+        if options.get(f"log{axis}"):
+            ends = {end for element in elements if len(element) for end in element.range(k)}
+            if len(ends) == 1 and (value := ends.pop()) > 0:
+                limits[f"{axis}lim"] = (value / 2, 2 * value)
+    return limits
 
 
 def graph(
@@ -266,10 +298,11 @@ def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
     """Frames next to each other."""
     layout = hv.Layout(list(frames)).cols(columns)
     if backend == "bokeh":
-        return layout.opts(shared_axes=False, backend=backend)
+        return _displayed(layout.opts(shared_axes=False, backend=backend), backend)
     (width, height), (rows, across) = FRAME_INCHES, layout.shape
     size = {"fig_inches": (across * width, rows * height)}
-    return layout.opts(sublabel_format="", hspace=0.3, vspace=0.35, backend=backend, **size)
+    layout = layout.opts(sublabel_format="", hspace=0.3, vspace=0.35, backend=backend, **size)
+    return _displayed(layout, backend)
 
 
 def save(figure: Any, path: str | Path, caption: str = "") -> None:

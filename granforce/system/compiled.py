@@ -62,6 +62,20 @@ def are_cached(last: str) -> bool:
     return any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place)
 
 
+def kernels() -> list[Path]:
+    """The files of this package's compiled kernels, wherever numba keeps them."""
+    from numba.core.caching import _CacheLocator
+
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    places = [*map(Path, [chosen] if chosen else []), *list(_usual_places())[1:]]
+    found: list[Path] = []
+    for source in Path(__file__).parents[1].rglob("__init__.py"):
+        name = _CacheLocator.get_suitable_cache_subpath(str(source))
+        for place in (source.parent / "__pycache__", *(place / name for place in places)):
+            found += place.glob("*.nb[ci]")
+    return found
+
+
 def compile_ahead(statement: str, last: str) -> bool:
     """Run a statement that compiles kernels in a separate process if none are cached yet.
 

@@ -1,6 +1,8 @@
 """The command line as a user meets it: reports, exit codes, one-line errors, no heavy start."""
 
 import contextlib
+import errno
+import io
 import json
 import os
 import signal
@@ -12,14 +14,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from heeding import heed, heeding, interrupted, until_it_computes, until_it_left
+from numba.core.caching import _CacheLocator
 from packings import packed
 
 import granforce as gf
 from granforce.cli import commands
+from granforce.cli.commands import service
 from granforce.cli.parser import main
 from granforce.packing.importers import save_packing
 from granforce.study.store import open_store
-from granforce.system import interrupts
+from granforce.system import compiled, interrupts
 
 SMALL = ["-n", "20", "--mu", "0.3", "--relax", "nearest", "--states", "5"]
 
@@ -310,12 +314,60 @@ def test_cache_commands(run):
     assert sorted(entry["kind"] for entry in entries) == ["packing", "walk"]
     assert json.loads(run("cache", "size", "--json")[1])["bytes"] > 1000
     assert run("cache", "verify")[0] == 0
-    assert json.loads(run("cache", "clear", "--kind", "walk", "--json")[1])["removed"] == 1
+    assert json.loads(run("cache", "clear", "--kind", "walk", "--json", "--yes")[1])["removed"] == 1
     assert len(json.loads(run("cache", "list", "--json")[1])) == 1
     assert json.loads(run("cache", "verify", "--kind", "frame", "--json")[1]) == []
     for kind in ("wlk", "", "*"):
         code, out, err = run("cache", "verify", "--kind", kind)
         assert (code, out, err.count("\n")) == (2, "", 1) and "choose one of packing, walk" in err
+
+
+def test_clear_asks_in_a_terminal_and_needs_yes_in_scripts(run, away, monkeypatch):
+    run("pack", "-n", "8", "--mu", "0.3")
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    code, out, err = run("cache", "clear")
+    assert (code, out, err.count("\n")) == (2, "", 1) and "remove 1 result: add --yes" in err
+    for answer, removed in (("", False), ("n\n", False), ("y\n", True)):
+        monkeypatch.setattr("sys.stdin", Terminal(answer))
+        code, out, err = run("cache", "clear")
+        assert code == 0 and "Remove 1 result (" in err and str(away / "cache") in err
+        assert (
+            ("removed" in out) == removed == (json.loads(run("cache", "list", "--json")[1]) == [])
+        )
+
+
+def test_built_documentation_and_kernels_are_measured_and_removed(run, away, monkeypatch):
+    monkeypatch.setattr(service.platformdirs, "user_cache_path", lambda name: away / name)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(away / "numba"))
+    monkeypatch.setattr(compiled, "__file__", str(away / "granforce" / "system" / "compiled.py"))
+    package = away / "granforce"
+    name = _CacheLocator.get_suitable_cache_subpath(str(package / "__init__.py"))
+    kernels = [package / "__pycache__" / "a.nbi", away / "numba" / name / "b.nbc"]
+    others = [package / "__init__.py", away / "numba" / "other" / "c.nbc"]
+    site = away / "granforce-docs" / "site" / "index.html"
+    for file in (*kernels, *others, site):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("12345")
+    run("pack", "-n", "8", "--mu", "0.3")
+    sizes = json.loads(run("cache", "size", "--json")[1])
+    assert (sizes["documentation_bytes"], sizes["kernels_bytes"]) == (5, 10)
+    for kind, removed, kept in (
+        ("kernels", kernels, [*others, site]),
+        ("documentation", [site], others),
+    ):
+        code, _, err = run("cache", "clear", "--kind", kind)
+        assert code == 2 and err.count("\n") == 1 and "--yes" in err
+        assert json.loads(run("cache", "size", "--kind", kind, "--json")[1])["files"] == len(
+            removed
+        )
+        assert run("cache", "clear", "--kind", kind, "--yes")[0] == 0
+        assert not any(map(Path.exists, removed)) and all(map(Path.exists, kept))
+    assert len(json.loads(run("cache", "list", "--json")[1])) == 1
+    assert "no effect" in run("cache", "size", "--kind", "kernels", "--cache", "s")[2]
 
 
 @pytest.mark.parametrize("action", ["list", "size", "verify", "clear"])
@@ -495,3 +547,12 @@ def test_a_packing_in_a_file_has_the_results_of_the_options_that_made_it(run, op
     packing = gf.load_packing("p.npz")
     save_packing(packing._replace(forces=2 * packing.forces), "other.npz")
     assert json.loads(run("intervals", "other.npz", "--json")[1])["cached"] is False
+
+
+def test_too_many_open_files_are_told_in_a_line(run, monkeypatch):
+    def scan(arguments):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(commands, "scan", scan)
+    code, out, err = run("scan", "--mu", "0.3")
+    assert (code, out, err.count("\n")) == (2, "", 1) and "too many open files; use fewer" in err

@@ -93,7 +93,7 @@ LINES = {
         "--documents bench.md --table bench.json",
         "--table bench.json --out done",
     ],
-    "cache": ["list", "size", "verify", "clear", "path"],
+    "cache": ["list", "size", "verify", "clear --yes", "path", "size --kind kernels"],
 }
 
 

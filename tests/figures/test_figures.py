@@ -1,5 +1,7 @@
 """Figures hold what they were given; pages need no network, pictures no browser."""
 
+import contextlib
+import io
 import pathlib
 import re
 import subprocess
@@ -375,3 +377,36 @@ def test_bodies_are_drawn_as_they_are():
     assert np.allclose(middle, packing.contact_points)
     picture = packing._repr_svg_()
     assert picture.count("<polygon") == 2 and picture.count("<circle") == 1
+
+
+NOTEBOOK = """
+from IPython.core.interactiveshell import InteractiveShell
+shell = InteractiveShell.instance()
+shell.run_cell('''
+import granforce as gf
+groove = gf.scene("groove")
+drawn = [gf.plot(groove, backend=backend) for backend in BACKENDS]
+print(*("data:image" in figure._repr_mimebundle_()[0]["text/html"] for figure in drawn))
+'''.replace("BACKENDS", "{backends}"))
+"""
+
+
+@pytest.mark.parametrize("backends", [["bokeh", "matplotlib"], ["matplotlib", "bokeh"]])
+def test_notebooks_show_a_figure_in_the_backend_of_its_call(backends):
+    code = NOTEBOOK.replace("{backends}", str(backends))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    shown = [str(backend == "matplotlib") for backend in backends]
+    assert " ".join(shown) in done.stdout.splitlines(), done.stderr
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_a_single_value_has_a_place_on_a_logarithmic_axis(backend, caplog, tmp_path):
+    style.ready(backend)
+    series = [([(0.3, 0.2, 0.01)], "η", "#000000", "solid", 0)]
+    drawn = style.graph(series, backend, logx=True, logy=True, title="", x="μ", y="η")
+    suffix = "html" if backend == "bokeh" else "png"
+    with contextlib.redirect_stderr(io.StringIO()) as said:
+        style.save(drawn, tmp_path / f"one.{suffix}")
+    assert "Logarithmic" not in caplog.text + said.getvalue()
+    low, high = drawn.opts.get("plot", backend=backend).kwargs["xlim"]
+    assert low == 0.15 and high == 0.6

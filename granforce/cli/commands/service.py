@@ -26,8 +26,9 @@ from granforce.study import kinds
 from granforce.study.keys import Parameters
 from granforce.study.series import FRAME
 from granforce.study.store import Entry, Store, open_store, refuse_newer
+from granforce.system.compiled import kernels
 from granforce.system.files import make_folder
-from granforce.system.plain import json_text, spaced
+from granforce.system.plain import counted, json_text, spaced
 from granforce.system.terminal import print_list, print_notes, print_report
 
 
@@ -97,7 +98,7 @@ def docs(arguments: argparse.Namespace) -> None:
         print(folder / "index.html")
         return
     # Not in the folder of the default store, which would be refused with foreign contents.
-    folder = make_folder(platformdirs.user_cache_path("granforce-docs")) / "site"
+    folder = make_folder(_docs_folder()) / "site"
     _build_docs(folder)
     # Over HTTP, because browsers do not run the search in pages opened from files.
     handler = partial(_QuietHandler, directory=str(folder))
@@ -106,6 +107,10 @@ def docs(arguments: argparse.Namespace) -> None:
         print(address, flush=True)
         webbrowser.open(address)
         server.serve_forever()
+
+
+def _docs_folder() -> Path:
+    return platformdirs.user_cache_path("granforce-docs")
 
 
 def _build_docs(folder: Path) -> None:
@@ -163,20 +168,28 @@ def cache(arguments: argparse.Namespace) -> int:
         path = str(open_store(arguments.cache).path)
         print(json_text({"path": path}) if arguments.json else path)
         return 0
+    if arguments.kind in _OTHERS and arguments.action in ("size", "clear"):
+        return _others(arguments)
     store = open_store(arguments.cache, readonly=True)  # readonly: does not create a missing store
     refuse_newer(store.path)
     if arguments.kind is not None:
         _check_kind(store, arguments.kind)
     if arguments.action == "clear":
+        entries = store.find(arguments.kind)
+        size = sum(entry.bytes for entry in entries)
+        if not _confirmed(arguments, counted(len(entries), "result", "results"), size, store.path):
+            return 0
         store = open_store(store.path)
         lines = {"removed": store.clear(arguments.kind), "temporaries": store.clean()}
         print_report(lines, arguments.json)
     elif arguments.action == "size":
         entries = store.find(arguments.kind)
         size = sum(entry.bytes for entry in entries)
-        print_report(
-            {"path": str(store.path), "entries": len(entries), "bytes": size}, arguments.json
-        )
+        lines = {"path": str(store.path), "entries": len(entries), "bytes": size}
+        if arguments.cache is None and arguments.kind is None:
+            for name, files_of in _OTHERS.items():
+                lines[f"{name}_bytes"] = sum(file.stat().st_size for file in files_of())
+        print_report(lines, arguments.json)
     elif arguments.action == "verify":
         verdicts = [verdict._asdict() for verdict in store.verify(arguments.kind)]
         print_list(verdicts, ("name", "ok", "reason"), arguments.json)
@@ -189,6 +202,44 @@ def cache(arguments: argparse.Namespace) -> int:
         else:
             _print_entries(entries)
     return 0
+
+
+def _documentation() -> list[Path]:
+    """The files of the documentation that `granforce docs` has built."""
+    return [file for file in _docs_folder().rglob("*") if file.is_file()]
+
+
+# Files that are no results, by the names of --kind.
+_OTHERS = {"documentation": _documentation, "kernels": kernels}
+
+
+def _others(arguments: argparse.Namespace) -> int:
+    """Measure or remove the built documentation or the compiled kernels."""
+    files = _OTHERS[arguments.kind]()
+    size = sum(file.stat().st_size for file in files)
+    if arguments.action == "size":
+        print_report({"files": len(files), "bytes": size}, arguments.json)
+    elif _confirmed(arguments, f"{len(files)} files of {arguments.kind}", size, *files[:1]):
+        for file in files:
+            file.unlink(missing_ok=True)
+        print_report({"removed": len(files)}, arguments.json)
+    return 0
+
+
+def _confirmed(arguments: argparse.Namespace, what: str, size: int, *place: Path) -> bool:
+    """Whether to remove something: with --yes, or after a question in a terminal."""
+    if arguments.yes:
+        return True
+    if not sys.stdin.isatty():
+        raise InputError(f"clear would remove {what}: add --yes, as no terminal can be asked")
+    where = f" in {place[0]}" if place else ""
+    print(
+        f"Remove {what} ({size / 1e6:.3g} MB){where}? [y/N] ", end="", file=sys.stderr, flush=True
+    )
+    if sys.stdin.readline().strip().lower() in ("y", "yes"):
+        return True
+    print_notes(["nothing was removed"])
+    return False
 
 
 def _print_entries(entries: Sequence[Entry]) -> None:
