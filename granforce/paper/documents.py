@@ -12,7 +12,6 @@ and η3 depend on when drag sets in), "counts" (number of packings of each kind 
 "certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -66,7 +65,6 @@ KIND = "study"
 
 _SWEPT_EXTENT = "paper's walk 0.15 η3"
 _OUTSIDE = "outside S"
-_FEWER = re.compile(r" \((\d+)\)(?=$|,)")  # number of packings, if it is not the expected one
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
 SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions, among claims
@@ -215,29 +213,39 @@ def _against_friction(table: StudyTable, columns: Sequence[tuple[Any, ...]]) -> 
     beyond, known = outside(table, swept_part), excesses(table, swept_part)
     lines = []
     for mu, seeds in every.items():
-        line = [f"{mu:g}", str(len(seeds))]
+        line = [_Cell(f"{mu:g}"), _Cell(str(len(seeds)))]
         for head, rows, name, factor, form in columns:
             if mu in beyond and head.startswith("paper's walk"):
-                line.append(_OUTSIDE)
+                line.append(_Cell(_OUTSIDE))
                 continue
             chosen = rows[(rows["mu"] == mu) & rows["seed"].isin(seeds)]
             line.append(_cell(chosen, name, factor, form, len(seeds)))
             if head == _SWEPT_EXTENT and mu in known and known[mu][0] > _FAR * known[mu][1]:
-                line[-1] += f", excess {_excess(*known[mu])}"
+                line[-1] = line[-1]._replace(note=f", excess {_excess(*known[mu])}")
         lines.append(line)
     return _counted(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
-def _counted(heads: list[str], lines: list[list[str]]) -> str:
+class _Cell(NamedTuple):
+    """A mean over packings, as text."""
+
+    text: str
+    fewer: int | None = None  # the number of packings, if it is not the expected one
+    note: str = ""
+
+    def __str__(self) -> str:
+        return self.text + (f" ({self.fewer})" if self.fewer else "") + self.note
+
+
+def _counted(heads: list[str], lines: list[list[_Cell]]) -> str:
     """The table; a column of fewer packings, equally many in each line, says so in its head."""
     for k in range(2, len(heads)):
-        cells = [line[k] for line in lines if line[k] not in ("", _OUTSIDE)]
-        marks = {found[1] if (found := _FEWER.search(cell)) else "" for cell in cells}
-        if len(marks) == 1 and "" not in marks:
-            heads[k] += f" (n = {marks.pop()})"
+        fewer = {line[k].fewer for line in lines if line[k].text not in ("", _OUTSIDE)}
+        if len(fewer) == 1 and None not in fewer:
+            heads[k] += f" (n = {fewer.pop()})"
             for line in lines:
-                line[k] = _FEWER.sub("", line[k])
-    return markdown.table(heads, lines)
+                line[k] = line[k]._replace(fewer=None)
+    return markdown.table(heads, [list(map(str, line)) for line in lines])
 
 
 def others(table: StudyTable) -> str:
@@ -281,8 +289,8 @@ def _measured_at_each(columns: Sequence[tuple[str, pd.DataFrame, str]]) -> str:
             _cell(rows, name, 1.0, None, most)
             for rows, (_, _, name) in zip(of_mu, columns, strict=True)
         ]
-        if any(cells):
-            lines.append([f"{mu:g}", str(max(map(len, of_mu))), *cells])
+        if any(cell.text for cell in cells):
+            lines.append([_Cell(f"{mu:g}"), _Cell(str(max(map(len, of_mu)))), *cells])
     return _counted(["μ", "packings", *(head for head, *_ in columns)], lines)
 
 
@@ -319,14 +327,14 @@ def sweeps(table: StudyTable) -> str:
 def _sweeps_of(table: StudyTable, part: str) -> dict[float, str]:
     """{μ: sweeps per network}."""
     every = positive(table.part(part), "mean_sweeps").groupby("mu")
-    return {mu: _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)) for mu, rows in every}
+    return {mu: str(_cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows))) for mu, rows in every}
 
 
 def _eta2_over_nearest(table: StudyTable, part: str) -> dict[float, str]:
     """{μ: η2 over that of the nearest-network walk in the same packings}."""
     beyond = outside(table, part)
     ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2").groupby("mu")
-    cells = {mu: _cell(rows, "ratio", 1.0, None, len(rows)) for mu, rows in ratios}
+    cells = {mu: str(_cell(rows, "ratio", 1.0, None, len(rows))) for mu, rows in ratios}
     return cells | dict.fromkeys(beyond, _OUTSIDE)
 
 
@@ -554,14 +562,14 @@ def _drawn_by(table: StudyTable, sampler: str) -> pd.DataFrame:
     return rows[~skipped(rows)]
 
 
-def _cell(rows: pd.DataFrame, name: str, factor: float, form: str | None, expected: int) -> str:
+def _cell(rows: pd.DataFrame, name: str, factor: float, form: str | None, expected: int) -> _Cell:
     """Mean ± standard error over rows, and their number if it is not the expected one."""
     values = factor * rows[name][np.isfinite(rows[name])].to_numpy()
     if not len(values):
-        return ""
+        return _Cell("")
     mean = values.mean()
     text = form.format(mean) if form else with_error(values)
-    return text if len(values) == expected else f"{text} ({len(values)})"
+    return _Cell(text, None if len(values) == expected else len(values))
 
 
 def certificates(table: StudyTable) -> str:
