@@ -24,7 +24,7 @@ def test_a_line_for_each_imbalance_and_how_many_packings_it_has():
         )
         for seed, h in enumerate(dimensions)
     ]
-    text = resting.resting(tables.StudyTable({"n": 400}, rows, {}, [], {}, {}))
+    text = resting.resting(tables.StudyTable({"n": 400}, tables.make_rows(rows), {}, [], {}, {}))
     lines = [
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in text.splitlines()
@@ -35,4 +35,4 @@ def test_a_line_for_each_imbalance_and_how_many_packings_it_has():
     assert lines[2] == ["2·10⁻⁶", "", "4.0 ± 1.0"]
     assert lines[3][0].startswith("exact η3") and lines[5][-1] == "1.00 ± 0.25"
     assert text.endswith("Packings at each μ: 2 for 2·10⁻² and 2 for 2·10⁻⁶.\n")
-    assert not resting.resting(tables.StudyTable({"n": 400}, rows[:0], {}, [], {}, {}))
+    assert not resting.resting(tables.StudyTable({"n": 400}, tables.make_rows([]), {}, [], {}, {}))
