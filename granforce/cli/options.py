@@ -58,8 +58,11 @@ def import_format(
     contacts: str | None,
     *,
     contacts_needed: bool = True,
+    series: bool = False,
 ) -> Parser:
     """Add a format of `granforce import`, with the options common to all formats.
+
+    series: whether many snapshots can be written, to a folder.
 
     Options are named after the arguments of the format's reader in `granforce.packing.importers`.
     """
@@ -76,7 +79,10 @@ def import_format(
         )
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
     command.add_argument(
-        "--out", type=Output, metavar="FILE.npz", help="save the packing to this file"
+        "--out",
+        type=Output,
+        suffixes=("npz", "zarr") if series else ("npz",),
+        help="save the packing to this file",
     )
     return command
 
@@ -106,20 +112,17 @@ def add_series(command: Parser) -> None:
         "with --frames: write exact intervals of all snapshots to one dataset (--out FOLDER.zarr), "
         "and print one line per snapshot",
     )
-    group.add_argument("--frames", type=str, help="snapshots: all, or numbers separated by commas")
+    group.add_argument(
+        "--frames", type=str, listed=True, help="snapshots: all, or numbers separated by commas"
+    )
     group.add_argument(
         "--states", type=int, default=0, help="states of a random walk, for η1 and η2 (default 0)"
     )
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
-    group.add_argument(
-        "--csv", type=Output, metavar="FILE.csv", help="write these lines as a table"
-    )
+    group.add_argument("--csv", type=Output, suffixes=("csv",), help="write these lines as a table")
     add_workers(group)
     add_scheduler(group)
     add_store(group)
-    for action in command._actions:
-        if action.dest == "out":  # a folder for all snapshots
-            action.metavar = "FILE.{npz,zarr}"
     series = command.options.keys() - others - {"frames"}
     command.leaves_out("without --frames", lambda arguments: arguments.frames is None, series)
     command.leaves_out("with --frames", lambda arguments: arguments.frames is not None, {"frame"})
@@ -133,7 +136,7 @@ def add_series(command: Parser) -> None:
 def add_columns(
     command: argparse._ActionsContainer, what: str = "names of the columns in the files"
 ) -> None:
-    command.add_argument("--columns", type=str, metavar="x=…,y=…", help=what)
+    command.add_argument("--columns", type=str, listed=True, metavar="x=…,y=…", help=what)
 
 
 def add_reverse(command: argparse._ActionsContainer) -> None:
@@ -218,7 +221,7 @@ def add_packing_file(command: Parser, needed: bool = True) -> None:
         "packing",
         type=Input,
         nargs=None if needed else "?",
-        metavar="FILE.npz",
+        suffixes=("npz",),
         help="file of the packing" if needed else "use this packing instead of making one",
     )
 
@@ -261,7 +264,7 @@ def add_known(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--known",
         type=Input,
-        metavar="FILE.{csv,npz,zarr}",
+        suffixes=("csv", "npz", "zarr"),
         help="known forces, in the packing's units: columns contact, and f_n, f_t (exact) or "
         "f_n_low, f_n_high, f_t_low, f_t_high (bounds), as written by intervals with --out; empty "
         "fields, nan and infinite bounds are ignored",
@@ -330,7 +333,7 @@ def add_out(command: argparse._ActionsContainer, what: str, also: str = "") -> N
     command.add_argument(
         "--out",
         type=Output,
-        metavar="FILE.{csv,npz,zarr}",
+        suffixes=("csv", "npz", "zarr"),
         help=f"write {what}: a table (.csv), arrays (.npz) or an xarray dataset (.zarr){also}",
     )
 
@@ -340,7 +343,7 @@ def add_picture(command: Parser) -> None:
         "--out",
         type=Output,
         required=True,
-        metavar="FILE.{png,svg,pdf,html}",
+        suffixes=("png", "svg", "pdf", "html"),
         help="write a picture, or a page that can be zoomed (.html)",
     )
 
@@ -372,7 +375,10 @@ def add_exact(command: Parser) -> None:
     group = command.add_argument_group("the ensemble")
     add_ensemble_mu(group)
     group.add_argument(
-        "--contacts", type=str, help="only the contacts with these numbers, separated by commas"
+        "--contacts",
+        type=str,
+        listed=True,
+        help="only the contacts with these numbers, separated by commas",
     )
     group.add_argument(
         "--slice",

@@ -118,7 +118,19 @@ _INSTEAD = {"mu": "ensemble_mu"}
 
 
 class _Once(argparse.Action):
-    """Stores the value of an option, which may be given once: another value would replace it."""
+    """Stores the value of an option, which may be given once: another value would replace it.
+
+    suffixes: of a file, of which one selects the format; listed: several values, between commas.
+    """
+
+    def __init__(
+        self, *words: Any, suffixes: Sequence[str] = (), listed: bool = False, **options: Any
+    ) -> None:
+        self.suffixes, self.listed = suffixes, listed
+        if suffixes:
+            several = ",".join(suffixes)
+            options["metavar"] = f"FILE.{{{several}}}" if len(suffixes) > 1 else f"FILE.{several}"
+        super().__init__(*words, **options)
 
     def __call__(
         self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
@@ -198,7 +210,7 @@ class Parser(argparse.ArgumentParser):
         if action is None or action.nargs is not None:
             return _unrecognized(unknown)
         option, value = words[at - 2 : at]
-        if action.type is str and "comma" in str(action.help):
+        if getattr(action, "listed", False):
             return f"{option}: separate values by commas, as in {option} {value},{first}"
         return f"{option} takes one value, not {value} and {first}"
 
@@ -245,17 +257,13 @@ class Parser(argparse.ArgumentParser):
         return self
 
     def strange_suffix(self, arguments: argparse.Namespace) -> str | None:
-        """The error in the suffix of an output file, which selects its format, or None.
-
-        A metavar lists the valid ones: FILE.npz, FILE.{csv,npz,zarr}.
-        """
+        """The error in the suffix of an output file, which selects its format, or None."""
         for action in self._actions:
-            path = getattr(arguments, action.dest, None)
-            known = re.search(r"\.\{?([a-z,]+)\}?$", str(action.metavar))
-            if isinstance(path, (Output, TableOrStore)) and known and not _no_file(path):
-                suffixes = [f".{suffix}" for suffix in known[1].split(",")]
-                if not path.endswith(tuple(suffixes)):
-                    *others, last = suffixes
+            path, suffixes = getattr(arguments, action.dest, None), getattr(action, "suffixes", ())
+            if isinstance(path, (Output, TableOrStore)) and suffixes and not _no_file(path):
+                endings = [f".{suffix}" for suffix in suffixes]
+                if not path.endswith(tuple(endings)):
+                    *others, last = endings
                     words = f"{', '.join(others)} or {last}" if others else last
                     return f"{action.option_strings[-1]} {path}: the name must end with {words}"
         return None

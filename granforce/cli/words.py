@@ -63,6 +63,7 @@ def add_pack(commands: Commands) -> None:
     command.add_argument(
         "--scene-options",
         type=str,
+        listed=True,
         metavar="NAME=…,NAME=…",
         help="options of the scene, separated by commas: courses, blocks, width, height (wall); "
         "voussoirs, thickness, opening (arch); books, overhang (books); angle, width, height "
@@ -77,7 +78,7 @@ def add_pack(commands: Commands) -> None:
         help="maximum number of time steps (default 100000)",
     )
     command.add_argument(
-        "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
+        "--out", type=Output, suffixes=("npz",), help="also save the packing to this file"
     )
     names = command.options.keys() - {"scene", "scene_options", "mu", "out", "json"}
     command.leaves_out("without --scene", lambda given: given.scene is None, {"scene_options"})
@@ -165,7 +166,7 @@ def add_infer(commands: Commands) -> None:
     group.add_argument(
         "--measured",
         type=Input,
-        metavar="FILE.csv",
+        suffixes=("csv",),
         help="columns contact, f_n, f_t, sigma_n, sigma_t, in the packing's units; empty or nan "
         "where not measured",
     )
@@ -219,6 +220,7 @@ def add_infer(commands: Commands) -> None:
     series.add_argument(
         "--frames",
         type=str,
+        listed=True,
         help="import these frames and infer their forces: all, or numbers separated by commas",
     )
     add_reading(series)
@@ -296,7 +298,11 @@ def add_scan(commands: Commands) -> None:
         lines=report_lines.SCAN,
     )
     command.add_argument(
-        "--mu", type=str, required=True, help="friction coefficients, separated by commas"
+        "--mu",
+        type=str,
+        listed=True,
+        required=True,
+        help="friction coefficients, separated by commas",
     )
     command.add_argument("--seeds", type=int, default=1, help="packings per μ: seeds 1 … SEEDS")
     add_packing(command, several=True, expert=True)
@@ -304,7 +310,7 @@ def add_scan(commands: Commands) -> None:
     command.add_argument(
         "--out",
         type=TableOrStore,
-        metavar="FILE.{csv,zarr}",
+        suffixes=("csv", "zarr"),
         help="write the table (.csv), or use this store of results instead of --cache (.zarr)",
     )
     add_store(command)
@@ -351,7 +357,7 @@ def add_plot(commands: Commands) -> None:
     command.add_argument(
         "--states",
         type=Input,
-        metavar="FILE.{csv,npz,zarr}",
+        suffixes=("csv", "npz", "zarr"),
         help="draw the mean of these networks, written by walk, uniform or infer with --out "
         "(default: the packing's original network)",
     )
@@ -391,7 +397,10 @@ def add_study(commands: Commands) -> None:
         help="compute only what the paper computed, with the paper's relaxation",
     )
     command.add_argument(
-        "--parts", type=str, help="compute only the parts with these names, separated by commas"
+        "--parts",
+        type=str,
+        listed=True,
+        help="compute only the parts with these names, separated by commas",
     )
     command.add_argument(
         "--minutes",
@@ -425,7 +434,9 @@ def add_study(commands: Commands) -> None:
     others = set(command.options)
     group = command.add_argument_group("size")
     group.add_argument("-n", type=int, help="number of disks (default 400)")
-    group.add_argument("--mu", type=str, help="friction coefficients, separated by commas")
+    group.add_argument(
+        "--mu", type=str, listed=True, help="friction coefficients, separated by commas"
+    )
     group.add_argument("--packings", type=int, help="packings at each μ (default 30)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
     group.add_argument(
@@ -448,13 +459,14 @@ def add_study(commands: Commands) -> None:
         "implicit steps (default 3)",
     )
     group.add_argument(
-        "--sizes", type=str, help="other numbers of disks (default 100,200,800,1600)"
+        "--sizes", type=str, listed=True, help="other numbers of disks (default 100,200,800,1600)"
     )
     sized = command.options.keys() - others
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     command.add_argument(
         "--formats",
         type=str,
+        listed=True,
         default="html,png,svg",
         help="figure formats, separated by commas; an empty value draws none",
     )
@@ -577,7 +589,9 @@ def add_perturb(commands: Commands) -> None:
     which.add_argument(
         "--random", type=int, default=50, help="number of randomly chosen contacts (default 50)"
     )
-    which.add_argument("--contacts", type=str, help="numbers of contacts, separated by commas")
+    which.add_argument(
+        "--contacts", type=str, listed=True, help="numbers of contacts, separated by commas"
+    )
     which.add_argument("--all", action="store_true", help="all contacts that carry force")
     group.add_argument(
         "--draw-seed",
@@ -689,6 +703,7 @@ def add_import(commands: Commands) -> None:
         "dumps may be compressed (.gz, .bz2, .xz, .zst)",
         "dump local of the contacts: two ids, distance, normal force x y, tangential force x y, in "
         "this order or under the names atom1 atom2 distance fx fy px py",
+        series=True,
     )
     add_frame(lammps, "timestep")
     add_columns(lammps)
@@ -707,6 +722,7 @@ def add_import(commands: Commands) -> None:
     mercury = import_format(
         *(formats, "mercury", "import .data and .fstat files from MercuryDPM"),
         *("run.data run.fstat", "particles: NAME.data", "contacts: NAME.fstat"),
+        series=True,
     )
     add_frame(mercury, "number of the time step in the files, from 0")
     add_cell(mercury)
@@ -786,7 +802,7 @@ def add_import(commands: Commands) -> None:
     pegs.add_argument(
         "--measured",
         type=Output,
-        metavar="FILE.csv",
+        suffixes=("csv",),
         help="write the measured forces, for granforce infer",
     )
 
@@ -831,7 +847,7 @@ def add_bench(commands: Commands) -> None:
     command.add_argument(
         "--table",
         type=Input,
-        metavar="FILE.json",
+        suffixes=("json",),
         help="measure nothing: draw the figures and update the documents from these rows, such as "
         "data/bench.json",
     )

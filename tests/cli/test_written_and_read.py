@@ -7,7 +7,6 @@ refused in one line, and nothing is written.
 import contextlib
 import io
 import os
-import re
 import warnings
 
 import frames
@@ -144,7 +143,7 @@ def suffixes(action):
     """Those that the help of an option offers."""
     if action.dest in ("grains", "contacts"):  # of export
         return ["vtp", "dump"]
-    return re.search(r"\.\{?([a-z,]+)\}?$", action.metavar)[1].split(",")
+    return action.suffixes
 
 
 def called(words):
