@@ -51,7 +51,7 @@ FROM_BROWSER = {
         {"scene": str, "mu": float},
         {"query": str},  # after going back or forward
         {"built": str, "mu": float},  # by hand
-        # "file", "fall" or "measured", for a scene with loads (3 N) on its disks
+        # "file", "fall", "limit" or "measured", for a scene with loads (3 N) on its disks
         {
             **{"find": str, "scene": str, "built": str, "mu": float},
             **{"load": [float, ...], "plane": [int, int]},
@@ -101,6 +101,8 @@ TO_BROWSER = {
         {"error": str},
         {"fall": [float, ...]},  # motion (3 N) of the disks; empty if nothing falls
         {"file": str},  # base64
+        {"limit": float, "load": list},  # times the push that the disks can bear
+        {"limit": None, "load": list},  # however hard it is
         {"measured": {"most": float, "outline": list}, **MEASURED},
         {"measured": {"bounds": list, "outline": list}, **MEASURED},
     ),

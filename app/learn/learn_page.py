@@ -30,9 +30,9 @@ def learn_page(document: Document, query: str) -> Any:
         view: Any = Lesson(packings, wake, visitor, dark=dark, alone=alone)
         visit.at_end(view.close)
     else:
-        task, saving = (Task(computing, wake, visitor) for _ in range(2))
-        view = Workbench(request, task, saving, dark=dark)
-        visit.at_end(task.close, saving.close)
+        tasks = [Task(computing, wake, visitor) for _ in range(3)]
+        view = Workbench(request, *tasks, dark=dark)
+        visit.at_end(*(task.close for task in tasks))
     if header is not None:
         header.link(view, dark="dark")
     return framed(header, [view], dark=dark)

@@ -17,6 +17,7 @@ from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics import certificates
+from granforce.perturb.grain_loads import load_factor
 from granforce.records import InputError, Packing, are_whole
 from granforce.types import Floats, Integers
 
@@ -52,6 +53,14 @@ def hull(packing: Packing) -> BalanceSpace:
 def fall(packing: Packing) -> Floats | None:
     """The motion (N, 3) that proves that nothing balances, or None; see `bodies.fall`."""
     return bodies.fall(packing)
+
+
+def limit(packing: Packing, load: Floats) -> float:
+    """The largest λ for which bodies under λ times a load (N, 3), besides their own, balance.
+
+    Raises the errors of `load_factor`.
+    """
+    return load_factor(ensemble(packing), load).factor
 
 
 def bounds(packing: Packing) -> Floats | None:

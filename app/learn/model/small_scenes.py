@@ -187,6 +187,12 @@ def measured(
     return {"bounds": bounds, "outline": hulls.outline(packing, plane).ravel().tolist()}
 
 
+def limit(packing: Packing, load: npt.ArrayLike) -> float | None:
+    """How many times the change of loads to these, flat, the bodies can bear; None if endless."""
+    least = hulls.limit(packing, np.nan_to_num(_loaded(packing, load).load - packing.load))
+    return least if np.isfinite(least) else None
+
+
 def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
     """The packing under other loads on its disks, flat."""
     if load is None:

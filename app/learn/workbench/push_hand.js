@@ -39,10 +39,18 @@ export class PushHand {
     return true
   }
 
+  get size() { return Math.hypot(...this.force) }
+
   push(hand, disk, force) {
     Object.assign(this, { disk, force })
     hand.load(this.loads(hand.scene, force))
-    this.note = this.words(hand.body) || this.note
+    const { whole, scene } = hand.body
+    this.tell(hand, whole ? this.limit(hand.body) : scene.box[0] ? 0 : null) // nothing balances a push in a periodic box
+  }
+
+  /** Say the push and the largest one; null: not known yet. */
+  tell(hand, most) {
+    this.note = this.words(hand.body, most) || this.note
     hand.changed()
   }
 
@@ -55,12 +63,12 @@ export class PushHand {
   }
 
   /** The push and its largest value, in words. */
-  words(body) {
-    const size = Math.hypot(...this.force)
-    if (size < 1e-6 || !body.whole) return ""
-    const most = this.limit(body)
+  words(body, most) {
+    const { size } = this
+    if (size < 1e-6) return ""
+    if (most === null) return `You push disk ${this.disk + 1} with ${number(size)}. Finding the largest push …`
     const end = Number.isFinite(most) ? `at most ${number(most)} can be borne this way (the limit load)` : "no push this way is too large: it only presses the disks against their walls"
-    return `You push disk ${this.disk + 1} with ${number(size)}: ${end}.${body.empty ? " Now nothing balances." : ""}`
+    return `You push disk ${this.disk + 1} with ${number(size)}: ${end}.${body.empty || size > most ? " Now nothing balances." : ""}`
   }
 
   /** The largest push in this direction with a nonempty S, by bisection; Infinity if unbounded. */

@@ -209,6 +209,7 @@ class Workbench {
     if (fails && !hand.enough) { hand.enough = body.enough(MOST_MU); this.changed() }
     if (fails) this.find("fall")
     this.measure()
+    if (this.push.size && !body.whole && !body.scene.box[0]) this.find("limit")
   }
 
   // Results from the server
@@ -226,9 +227,10 @@ class Workbench {
   }
 
   arrived(news) {
-    const { hand, space } = this
+    const { hand, space, push } = this
     if (news.error) return this.refused(news.error)
     if (news.file) saveBytes(news.file, `${hand.scene.name}.npz`)
+    if (news.limit !== undefined && push.size && news.load.every((v, k) => v === hand.body.load[k])) push.tell(hand, (news.limit ?? Infinity) * push.size)
     if (news.fall && hand.body.empty) {
       hand.fall = news.fall.length ? news.fall : null
       this.changed()

@@ -25,16 +25,21 @@ class Workbench(Scripted):
     dark = param.Boolean()
 
     def __init__(
-        self, request: scene_links.Request, task: Task, saving: Task, **params: Any
+        self,
+        request: scene_links.Request,
+        task: Task,
+        saving: Task,
+        pushing: Task,
+        **params: Any,
     ) -> None:
-        """request: the request in the link. task, saving: for longer work, and for files.
+        """request: the request in the link. task, saving, pushing: for longer work, files, limits.
 
         A file is delivered even if other results are requested meanwhile.
         """
         super().__init__(titles=scene_links.titles(), **params)
-        self._task, self._saving = task, saving
+        self._task, self._saving, self._pushing = task, saving, pushing
         self._ready = True  # the scene requested last
-        for one in (task, saving):
+        for one in (task, saving, pushing):
             one.param.watch(self._failed, "message")
         self._show(request.scene, request.mu, request.built)
 
@@ -55,7 +60,11 @@ class Workbench(Scripted):
                 self._show(name)
 
     def _replace(self, scene: dict[str, Any]) -> None:
-        for task in (self._task, self._saving):  # drop pending results for the previous scene
+        for task in (
+            self._task,
+            self._saving,
+            self._pushing,
+        ):  # drop pending results for the previous scene
             task.cancel()
         self._ready = True
         self.scene = scene
@@ -105,11 +114,13 @@ class Workbench(Scripted):
                 case "file":
                     file = base64.b64encode(small_scenes.file_of(packing, load))
                     return {"file": file.decode()}
+                case "limit":
+                    return {"limit": small_scenes.limit(packing, load), "load": load}
                 case "fall":
                     return {"fall": small_scenes.falling(packing, load).tolist()}
                 case _:
                     values = {"scene": scene, "mu": mu, "plane": plane}
                     return {"measured": small_scenes.measured(packing, load, plane), **values}
 
-        task = self._saving if what == "file" else self._task
-        task.start(compute, self.tell)
+        tasks = {"file": self._saving, "limit": self._pushing}
+        tasks.get(what, self._task).start(compute, self.tell)

@@ -225,10 +225,24 @@ def test_what_cannot_be_built_is_refused(text):
         small_scenes.built_packing(text)
 
 
+def test_the_limit_of_a_push_is_where_nothing_balances_any_more():
+    """Of many dimensions, of which the page draws only a shadow."""
+    packing = small_scenes.packing_of("column", 0.3)
+    loads = packing.load[:10].copy()
+    loads[2, 0] += 0.5
+    most = small_scenes.limit(packing, loads.ravel())
+    for part, holds in ((0.999, True), (1.001, False)):
+        loads[2, 0] = packing.load[2, 0] + 0.5 * most * part
+        assert (not len(small_scenes.falling(packing, loads.ravel()))) == holds
+    pressed = packing.load[:10].copy()
+    pressed[:, 1] *= 2
+    assert small_scenes.limit(packing, pressed.ravel()) is None
+
+
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Workbench(scene_links.request_of("?scene=column"), Task(), Task())
+    view = Workbench(scene_links.request_of("?scene=column"), Task(), Task(), Task())
     told = []
     view.tell = told.append
     _at_rest(view)
@@ -236,7 +250,7 @@ def page():
 
 
 def _at_rest(view):
-    for task in (view._task, view._saving):
+    for task in (view._task, view._saving, view._pushing):
         while task.running:
             task.job and task.job.wait(240)
             task.poll()

@@ -1,5 +1,7 @@
 """The workbench of small scenes, as a visitor sees it and has it in hand."""
 
+import re
+
 import pytest
 from serving import expect, free_port, painted, searched, serve
 
@@ -102,6 +104,18 @@ def test_a_push_by_keyboard_shrinks_s_until_nothing_balances(look):
     says(page, "Now nothing balances")
     page.get_by_role("button", name="Test push").click()
     free(page)
+
+
+def test_a_push_in_many_dimensions_has_a_limit_too(look):
+    """The server finds it: of such an S the page has only a shadow."""
+    page = look("?scene=column")
+    page.get_by_role("button", name="Test push").click()
+    for _ in range(3):
+        page.keyboard.press("n")
+    page.keyboard.press("ArrowRight")
+    page.locator(".says").filter(
+        has_text=re.compile(r"^You push disk 3 with .*: at most")
+    ).wait_for()
 
 
 def test_many_dimensions_have_exact_ends_on_axes_that_are_chosen(look):
