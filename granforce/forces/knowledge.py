@@ -15,7 +15,7 @@ from granforce.fields import record
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import Contacts, InputError, NotJammedError, are_whole, real_array
-from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT, REVERSED
+from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT, REVERSED, ROUNDING
 from granforce.types import Floats, Integers, Mask
 
 _NAMES = "f_n", "f_t"
@@ -191,8 +191,9 @@ def polygons(bounds: Floats, mu: Floats, scale: float, index: Integers) -> Polyg
     pinned[:, 1] &= rough | pinned[:, 0]
     fixed = pinned[:, 1] & rough
     value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])
-    # Forces given exactly keep their balance if they are slightly outside their cone.
-    exactly = (low == high) & pinned & np.stack([rough, rough], axis=1)
+    # Forces given exactly keep their balance even if they are outside their cone by more than
+    # rounding.
+    exactly = (low == high) & pinned & rough[:, None] & (np.abs(low - value) > ROUNDING)
     value[exactly] = low[exactly]
     slid = np.abs(value[:, 1]) / np.where(rough, mu, np.inf)
     bounded = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
