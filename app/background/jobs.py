@@ -264,7 +264,7 @@ class Job:
             work = self._work
             if work is not None and not self.cancelled():
                 self._until = time.monotonic() + (self._pool.seconds or math.inf)
-                with cancelling.watched(self._ends):
+                with cancelling.scope(self._ends):
                     self.result = work(self)
         except Later:
             self.not_before = time.monotonic() + _ASK  # meanwhile the thread is free for others

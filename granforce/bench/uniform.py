@@ -17,7 +17,14 @@ from granforce.bench.report import exponent, note
 from granforce.bench.solvers import tile
 from granforce.explore.billiard import make_rows, room_for_rows
 from granforce.explore.mixing import Mixing, mixing
-from granforce.explore.uniform import METHODS, forces_of, sample_uniform, step, varying, warm_up
+from granforce.explore.uniform import (
+    METHODS,
+    forces_of,
+    sample_uniform,
+    step,
+    varying_components,
+    warm_up,
+)
 from granforce.explore.walls import walls
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
@@ -107,7 +114,9 @@ def _ours(S: Ensemble, polytope: Any, rows: Any, method: str, seed: int) -> _Run
         _, slacks, _ = step(polytope, ends, count=count, reach=reach, rows=rows, method=method)
         seconds = time.process_time() - begin
     states = forces_of(S, polytope, slacks)
-    return _Run(NAMES[method], states, mixing(states, varying(S, polytope)), seconds, 0.0)
+    return _Run(
+        NAMES[method], states, mixing(states, varying_components(S, polytope)), seconds, 0.0
+    )
 
 
 def uniform_growth(
@@ -240,7 +249,9 @@ def _hopsy(S: Ensemble, polytope: Any, rows: Any, rounded: int) -> list[_Run]:
         slacks = np.ones((*places.shape[:2], polytope.count))
         slacks[..., :count] -= places @ sides.T
         states = forces_of(S, polytope, slacks)[:, places.shape[1] // 10 :]  # warm-up
-        runs.append(_Run(name, states, mixing(states, varying(S, polytope)), seconds, setup))
+        runs.append(
+            _Run(name, states, mixing(states, varying_components(S, polytope)), seconds, setup)
+        )
     return runs
 
 

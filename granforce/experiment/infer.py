@@ -154,7 +154,9 @@ def infer(
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
     unmeasured = spread_of(ensemble, unmeasured)
-    m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers)
+    numbers = checked_numbers(ensemble, numbers)
+    m, s = checked(ensemble, measured, sigma)
+    best = likeliest(ensemble, m, s, unmeasured)
     draws = None
     if numbers[0]:
         # In ⟨f_n⟩, so that χ² = Σ W (f − m)².
@@ -164,20 +166,14 @@ def infer(
     return inference_of(Inference, ensemble, best, draws, begin)
 
 
-def arguments_of(
-    ensemble: Ensemble,
-    measured: npt.ArrayLike,
-    sigma: npt.ArrayLike,
-    unmeasured: float,
-    numbers: tuple[int, int, int],
-    least: int = 0,
-) -> tuple[Floats, Floats, Likeliest, tuple[int, int, int]]:
-    """(m, σ, the likeliest network, numbers) for arguments; numbers: draws, chains, workers."""
+def checked_numbers(
+    ensemble: Ensemble, numbers: tuple[int, int, int], least: int = 0
+) -> tuple[int, int, int]:
+    """Numbers of draws (at least `least`), chains and workers; InputError if they are invalid."""
     draws, chains = whole(numbers[0], "states", least), whole(numbers[1], "chains", 1)
     workers, most = worker_count(numbers[2]), max(draws, chains)
     check_memory(16 * most * len(ensemble.index), f"{most} states")
-    m, s = checked(ensemble, measured, sigma)
-    return m, s, likeliest(ensemble, m, s, unmeasured), (draws, chains, workers)
+    return draws, chains, workers
 
 
 def inference_of(
@@ -206,7 +202,7 @@ def judged(
 ) -> Draws:
     """The Draws of states (chains, k, N_c, 2), with their residual, violation and mixing."""
     residual, violation = ensemble.residual(forces), ensemble.violation(forces)
-    good = bool(uniform.inside(residual, violation) and mixed)
+    good = bool(uniform.are_admissible(residual, violation) and mixed)
     return Draws(forces, residual, violation, worth, good, counts, *seconds)
 
 
@@ -220,16 +216,18 @@ def _draws(
 ) -> Draws:
     begin, (states, chains, workers) = time.perf_counter(), numbers
     polytope = walls(ensemble, weight, m)
-    stores, on = uniform.stores_for(polytope, chains, workers), partial(step, polytope)
+    stores, advance = uniform.stores_for(polytope, chains, workers), partial(step, polytope)
     ready = time.perf_counter()
-    ends = uniform.begun(polytope, chains, seed)
-    ends, _, dropped = uniform.together(stores, ends, partial(on, count=_DROPPED))
+    ends = uniform.start_chains(polytope, chains, seed)
+    ends, _, dropped = uniform.advance_all(stores, ends, partial(advance, count=_DROPPED))
     each = -(-states // chains)
-    _, samples, done = uniform.drawn(ensemble, polytope, stores, ends, on, 0, each, progress)
+    _, samples, done = uniform.draw_states(
+        ensemble, polytope, stores, ends, advance, 0, each, progress
+    )
     cancelling.check("inference")
     drawn = time.perf_counter()
-    worth = mixing(samples, uniform.varying(ensemble, polytope))
-    counts = uniform.counted({"turns": 0, "refused": 0}, dropped + done)
+    worth = mixing(samples, uniform.varying_components(ensemble, polytope))
+    counts = uniform.add_counts({"turns": 0, "refused": 0}, dropped + done)
     counts |= {"dropped": _DROPPED * chains, "held": len(polytope.centre) - len(polytope.moving)}
     mixed = not polytope.dimension or worth.worst_r_hat <= uniform.MIXED
     return judged(ensemble, samples, worth, mixed, counts, ready - begin, drawn - ready)
@@ -241,7 +239,7 @@ def step(
     rows: billiard.RowStore | None = None,
     *,
     count: int,
-) -> uniform.Flown:
+) -> uniform.Advance:
     """The next `count` states of some chains, in the format of `uniform.step`.
 
     Gibbs sampling alternates two steps. A normal error of variance 1 is added to every wall's 1 + B
@@ -253,7 +251,7 @@ def step(
     pulls = np.tile(polytope.pull, (len(ends), 1))
     ahead: list[Any] = []
 
-    def on(ends: list[uniform.ChainState], left: int) -> uniform.Flown:
+    def advance(ends: list[uniform.ChainState], left: int) -> uniform.Advance:
         if not ahead:
             drawn = [_drawn(polytope, end.rng, min(_AT_ONCE, left)) for end in ends]
             ahead.extend(zip(*(zip(*one, strict=True) for one in drawn), strict=True))
@@ -261,9 +259,9 @@ def step(
         shifts = [error + end.slacks for error, end in zip(errors, ends, strict=True)]
         middles = 1.0 + polytope.moved(np.stack(shifts) - 1.0, pulls)
         paths = [(w[None], times, m[None]) for w, m in zip(speeds, middles, strict=True)]
-        return uniform.flown(polytope, rows, ends, paths)
+        return uniform.follow_paths(polytope, rows, ends, paths)
 
-    return uniform.walked(polytope, ends, count, _PATHS, on)
+    return uniform.run_chains(polytope, ends, count, _PATHS, advance)
 
 
 def _drawn(polytope: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:

@@ -20,11 +20,11 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from granforce.experiment.infer import Inference, arguments_of, inference_of, judged
+from granforce.experiment.infer import Inference, checked_numbers, inference_of, judged
 from granforce.explore.mixing import Mixing
 from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import fitted_many, spread_of
+from granforce.forces.likeliest import checked, fitted_many, likeliest, spread_of
 from granforce.numerics.lanes import LANES
 from granforce.quantities import quantity
 from granforce.records import random_seed, takes
@@ -87,7 +87,9 @@ def remeasured(
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)
     unmeasured = spread_of(ensemble, unmeasured, UNMEASURED)
-    m, s, best, numbers = arguments_of(ensemble, measured, sigma, unmeasured, numbers, least=1)
+    numbers = checked_numbers(ensemble, numbers, least=1)
+    m, s = checked(ensemble, measured, sigma)
+    best = likeliest(ensemble, m, s, unmeasured)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
     repeated = _repeated(ensemble, best.forces, width, *numbers, seed, progress)

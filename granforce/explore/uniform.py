@@ -76,7 +76,7 @@ class ChainState(NamedTuple):
 
 # Final chains, their slacks (chains, count, walls) after each path or state, and the numbers of
 # reflections and of rejected paths (chains, 2).
-Flown = tuple[list[ChainState], Floats, Integers]
+Advance = tuple[list[ChainState], Floats, Integers]
 
 
 @record
@@ -157,7 +157,7 @@ def step(
     count: int,
     reach: float,
     method: str = "billiard",
-) -> Flown:
+) -> Advance:
     """The next `count` states of some chains, as slacks for Walls.points.
 
     The given ChainStates are not changed. rows: store for rows of K. reach: distance of states from
@@ -165,56 +165,56 @@ def step(
     fixed number leaves the measure uniform.
     """
     if method == "hit_and_run":
-        return walked(polytope, ends, count, 1, lambda ends, left: _chords(polytope, ends))
+        return run_chains(polytope, ends, count, 1, lambda ends, left: _chords(polytope, ends))
     rows = rows or billiard.room_for_rows(polytope.count)
     straight = np.ones((0, polytope.count))
 
-    def on(ends: list[ChainState], left: int) -> Flown:
+    def advance(ends: list[ChainState], left: int) -> Advance:
         paths = min(left, BATCH - ends[0].paths % BATCH)
         drawn = [directions(polytope, end.rng, paths) for end in ends]
         paths_of = [(speeds, PATH * reach * (0.5 + parts), straight) for speeds, parts in drawn]
-        return flown(polytope, rows, ends, paths_of)
+        return follow_paths(polytope, rows, ends, paths_of)
 
-    return walked(polytope, ends, count, PATHS_PER_STATE, on)
+    return run_chains(polytope, ends, count, PATHS_PER_STATE, advance)
 
 
-def walked(
+def run_chains(
     polytope: Walls,
     ends: Sequence[ChainState],
     count: int,
     paths: int,
-    on: Callable[[list[ChainState], int], Flown],
-) -> Flown:
+    advance: Callable[[list[ChainState], int], Advance],
+) -> Advance:
     """The next `count` states of some chains, `paths` paths apart, in the format of `step`.
 
-    on(ends, left): advances each chain by some paths, at most `left`.
+    advance(chains, left): advances each chain by some paths, at most `left`.
     """
-    ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
-    counts = np.zeros((len(ends), 2), dtype=int)
-    states: list[Floats] = []
+    chains, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
+    counts = np.zeros((len(chains), 2), dtype=int)
+    path_ends: list[Floats] = []
     while left and polytope.dimension:
-        ends, outs, done = on(ends, left)
-        states.append(outs)
-        counts += done
-        left -= outs.shape[1]
-    if not states:
-        return ends, np.ones((len(ends), count, polytope.count)), counts
-    slacks = np.concatenate(states, axis=1)[:, paths - 1 :: paths]
-    return ends, np.stack([polytope.on_hull(s) for s in slacks]), counts
+        chains, slacks, new = advance(chains, left)
+        path_ends.append(slacks)
+        counts += new
+        left -= slacks.shape[1]
+    if not path_ends:
+        return chains, np.ones((len(chains), count, polytope.count)), counts
+    states = np.concatenate(path_ends, axis=1)[:, paths - 1 :: paths]
+    return chains, np.stack([polytope.on_hull(s) for s in states]), counts
 
 
-def flown(
-    polytope: Walls, rows: RowStore, ends: Sequence[ChainState], drawn: Sequence[Any]
-) -> Flown:
-    """Advance chains by a batch of paths; drawn: speeds, times and middles (`billiard.fly`)."""
-    slacks, outs, counts = billiard.follow(
-        polytope.rows, polytope.dimension, rows, [end.slacks for end in ends], drawn
+def follow_paths(
+    polytope: Walls, rows: RowStore, ends: Sequence[ChainState], paths: Sequence[Any]
+) -> Advance:
+    """Advance chains by a batch of paths; paths: speeds, times and middles (`billiard.fly`)."""
+    slacks, path_ends, counts = billiard.follow(
+        polytope.rows, polytope.dimension, rows, [end.slacks for end in ends], paths
     )
-    paths = ends[0].paths + outs.shape[1]
-    if paths % BATCH == 0:
+    done = ends[0].paths + path_ends.shape[1]
+    if done % BATCH == 0:
         slacks = polytope.on_hull(slacks)
-    ends = [ChainState(s, end.rng, paths) for s, end in zip(slacks, ends, strict=True)]
-    return ends, outs, counts
+    ends = [ChainState(s, end.rng, done) for s, end in zip(slacks, ends, strict=True)]
+    return ends, path_ends, counts
 
 
 def directions(
@@ -230,7 +230,7 @@ def directions(
     return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
 
 
-def _chords(polytope: Walls, ends: list[ChainState]) -> Flown:
+def _chords(polytope: Walls, ends: list[ChainState]) -> Advance:
     """Advance chains by one state of hit-and-run."""
     slacks, moves = np.stack([end.slacks for end in ends]), MOVES_PER_DIMENSION * polytope.dimension
     for s, end in zip(slacks, ends, strict=True):
@@ -290,7 +290,9 @@ def sample_uniform(
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
-            good = complete and enough and mixed and inside(sample.residual, sample.violation)
+            good = (
+                complete and enough and mixed and are_admissible(sample.residual, sample.violation)
+            )
             counts = sample.counts | {"skipped": 0 if h else done}
             return sample._replace(reached=bool(good), counts=counts)
         growth = 1.1 * (effective or 0.0) / max(sample.effective, 1.0)
@@ -313,7 +315,7 @@ def _check_same(previous: UniformSample, chains: int, seed: int, method: str) ->
             )
 
 
-def begun(polytope: Walls, chains: int, seed: int) -> list[ChainState]:
+def start_chains(polytope: Walls, chains: int, seed: int) -> list[ChainState]:
     """Initial states of the chains, each with its own random stream."""
     return [init(polytope, child) for child in np.random.SeedSequence(seed).spawn(chains)]
 
@@ -322,11 +324,11 @@ def warm_up(
     polytope: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
 ) -> tuple[list[ChainState], float, Integers]:
     """Chains ready to draw from: (ChainState of each, reach, turns and rejected paths of each)."""
-    ends, counts = begun(polytope, chains, seed), np.zeros((chains, 2), dtype=int)
+    ends, counts = start_chains(polytope, chains, seed), np.zeros((chains, 2), dtype=int)
     reach = float(np.sqrt(polytope.dimension))
     for count in WARM_UP if polytope.dimension else ():
-        on = partial(step, polytope, count=count, reach=reach, method=method)
-        ends, slacks, done = together(stores, ends, on)
+        advance = partial(step, polytope, count=count, reach=reach, method=method)
+        ends, slacks, done = advance_all(stores, ends, advance)
         counts += done
         reach = float(np.sqrt(np.mean(np.sum((slacks - 1) ** 2, axis=2))))
     return ends, reach, counts
@@ -340,7 +342,7 @@ def stores_for(polytope: Walls, chains: int, workers: int) -> list[RowStore]:
     return [billiard.room_for_rows(polytope.count, 1 / threads) for _ in range(threads)]
 
 
-def shared(
+def map_parts(
     stores: Sequence[RowStore], tasks: Sequence[Any], work: Callable[[list[Any], RowStore], Any]
 ) -> list[Any]:
     """work(some tasks, rows) of consecutive parts of the tasks, each in a thread with its store."""
@@ -349,22 +351,22 @@ def shared(
         return list(pool.map(work, [[tasks[k] for k in part] for part in parts], stores))
 
 
-def together(
+def advance_all(
     stores: Sequence[RowStore],
     ends: Sequence[ChainState],
-    on: Callable[[list[Any], RowStore], Flown],
-) -> Flown:
-    """on(some chains, rows) for all chains, on threads."""
-    parts, slacks, counts = zip(*shared(stores, ends, on), strict=True)
+    advance: Callable[[list[Any], RowStore], Advance],
+) -> Advance:
+    """advance(some chains, rows) for all chains, on threads."""
+    parts, slacks, counts = zip(*map_parts(stores, ends, advance), strict=True)
     return [end for part in parts for end in part], np.concatenate(slacks), np.concatenate(counts)
 
 
-def drawn(
+def draw_states(
     ensemble: Ensemble,
     polytope: Walls,
     stores: Sequence[RowStore],
     ends: Sequence[ChainState],
-    on: Callable[..., Flown],
+    advance: Callable[..., Advance],
     have: int,
     target: int,
     progress: Progress | None,
@@ -372,7 +374,7 @@ def drawn(
     """Final chains, forces (chains, k, N_c, 2) of new states, and their counts (chains, 2).
 
     Each chain has `have` states, and gets more up to the target, or until the work is cancelled.
-    on(some chains, rows, count=…): as `step`.
+    advance(some chains, rows, count=…): as `step`.
     """
     chunks = [np.zeros((len(ends), 0, len(ensemble.index), 2))]
     counts = np.zeros((len(ends), 2), dtype=int)
@@ -380,7 +382,7 @@ def drawn(
         while have < target:
             cancelling.check("uniform sample")
             count = min(ROUND, target - have)
-            ends, slacks, done = together(stores, ends, partial(on, count=count))
+            ends, slacks, done = advance_all(stores, ends, partial(advance, count=count))
             chunks.append(forces_of(ensemble, polytope, slacks))
             counts, have = counts + done, have + count
             if progress is not None:
@@ -388,7 +390,7 @@ def drawn(
     return ends, np.concatenate(chunks, axis=1), counts
 
 
-def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
+def add_counts(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
     """Counts with turns and rejected paths (chains, 2) added."""
     turns, refused = done.sum(axis=0).tolist()
     return counts | {"turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
@@ -412,7 +414,7 @@ def _start(
         violation=nothing,
         mixing=cast("Mixing", None),  # until there are states
         reached=False,
-        counts=counted(counts | {"held": len(polytope.centre) - len(polytope.moving)}, done),
+        counts=add_counts(counts | {"held": len(polytope.centre) - len(polytope.moving)}, done),
         setup_seconds=ready - begin,
         sampling_seconds=time.perf_counter() - ready,
         diagnosis_seconds=0.0,
@@ -435,11 +437,13 @@ def _extend(
     polytope, (chains, have) = sample.walls, sample.residual.shape
     target = -(-states // chains)
     begin = time.perf_counter()
-    on = partial(step, polytope, reach=sample.reach, method=sample.method)
-    ends, new, done = drawn(ensemble, polytope, stores, sample.ends, on, have, target, progress)
+    advance = partial(step, polytope, reach=sample.reach, method=sample.method)
+    ends, new, done = draw_states(
+        ensemble, polytope, stores, sample.ends, advance, have, target, progress
+    )
     forces = np.concatenate([sample.states, new], axis=1)
     ready = time.perf_counter()
-    varies = varying(ensemble, polytope)
+    varies = varying_components(ensemble, polytope)
     try:
         diagnosis = mixing(forces, varies)
     except Cancelled:
@@ -449,7 +453,7 @@ def _extend(
         residual=ensemble.residual(forces),
         violation=ensemble.violation(forces),
         mixing=diagnosis,
-        counts=counted(sample.counts, done),
+        counts=add_counts(sample.counts, done),
         sampling_seconds=sample.sampling_seconds + ready - begin,
         diagnosis_seconds=sample.diagnosis_seconds + time.perf_counter() - ready,
         ends=ends,
@@ -457,7 +461,7 @@ def _extend(
     return sample, forces.shape[1] >= target and not cancelling.cancelled()
 
 
-def inside(residual: Floats, violation: Floats) -> bool:
+def are_admissible(residual: Floats, violation: Floats) -> bool:
     """Whether all states are in S, by residual and violation."""
     return bool(np.all(residual <= BALANCED) and np.all(violation <= ADMISSIBLE))
 
@@ -470,7 +474,7 @@ def forces_of(ensemble: Ensemble, polytope: Walls, slacks: Floats) -> Floats:
     return ensemble.pin(ensemble.to_forces(x.reshape(*y.shape[:-1], -1)))
 
 
-def varying(ensemble: Ensemble, polytope: Walls) -> Mask:
+def varying_components(ensemble: Ensemble, polytope: Walls) -> Mask:
     """Mask (N_c, 2) of components that vary in S, from random changes.
 
     Changes count if they exceed a tenth of the resolution of S. The random numbers are always the

@@ -299,12 +299,12 @@ def _settled(
         turns=0,
         refused=0,
     )
-    begun = _flown(polytope, rows, fresh, _PILOT)
-    turns = begun.turns * (_PILOT - _FORGOTTEN) // _PILOT
-    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:], turns=turns)
+    first = _follow_rung(polytope, rows, fresh, _PILOT)
+    turns = first.turns * (_PILOT - _FORGOTTEN) // _PILOT
+    return first._replace(q=first.q[_FORGOTTEN:], x=first.x[_FORGOTTEN:], turns=turns)
 
 
-def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
+def _follow_rung(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) -> _Rung:
     """The rung with this many more paths, in whole batches."""
     h, beta, end, slack_sums, drawn = polytope.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)
@@ -317,7 +317,9 @@ def _flown(polytope: Walls, rows: billiard.RowStore, rung: _Rung, count: int) ->
             # As long as those of uniform states, or a quarter of an oscillation.
             speeds /= np.sqrt(beta)
             lengths = np.minimum(lengths * np.sqrt(beta / h), 0.5 * np.pi)
-        (end,), outs, done = uniform.flown(polytope, rows, [end], [(speeds, lengths, middle)])
+        (end,), outs, done = uniform.follow_paths(
+            polytope, rows, [end], [(speeds, lengths, middle)]
+        )
         slack_sums.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
     return rung._replace(
@@ -407,14 +409,14 @@ def _extended(
     ]
     tasks = [(rungs[way][k], int(more[way, k]), float(cost[k])) for way, k in order]
 
-    def flown(some: list[tuple[_Rung, int, float]], rows: billiard.RowStore) -> list[_Rung]:
+    def follow_rungs(some: list[tuple[_Rung, int, float]], rows: billiard.RowStore) -> list[_Rung]:
         flying = []
         for rung, number, each in some:
-            flying.append(_flown(polytope, rows, rung, number))
+            flying.append(_follow_rung(polytope, rows, rung, number))
             work.add(number * each)
         return flying
 
-    parts = uniform.shared(stores, tasks, flown)
+    parts = uniform.map_parts(stores, tasks, follow_rungs)
     longer = [list(way) for way in rungs]
     for (way, k), rung in zip(order, itertools.chain(*parts), strict=True):
         longer[way][k] = rung

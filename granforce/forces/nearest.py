@@ -84,7 +84,7 @@ def nearest_of_many(
     starts: arrays (N_c, 2), force. Other arguments as of `nearest`.
     """
     if cancel is not None:
-        with cancelling.watched(cancel):
+        with cancelling.scope(cancel):
             return nearest_of_many(
                 ensemble, starts, tolerance=tolerance, max_iterations=max_iterations
             )

@@ -314,7 +314,7 @@ def _from(before: int, advanced: Callable[[float], object]) -> Callable[[float],
 def _over_processes(tasks: Tasks, waits: Waits, workers: int, calls: _Calls) -> None:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # in a worker that imports a script without a guard: its parent says so
-    with cancelling.watched():  # the compiler cannot be interrupted
+    with cancelling.scope():  # the compiler cannot be interrupted
         cancelling.apart(warm_up, {cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
     for _ in range(TRIES):

@@ -45,10 +45,11 @@ _APART = "granforce-apart"  # threads with a call that cannot read the flag
 
 
 @contextmanager
-def watched(cancel: Cancel | None = None) -> Iterator[None]:
-    """Within, all work ends soon after cancel() → True, or after Ctrl-C in the main thread.
+def scope(cancel: Cancel | None = None) -> Iterator[None]:
+    """A context whose work ends soon after cancel() → True, or after Ctrl-C in the main thread.
 
-    Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones also apply.
+    Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones also apply. A
+    thread asks cancel(), and reads from a socket the signals that arrive and the end of the scope.
     """
     outer = _scope.get()
     main = threading.current_thread() is threading.main_thread()
@@ -56,15 +57,18 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
         yield
         return
     request = _either(outer, cancel)
-    scope = _Scope(np.array([_ending.is_set() or interrupted()]), request)
-    ears, mouth = socket.socketpair()
-    mouth.setblocking(False)
-    installed = main and _wake_by_signals(mouth)
+    inner = _Scope(np.array([_ending.is_set() or interrupted()]), request)
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    installed = main and _wake_by_signals(writer)
     thread = threading.Thread(
-        target=_watch, args=(scope, ears, cancel is not None), name="granforce-cancel", daemon=True
+        target=_watch,
+        args=(inner, reader, cancel is not None),
+        name="granforce-cancel",
+        daemon=True,
     )
     thread.start()
-    token = _scope.set(scope)
+    token = _scope.set(inner)
     try:
         yield
     finally:
@@ -72,21 +76,21 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
         if installed:
             signal.set_wakeup_fd(-1)
         with suppress(BlockingIOError):
-            mouth.send(b"\0")
+            writer.send(b"\0")
         thread.join()
-        ears.close()
-        mouth.close()
+        reader.close()
+        writer.close()
 
 
 def cancellable(function: Callable[P, T]) -> Callable[P, T]:
-    """Run the function inside `watched`, with its own keyword argument `cancel`.
+    """Run the function inside `scope`, with its own keyword argument `cancel`.
 
     A ResultWarning says if its result, or one of a list, has a `shortfall` without being cancelled.
     """
 
     @functools.wraps(function)
     def inside(*arguments: P.args, **options: P.kwargs) -> T:
-        with watched(cast("Cancel | None", options.pop("cancel", None))):
+        with scope(cast("Cancel | None", options.pop("cancel", None))):
             result = function(*arguments, **options)
             for one in result if isinstance(result, list) else [result]:
                 if (reason := getattr(one, "shortfall", "")) and not cancelled():
@@ -108,28 +112,28 @@ def end_everything() -> None:
     _ending.set()
 
 
-def _wake_by_signals(mouth: socket.socket) -> bool:
+def _wake_by_signals(writer: socket.socket) -> bool:
     """Make signals write their number to the socket, unless an event loop already does so."""
-    before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+    before = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     if before != -1:
         signal.set_wakeup_fd(before)
     return before == -1
 
 
-def _watch(scope: _Scope, ears: socket.socket, asks: bool) -> None:
-    while not scope.flag[0]:
-        readable, _, _ = select.select([ears], [], [], _ASK_EVERY if asks else None)
-        numbers = ears.recv(64) if readable else b""
+def _watch(inner: _Scope, reader: socket.socket, asks: bool) -> None:
+    while not inner.flag[0]:
+        readable, _, _ = select.select([reader], [], [], _ASK_EVERY if asks else None)
+        numbers = reader.recv(64) if readable else b""
         if signal.SIGINT in numbers:
-            scope.flag[0] = True
+            inner.flag[0] = True
         if 0 in numbers:
             return
         try:
-            cancelled_now = scope.cancel is not None and scope.cancel()
+            cancelled_now = inner.cancel is not None and inner.cancel()
         except Exception:
             return  # the working thread, which also calls it, gets the same error
         if cancelled_now:
-            scope.flag[0] = True
+            inner.flag[0] = True
 
 
 def flag() -> Mask:
@@ -139,10 +143,10 @@ def flag() -> Mask:
 
 def cancelled() -> bool:
     """Whether the running work was cancelled."""
-    scope = _scope.get()
-    if not scope.flag[0] and scope.cancel is not None and scope.cancel():
-        scope.flag[0] = True
-    return bool(scope.flag[0])
+    current = _scope.get()
+    if not current.flag[0] and current.cancel is not None and current.cancel():
+        current.flag[0] = True
+    return bool(current.flag[0])
 
 
 def check(what: str = "work") -> None:

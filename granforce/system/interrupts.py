@@ -2,7 +2,7 @@
 
 Python turns the signal into a KeyboardInterrupt wherever the main thread happens to be. An import,
 or a call of a C library, may swallow the exception or replace it: the command would then continue,
-or end in a traceback. So the signal is also recorded, and work inside `watched` (cancelling.py)
+or end in a traceback. So the signal is also recorded, and work inside `scope` (cancelling.py)
 checks the record.
 
 Standard library only: this runs before anything else is imported.

@@ -509,7 +509,7 @@ def solve(arguments):
     model = highs.standard_form(A, A @ rng.random(2000))
     highs.set_cost(model, rng.random(2000))
     print("begun", flush=True)
-    with highs.cancelling.watched():
+    with highs.cancelling.scope():
         highs.solve(model)
 
 commands.pack = solve

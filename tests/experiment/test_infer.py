@@ -22,7 +22,7 @@ from granforce.records import Cancelled, InputError
 def drawn(body, W, d, states, chains=4, seed=0):
     """Draws (chains, states, n) of y with the weight exp(−½ |W y − d|²), as infer makes them."""
     made = BodyWalls(body, W, d)
-    ends, *_ = inference.step(made, uniform.begun(made, chains, seed), count=20)
+    ends, *_ = inference.step(made, uniform.start_chains(made, chains, seed), count=20)
     return made.points(inference.step(made, ends, count=states)[1])
 
 

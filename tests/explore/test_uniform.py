@@ -244,7 +244,7 @@ def test_stuck_chains_are_recognised(S, sample):
         residual=sample.residual[:, :0],
         violation=sample.violation[:, :0],
         reach=1e9,
-        ends=uniform.begun(sample.walls, 4, 0),
+        ends=uniform.start_chains(sample.walls, 4, 0),
     )
     stuck = sample_uniform(S, 40, previous=begun)
     refused = stuck.counts["refused"] - sample.counts["refused"]
@@ -416,7 +416,7 @@ def test_rows_made_on_demand_change_no_bit(sample):
     kept_ends, *kept = on(sample.ends, whole)
     apart = [billiard.room_for_rows(made.count, 0.0) for _ in range(3)]
     for stores in ([few], apart, [billiard.room_for_rows(made.count)] * 3):
-        ends, *moved = uniform.together(stores, sample.ends, on)
+        ends, *moved = uniform.advance_all(stores, sample.ends, on)
         for one, other in zip(ends, kept_ends, strict=True):
             assert np.array_equal(one.slacks, other.slacks)
         for one, other in zip(moved, kept, strict=True):

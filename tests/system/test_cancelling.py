@@ -121,7 +121,7 @@ def test_what_would_take_hours_ends_when_cancelled(work, S):
 
     def run():
         try:
-            with cancelling.watched(asked.is_set):
+            with cancelling.scope(asked.is_set):
                 work(*arguments)
         except BaseException as error:
             ends.append(error)
@@ -151,7 +151,7 @@ def test_what_would_take_hours_ends_when_cancelled(work, S):
     ],
 )  # fmt: skip
 def test_nothing_is_handed_out_once_cancelled(work, S):
-    with cancelling.watched(lambda: True), pytest.raises(gf.Cancelled):
+    with cancelling.scope(lambda: True), pytest.raises(gf.Cancelled):
         work(S)
 
 
@@ -166,8 +166,8 @@ def test_a_cancel_that_never_comes_changes_no_number(S):
 
 def test_scopes_nest_and_leave_nothing_behind():
     asked = []
-    with cancelling.watched(lambda: bool(asked)):
-        with cancelling.watched(lambda: False):
+    with cancelling.scope(lambda: bool(asked)):
+        with cancelling.scope(lambda: False):
             cancelling.check()
             with cancelling.threads(1) as pool:
                 assert not pool.submit(cancelling.cancelled).result()
