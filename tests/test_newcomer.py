@@ -35,7 +35,7 @@ from granforce.study import scan
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
 from granforce.system import terminal
-from granforce.system.plain import spaced
+from granforce.system.wording import spaced
 
 
 def test_tab_and_help_list_the_public_names_and_nothing_else():

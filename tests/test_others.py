@@ -23,10 +23,10 @@ NAMES = {
 KERNELS = {
     ("system/compiled.py", "numba.core.caching"),
     ("system/compiled.py", "_load_index"),
-    ("system/parts.py", "numba.core.codegen"),
-    ("system/parts.py", "numba.core.compiler"),
-    ("system/parts.py", "_engine"),
-    ("system/parts.py", "_add_module"),
+    ("system/part_compiler.py", "numba.core.codegen"),
+    ("system/part_compiler.py", "numba.core.compiler"),
+    ("system/part_compiler.py", "_engine"),
+    ("system/part_compiler.py", "_add_module"),
 }
 _OURS = {"_asdict", "_fields", "_make", "_replace", "_exit"}  # documented, in spite of their names
 _TYPES = {

@@ -26,7 +26,7 @@ from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
 from granforce.bench.uniform import uniform, uniform_growth
 from granforce.system.files import make_folder, written
-from granforce.system.plain import json_text
+from granforce.system.wording import json_text
 
 __all__ = [
     "PARTS",

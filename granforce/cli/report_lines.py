@@ -2,7 +2,7 @@
 
 import textwrap
 
-from granforce.system.plain import spaced
+from granforce.system.wording import spaced
 
 # The largest number of contacts that a report on exact results lists.
 FEW = 30

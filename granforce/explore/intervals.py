@@ -30,7 +30,7 @@ from granforce.numerics.linear_programs import Program
 from granforce.quantities import quantity
 from granforce.records import InputError, brief_list, float_array, takes
 from granforce.system import cancelling
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.tolerances import CARRYING, FLAT, INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 

@@ -128,7 +128,7 @@ def _pulled_all(
 
 
 def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
-    """The same for up to LANES values."""
+    """Networks (k, N_c, 2) with k ≤ LANES values of f_n at one contact."""
     count, scale = len(values), ensemble.force_scale
     width = 1 if count == 1 else LANES
     problem = problem_of(ensemble)

@@ -23,7 +23,7 @@ from granforce.records import (
     takes,
     with_article,
 )
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.tolerances import ADMISSIBLE
 from granforce.types import Floats, Integers
 

@@ -81,7 +81,7 @@ def ensemble(
 
 
 def with_idle(S: Ensemble) -> Ensemble:
-    """The same with the contacts that carry nothing, which may carry under other loads.
+    """The ensemble with the contacts that carry nothing, which may carry under other loads.
 
     Raises InputError if a pressure or a stress is prescribed.
     """
@@ -127,7 +127,7 @@ class _Conditions(NamedTuple):
 
 
 def _pruned(full: Ensemble, conditions: _Conditions) -> Ensemble:
-    """The same without contacts that carry nothing.
+    """The ensemble without contacts that carry nothing.
 
     Forces up to CARRYING count as nothing, but others may depend on them (if forces are frozen at
     such values): if no network balances without them, contacts that press in the known network

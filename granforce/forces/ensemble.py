@@ -385,12 +385,12 @@ class Ensemble:
         return self.force_scale * np.stack([self.known.low, self.known.high], axis=-1)
 
     def with_bounds(self, bounds: Floats, network: Floats) -> Ensemble:
-        """The same with other `bounds`; network (N_c, 2): a network of S, force."""
+        """The ensemble with other `bounds`; network (N_c, 2): a network of S, force."""
         known = knowledge.polygons(bounds, self.slopes, self.force_scale, self.index)
         return replace(self, known=known, computed=network)
 
     def with_normal(self, position: int, network: Floats) -> Ensemble:
-        """The same with f_n of the contact at `position` known as well.
+        """The ensemble with f_n of the contact at `position` known as well.
 
         network (N_c, 2): a network of S with that f_n, which becomes its `member`.
         """

@@ -142,7 +142,7 @@ def bounds_of(known: Known | None, count: int) -> Floats:
 
 
 def ordered(low: Floats, high: Floats, apart: float = 0.0) -> tuple[Floats, Floats]:
-    """The same bounds, both at their midpoint where low exceeds high by up to REVERSED.
+    """Bounds (…) with both at their midpoint where low exceeds high by up to REVERSED.
 
     Also where they are up to `apart` from each other; both relative to the largest finite bound.
     """

@@ -135,9 +135,9 @@ def fitted(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float = UNMEASU
 def fitted_many(
     ensemble: Ensemble, many: Floats, s: Floats, unmeasured: float = UNMEASURED
 ) -> Floats:
-    """The same (k, N_c, 2) of k ≤ LANES measurements (k, N_c, 2) of the same components, in lanes.
+    """Forces (k, N_c, 2) of `likeliest` for k ≤ LANES measurements (k, N_c, 2), in lanes.
 
-    Each gives the same network as alone.
+    All measure the same components. Each gives the same network as alone.
     """
     problem, unit = problem_of(ensemble), ensemble.force_scale
     m, width = many[0], 1 if len(many) == 1 else LANES

@@ -108,7 +108,7 @@ def recession(A: sparse.csr_matrix) -> Floats | None:
 
 
 def widest_recession(A: sparse.csr_matrix) -> Floats | None:
-    """The same, positive wherever any such d is."""
+    """A `recession` direction that is positive wherever any is; None if there is none."""
     for d, _ in widest(A):
         if _is_ray(A, d):
             return d / d.sum()

@@ -59,7 +59,7 @@ class System(NamedTuple):
     accuracy: float  # largest gap of a certified value: INTERVAL_GAP, or the rounding if larger
 
     def under(self, load: Floats) -> System:
-        """The same with one load on the balance, A y + F load = b, instead of pairs on contacts."""
+        """The system with a load on the balance, A y + F load = b, instead of pairs on contacts."""
         rows = np.zeros(len(self.b))
         rows[: len(load)] = load
         gain = np.array([-(rows @ self.combination)])

@@ -56,7 +56,7 @@ def project(problem, at, work, lanes):
 
 @within
 def _project_pinned(problem, k, normal, tangential, soft, at, work, lanes):
-    """The same for a contact with f_n, f_t or both pinned: the nearest point of a line."""
+    """Project one contact with f_n, f_t or both pinned: the nearest point of a line."""
     y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
     f_n, f_t = 0.5 * (y0 + y1), 0.5 * (y0 - y1)
     nn = tt = same(lanes, 0.0)

@@ -199,7 +199,7 @@ def _stiffness(k, y, z, mode, lanes):
 
 @within
 def _load_stiffness(at, mode, lane):
-    """The same for F, the last coordinate."""
+    """The stiffness of the load F, the last coordinate."""
     last = len(at.y) - 1
     if mode == BALANCE:
         return max(at.y[last, lane], _LIGHT) ** -1.5

@@ -28,7 +28,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from granforce.system.compiled import skip_unreadable_indices, tell_when_compiling
-from granforce.system.parts import PartCompiler
+from granforce.system.part_compiler import PartCompiler
 from granforce.types import Floats
 
 skip_unreadable_indices()

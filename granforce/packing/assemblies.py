@@ -37,7 +37,7 @@ from granforce.records import (
     real_array,
     refuse_hidden,
 )
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.tolerances import TOUCHING
 from granforce.types import Floats, Integers, Mask
 

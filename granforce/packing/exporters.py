@@ -15,7 +15,7 @@ import numpy.typing as npt
 from granforce.forces.balance import left_open_in
 from granforce.records import InputError, Packing, float_array, refuse_shapes, takes
 from granforce.system.files import expanded, written
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.types import Floats
 
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}

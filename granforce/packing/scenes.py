@@ -75,7 +75,7 @@ def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
 
 
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
-    """The same Packing even if nothing balances; its forces are 0, or those at another μ."""
+    """The Packing of a scene, even if nothing balances; its forces are 0, or those at another μ."""
     if not isinstance(name, str) or name not in EVERY:
         raise InputError(f"unknown scene {brief(name)}; choose one of {', '.join(EVERY)}")
     kind = EVERY[name]

@@ -19,8 +19,8 @@ from granforce.study.store import open_store
 from granforce.system import markdown
 from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
-from granforce.system.plain import json_text
 from granforce.system.terminal import Bar, print_list, table
+from granforce.system.wording import json_text
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (

@@ -77,7 +77,7 @@ class Puller:
         return whole
 
     def rails(self, contact: int, state: Floats, many: bool | None = None) -> Iterator[Rail]:
-        """The same; with many contacts first a part without the ends, which take longest."""
+        """Yield the Rail; with many contacts first a part without the ends, which take longest."""
         ends = reach(self._S, contact, workers=WORKERS)
         (position,) = self._S.positions([contact])
         many = len(self._S.index) > MANY if many is None else many

@@ -129,7 +129,7 @@ def _writable(folder: Path) -> bool:
 
 
 def temporary_place(folder: str | None = None) -> str:
-    """The same folder each time, so that kernels are compiled once; a new one if it is not ours.
+    """A folder for kernels: always the same one, or a new one if that belongs to someone else.
 
     folder: its parent, by default that of temporary files.
     """

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 
 from tqdm import tqdm
 
-from granforce.system.plain import json_text, spaced
+from granforce.system.wording import json_text, spaced
 
 
 def print_list(rows: Sequence[Mapping[str, Any]], names: Sequence[str], as_json: bool) -> None:

@@ -28,8 +28,8 @@ from granforce.study.series import FRAME
 from granforce.study.store import Entry, Store, open_store, refuse_newer
 from granforce.system.compiled import kernels
 from granforce.system.files import make_folder
-from granforce.system.plain import counted, json_text, spaced
 from granforce.system.terminal import print_list, print_notes, print_report
+from granforce.system.wording import counted, json_text, spaced
 
 
 def study_(arguments: argparse.Namespace) -> int:
@@ -55,7 +55,7 @@ def app(arguments: argparse.Namespace) -> None:
     words += [] if arguments.no_show else ["--show"]
     words += ["--warm"] if arguments.warm else []
     words += ["--use-xheaders"] if arguments.use_xheaders else []
-    words += ["--plugins", "granforce.system.health"]
+    words += ["--plugins", "granforce.cli.health"]
     sys.argv = words
     runpy.run_module("panel", run_name="__main__", alter_sys=True)
 

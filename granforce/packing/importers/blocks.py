@@ -12,7 +12,7 @@ from granforce.packing.assemblies import area, blocks, nearly_touching
 from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.text import Source, Table, read_csv, read_text
 from granforce.records import InputError, Packing, brief, positive
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.types import Floats, Integers
 
 KEYS = ("corners", "disk", "density", "fixed", "material")  # of a body in JSON

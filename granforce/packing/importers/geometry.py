@@ -19,7 +19,7 @@ from granforce.records import (
     positive,
     repeated,
 )
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.tolerances import LISTED_TOUCHING, RIGID_OVERLAP, UNUSUAL_GAP
 from granforce.types import Floats, Integers, Mask
 

@@ -15,7 +15,7 @@ from granforce.packing.assemblies import larger_tolerance
 from granforce.packing.closing import apart, margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
-from granforce.system.plain import counted
+from granforce.system.wording import counted
 from granforce.tolerances import CARRYING, NO_EQUILIBRIUM, RIGID_OVERLAP, ROUNDING
 from granforce.types import Floats, Integers
 

@@ -1,4 +1,4 @@
-"""Values in JSON (RFC 8259), which has neither NaN nor infinities, and in words."""
+"""Values as text: in JSON (RFC 8259), which has neither NaN nor infinities, and in words."""
 
 import json
 import math
