@@ -20,7 +20,7 @@ from granforce.forces.contact_problem import (
     problem_of,
 )
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.nearest import Search, some_network, starting_network
+from granforce.forces.nearest import Search, given_network, some_network, starting_network
 from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
@@ -104,9 +104,7 @@ def pull(
     values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
     if not len(values):
         raise InputError("give at least one value for the contact's force")
-    if state is None:
-        state = starting_network(ensemble)
-    state = float_array(ensemble.network(state, "state"), (-1, 2), "state")
+    state = given_network(ensemble, state)
     states = _pulled_all(ensemble, position, values, state, workers)
     missed = ~ensemble.admits(states)
     if missed.any():

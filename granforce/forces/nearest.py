@@ -27,7 +27,7 @@ from granforce.numerics import certificates, cone_projection, contact_program, h
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.interior_point import OPTIMUM, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import InputError, Relaxation, positive, takes, whole
+from granforce.records import InputError, Relaxation, float_array, positive, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
@@ -158,6 +158,15 @@ def starting_network(ensemble: Ensemble) -> Floats:
         A, b, _ = ensemble.scaled_form
         raise certificates.why_unsolved(A, b, slack=ensemble.slack)
     return network
+
+
+def given_network(ensemble: Ensemble, state: Floats | None) -> Floats:
+    """A network (N_c, 2) given as `state`, by default the `starting_network`.
+
+    Raises InputError for another shape, and for forces that are not finite.
+    """
+    network = starting_network(ensemble) if state is None else state
+    return float_array(ensemble.network(network, "state"), (-1, 2), "state")
 
 
 def some_network(ensemble: Ensemble, start: Floats) -> Floats:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from granforce.fields import record
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.nearest import some_network, starting_network
+from granforce.forces.nearest import given_network, some_network
 from granforce.quantities import FORCE, Field, quantity
 from granforce.records import InputError, float_array, real_array, takes
 from granforce.system import cancelling
@@ -61,9 +61,7 @@ def loaded_networks(
     loads = float_array(np.atleast_1d(real_array(loads, "loads")), (-1,), "loads")
     if not len(loads):
         raise InputError("give at least one load")
-    if state is None:
-        state = starting_network(ensemble)
-    state = float_array(ensemble.network(state, "state"), (-1, 2), "state")
+    state = given_network(ensemble, state)
     pair = np.zeros_like(state)
     pair[position, 0] = 1.0
     turned = ensemble.A @ ensemble.to_vector(pair)
