@@ -117,7 +117,7 @@ class Controls:
             sizing_mode="stretch_width",
         )
         self.opens.link(self.options, open="visible")
-        state.looks.keep_open(self.opens, "made")
+        state.looks.sync_opened(self.opens, "made")
 
     def _number(self, label: str, start: int, end: float, step: int = 1) -> NumberField:
         return NumberField(self.work.say, label=label, start=start, end=end, step=step, **FIELD)

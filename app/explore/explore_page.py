@@ -172,9 +172,9 @@ class _Around:
         tabs.drawn()
         self.results[:] = [Results(state, **WIDE)]
         yield
-        yield from tabs.filling(state.looks.tab)
+        yield from tabs.fill(state.looks.tab)
         if state.looks.wide:
-            yield from tabs.filling("plane")
+            yield from tabs.fill("plane")
         self.panels.append(Unfolding())
         self.controls.extend([self.address, Hints()])  # not in the panels, which are isolated
         explanation.follow(state, self.header)

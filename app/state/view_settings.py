@@ -104,7 +104,7 @@ class Looks(Appearance):
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 
-    def keep_open(self, panel: Any, *names: str) -> None:
+    def sync_opened(self, panel: Any, *names: str) -> None:
         """Keep `opened` in sync with a panel: its `active` parts, or whether it is `open`."""
         parameter = "active" if "active" in panel.param else "open"
 

@@ -108,15 +108,15 @@ class Tabs:
         if self.looks.wide and self.tabs.active == PLANE:
             self.tabs.active = 0
         if events and self.looks.wide:
-            self.state.work.piecewise(self.filling("plane"))
+            self.state.work.piecewise(self.fill("plane"))
 
     def _showing(self) -> Iterator[None]:
         name = self.names[self.tabs.active]
-        yield from self.filling(name)  # first, so that observers of the state find it
+        yield from self.fill(name)  # first, so that observers of the state find it
         if name == self.names[self.tabs.active]:
             self.looks.tab = name
 
-    def filling(self, name: str) -> Iterator[None]:
+    def fill(self, name: str) -> Iterator[None]:
         """Create the view of a tab, once; a generator of steps."""
         if name not in self._begun:
             self._begun.add(name)

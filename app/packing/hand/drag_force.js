@@ -18,7 +18,7 @@ const NUMBER_LINE = 14 // px, height of a line of numbers next to it
 const NUDGE = 1 / 40 // of a rail, per key press
 const REST = 600 // ms after the last key press until the force is released
 const ROUNDED = 1e-6 // in ⟨fₙ⟩, error of bounds in the page
-const LINGER = 1000 // ms for which its rail stays visible after release
+const FADE_MS = 1000 // ms for which its rail stays visible after release
 
 export class Grab {
   /** tell(message): send to the server. */
@@ -26,10 +26,10 @@ export class Grab {
     this.player = player
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
-    this.moved = this.flung = false // whether it moved, and whether it was released before its rail arrived
+    this.moved = this.released = false // whether it moved, and whether it was released before its rail arrived
     this.pulled = null // the network after all pulls, as the server has it
     this.aim = null // contact and value of a pull whose network has not arrived
-    this.lingers = 0
+    this.fading = 0
     this.frames = 0
     this.spot = new PointHand(this)
     this.tell({ anew: true })
@@ -47,7 +47,7 @@ export class Grab {
     const { player } = this
     if (!this.begin()) return
     this.contact = contact
-    this.moved = this.flung = false
+    this.moved = this.released = false
     this.place = place
     player.scene.selected = contact
     player.scene.closeTip()
@@ -83,32 +83,32 @@ export class Grab {
     const { contact, rail, value } = this
     if (contact === null) return
     clearTimeout(this.resting)
-    this.flung = !rail && this.moved
-    if (this.flung) return // applied when its rail arrives
+    this.released = !rail && this.moved
+    if (this.released) return // applied when its rail arrives
     this.contact = null
     if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
       this.tell({ hold: [contact, value] })
     }
-    if (rail) this.linger()
+    if (rail) this.fadeLater()
     this.still()
   }
 
   /** Nothing is being dragged any more. */
   still() {
-    this.unsay()
+    this.restoreMessage()
     this.player.plots.move(false)
     this.player.paint()
     this.player.paintPlots()
   }
 
   /** Keep the rail's message for a while after release. */
-  linger() {
-    clearTimeout(this.lingers)
-    this.lingers = setTimeout(() => { this.lingers = 0; this.player.repaint() }, LINGER)
+  fadeLater() {
+    clearTimeout(this.fading)
+    this.fading = setTimeout(() => { this.fading = 0; this.player.repaint() }, FADE_MS)
   }
 
   /** If nothing was pulled, restore the previous message. */
-  unsay() {
+  restoreMessage() {
     const messageLine = this.player.buttons.part("message")
     if (messageLine.textContent === FINDING) messageLine.textContent = this.messageBefore
   }
@@ -186,8 +186,8 @@ export class Grab {
   }
 
   settle() {
-    clearTimeout(this.lingers)
-    this.lingers = 0
+    clearTimeout(this.fading)
+    this.fading = 0
     this.rail = this.value = null
     if (this.player.look) this.player.look.before = this.replay?.held ? this.before : null
   }
@@ -196,15 +196,15 @@ export class Grab {
 
   hear({ rail, fan, held }) {
     this.aim = null
-    if (rail !== undefined) this.ride(rail && plain(rail))
+    if (rail !== undefined) this.takeRail(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))
     if (held === undefined || this.active) return
     if (this.player.pushed.held) this.pulled = held && plain(held) // shown after the push
     else this.keep(held && plain(held))
   }
 
-  ride(rail) {
-    if (!rail) { this.contact = null; this.unsay(); this.player.plots.move(false); return this.player.again() }
+  takeRail(rail) {
+    if (!rail) { this.contact = null; this.restoreMessage(); this.player.plots.move(false); return this.player.again() }
     if (rail.contact !== this.contact) return
     const { mixed } = this.replay, more = this.rail !== null // the ends of a rail that was there in part
     this.rail = rail
@@ -218,7 +218,7 @@ export class Grab {
   /** Continue the drag along a rail that arrived; after an early release, move to the target. */
   arrived() {
     this.move()
-    if (this.flung && this.rail.whole) this.leave()
+    if (this.released && this.rail.whole) this.leave()
   }
 
   /** Changes are coloured relative to the network on screen. */
@@ -341,7 +341,7 @@ export class Grab {
 
   /** Rail, handle and limiting contacts, on the canvas of marks. */
   draw(context, scene) {
-    if (this.contact === null && !this.lingers) return
+    if (this.contact === null && !this.fading) return
     const { palette, ratio } = scene
     const { opened, sliding } = this.rail ? this.holding : { opened: [], sliding: [] }
     this.drawHolding(context, scene, opened, true)

@@ -14,7 +14,7 @@ export class PointHand {
 
   drop() {
     this.target = this.fan = this.from = null
-    this.flung = false // whether it was released before its networks arrived
+    this.released = false // whether it was released before its networks arrived
   }
 
   // Dragging
@@ -34,7 +34,7 @@ export class PointHand {
   leave() {
     const { fan, at } = this
     if (!this.active) return
-    if (!fan) return void (this.flung = true)
+    if (!fan) return void (this.released = true)
     this.drop()
     if (at) this.hand.tell({ hold_point: at })
     this.hand.still()
@@ -56,7 +56,7 @@ export class PointHand {
     this.from.residual = hand.replay.residual
     hand.remember()
     this.set()
-    if (this.flung) this.leave()
+    if (this.released) this.leave()
   }
 
   /** The network at the target, or at the nearest point of the polygon. */

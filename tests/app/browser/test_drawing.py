@@ -528,7 +528,7 @@ def test_a_force_in_the_hand_follows_its_rail_to_its_ends(run):
             {HAND}
             Object.assign(hand, {{ contact: 0, grip: [300, 300], point: [300, 300] }})
             hand.place = () => 3
-            hand.ride(rail)
+            hand.takeRail(rail)
             const shown = () => ({{
                 value: hand.value, normal: [...player.replay.held.normal],
                 tangential: [...player.replay.held.tangential],

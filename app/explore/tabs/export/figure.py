@@ -37,5 +37,5 @@ def panel(state: AppState, tab: str) -> Any:
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
     fold = folded_away(TITLE, inside)
-    state.looks.keep_open(fold, "figure")
+    state.looks.sync_opened(fold, "figure")
     return fold

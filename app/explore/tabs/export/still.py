@@ -51,8 +51,8 @@ def figures(
     """Bokeh figures of intervals, of the growth of η, and of the principal plane `chosen`."""
     bars = intervals.View(at_rest(library, replay, exact, view, "intervals", None, narrowed))
     space = force_space.View(at_rest(library, replay, exact, view))
-    space._show(replay, chosen)
+    space.show_plane(replay, chosen)
     if outlined is not None:
-        space._outlined(replay, outlined)
+        space.show_outline(replay, outlined)
     space.drawing.figure.sizing_mode = "scale_width"
     return bars.drawing.figure, bars.growth.figure, space.drawing.figure

@@ -133,7 +133,7 @@ class View(TabView):
         state = self.state
         if state.shown is not replay:
             return
-        self._show(replay, plane)
+        self.show_plane(replay, plane)
         if state.growing:
             self.details.object = GROWS
             return
@@ -141,7 +141,7 @@ class View(TabView):
             self.details.object = ONE_POINT
             return
         work = planes.outline(state.library, state.cell, replay, plane)
-        self.task.start(work, lambda outlined: self._outlined(replay, outlined))
+        self.task.start(work, lambda outlined: self.show_outline(replay, outlined))
 
     def _components(self, replay: Replay) -> Plane:
         """The plane of one contact's forces, or of two contacts' normal forces."""
@@ -165,7 +165,7 @@ class View(TabView):
         if self.visible and pair and event.new not in (None, *pair):
             self.looks.pair = event.new, pair[1]
 
-    def _show(self, replay: Replay, plane: Plane) -> None:
+    def show_plane(self, replay: Replay, plane: Plane) -> None:
         """Show path, original network and cone; the outline follows."""
         self.state.plane = plane
         frame = min(self.looks.frame, len(plane.path) - 1)
@@ -190,10 +190,11 @@ class View(TabView):
             path[0] = plane.path[0]
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
-    def _outlined(self, replay: Replay, outlined: Outlined) -> None:
+    def show_outline(self, replay: Replay, outlined: Outlined) -> None:
+        """Show the outline of S in its plane, unless another packing is on screen by now."""
         if self.shown is not None and self.shown[0] is not replay:  # another one arrived meanwhile
             return
-        self._show(replay, outlined.plane)
+        self.show_plane(replay, outlined.plane)
         self.outlined = outlined
         self.drawing.outline(outlined)
         reach = 1.05 * float(outlined.outer[:, 0].max())

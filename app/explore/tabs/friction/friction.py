@@ -63,7 +63,7 @@ class View(TabView):
         first, fourth, sixth = self.figures
         pairs = [part for pair in zip(THIS, self.folded, strict=True) for part in pair]
         folds = folded_away(*pairs)
-        self.looks.keep_open(folds, *(f"friction{k}" for k in range(len(THIS))))
+        self.looks.sync_opened(folds, *(f"friction{k}" for k in range(len(THIS))))
         return pn.Column(
             self.first, first, self.details, self.fourth, fourth, self.sixth,
             sixth, folds, **WIDE,

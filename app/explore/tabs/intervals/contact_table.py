@@ -13,4 +13,4 @@ class Contacts(Scripted):
 
     def __init__(self, looks: Looks) -> None:
         super().__init__(sizing_mode="stretch_width")
-        looks.keep_open(self, "table")
+        looks.sync_opened(self, "table")

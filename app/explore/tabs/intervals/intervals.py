@@ -69,7 +69,7 @@ class View(TabView):
         """Choices and bars; collapsed table and growth."""
         wide = {"sizing_mode": "stretch_width"}
         grows = folded_away(GROWS, plotted(self.growth.figure))
-        self.looks.keep_open(grows, "growth")
+        self.looks.sync_opened(grows, "growth")
         return pn.Column(
             self.lead,
             plotted(self.drawing.figure),
