@@ -26,7 +26,7 @@ import xarray as xr
 
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import NEARLY_BALANCED, default_steps
-from granforce.perturb.critical_force import MOST_STEPS, RISE
+from granforce.perturb.critical_force import MOST_STEPS, Protocol
 from granforce.records import InputError
 from granforce.study import kinds, scan
 from granforce.study.cells import Kind, StudyCell, load
@@ -58,7 +58,7 @@ CHAINS = LANES
 # The residual that most attempts do not reach at large μ: requested for fewer states.
 HARDEST, HARDEST_STATES = "sweeps_1e-6", 200
 LONGER_WALK = 4  # factor, to test whether η depends on the length
-LONGER, FINER = 4, 4  # factors of the implicit steps of a load, and of the number of loads
+LONGER, FINER = 4, 4  # factors of the implicit steps of a load, and of the fineness of loads
 
 
 def variations(mu: float) -> dict[str, dict[str, Any]]:
@@ -312,10 +312,15 @@ def _repeated(plan: Plan, seed: int) -> list[Task]:
 
 def _responses(plan: Plan, seed: int) -> list[Task]:
     family = []
+    precision, rise, _ = Protocol()
     for part, packings, protocol in (
         ("response", plan.response_packings, {}),
         ("response_long", plan.perturb_packings, {"max_steps": LONGER * MOST_STEPS}),
-        ("response_fine", plan.perturb_packings, {"rise": RISE / FINER}),
+        (
+            "response_fine",
+            plan.perturb_packings,
+            {"rise": rise / FINER, "precision": precision / FINER},
+        ),
     ):
         for mu in plan.frictions if seed <= packings else ():
             if 0 < mu < LEAST_FOLLOWED:

@@ -154,7 +154,7 @@ def _perturbed_contact(
 
 PERTURBATION = Kind(
     name="perturbation",
-    version=2,
+    version=3,
     title="local perturbation",
     unit="contact",
     parameters=_perturbation_parameters,
