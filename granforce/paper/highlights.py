@@ -16,7 +16,8 @@ from granforce.paper.claims.verdicts import CONTRADICTED, FEW, REPRODUCED, STRON
 from granforce.paper.findings import SHEARED, WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
-from granforce.perturb.critical_force import Protocol
+from granforce.perturb.critical_force import REACHED, Protocol
+from granforce.study import kinds
 from granforce.types import Floats, Rows
 
 PEAK = "μ where exact η3 is largest"
@@ -308,7 +309,7 @@ def _critical(of: _Numbers) -> Highlight:
     return Highlight(
         f"{first}: the mean critical force is {_quoted(middle)} of the mean limit load at "
         f"intermediate μ ({_from_to(of)}) and {_quoted(large)} at large μ; at small μ, it is "
-        f"{_quoted(small)}.{_within_precision(of)}",
+        f"{_quoted(small)}.{_error(of)}",
         "figure2_limit",
         "local-perturbation",
     )
@@ -325,17 +326,23 @@ def _from_to(of: _Numbers) -> str:
     return " to ".join(ratios)
 
 
-def _within_precision(of: _Numbers) -> str:
-    """That F_crit may be the limit load at small μ, if they differ by less than its precision."""
-    rows = of.table.part("response")
+def _error(of: _Numbers) -> str:
+    """Whether F_crit is the limit load at small μ; or that it is of an older protocol."""
+    rows, now = of.table.part("response"), kinds.PERTURBATION.version
+    versions = sorted(rows["version"].unique())
+    if versions != [now]:
+        words = listed([f"{version:g}" for version in versions])
+        return (
+            f" These critical forces are from version {words} of the protocol, whose error exceeds "
+            f"that of the present version {now}, {Protocol().precision:g} ⟨f_n⟩."
+        )
     rows = rows[rows["mu"].between(*SMALL)]
-    apart = (rows["limit_load"] - rows["critical_force"]).to_numpy()
-    precision = Protocol().precision
-    if not len(apart) or np.mean(apart) > precision:
-        return ""
+    apart = (rows["limit_load"] - rows["critical_force"]).mean()
+    least = REACHED * Protocol().precision
+    word = "so the two are equal within it" if apart <= least else "so F_crit is smaller on average"
     return (
-        f" There, the difference is within the error of F_crit, up to {precision:g} ⟨f_n⟩, so the "
-        "two may be equal."
+        f" There, the mean difference is {apart:.2g} ⟨f_n⟩, and the error of F_crit near the limit "
+        f"load is {least:g} ⟨f_n⟩, {word}."
     )
 
 

@@ -4,14 +4,14 @@ Protocol. The geometry is fixed and grains are rigid. From the packing's own for
 raised step by step; each step starts from the last equilibrium and follows the flow of contact
 dynamics (`flow`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps have
 found no equilibrium. As long as grains come to rest, each step is RISE of the way to the static
-limit load, beyond which no equilibrium exists, until `precision` ⟨f_n⟩ are left. A motion is final
-only after a step of at most LAST_STEP · `precision`: after a longer one the load returns BACK steps
-and rises again in steps a quarter as long, and in full steps once it has passed the load of that
-motion. Motion that is not yet steady is followed for STEADY_STEPS before it is final. The critical
-force F_crit is the last load at rest. Its error is `precision`: of 200 contacts each at μ = 0.01,
-0.3, 1 and 10, none changes by more if load steps, precision and the steps of the flow are refined
-by four. The pair counts in the balance of the grains and in the pressure like a force of the
-contact itself, but not in its Coulomb cone, and the box may dilate at constant pressure.
+limit load, beyond which no equilibrium exists, until REACHED · `precision` are left of it. A motion
+is final only after a step of at most LAST_STEP · `precision`: after a longer one the load returns
+BACK steps and rises again in steps a quarter as long, and in full steps once it has passed the load
+of that motion. Motion that is not yet steady is followed for STEADY_STEPS before it is final. The
+critical force F_crit is the last load at rest. Its error is `precision`: of 200 contacts each at μ
+= 0.01, 0.3, 1 and 10, none changes by more if load steps, precision and the steps of the flow are
+refined by four. The pair counts in the balance of the grains and in the pressure like a force of
+the contact itself, but not in its Coulomb cone, and the box may dilate at constant pressure.
 
 F_crit ≤ limit load. They differ because sliding contacts do not dilate (the law is not associated):
 grains may start to move although an equilibrium exists.
@@ -54,13 +54,15 @@ from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP, LARGEST_UNIT
 from granforce.types import Cancel, Floats, Integers, Mask
 
-# Load steps: the first, as a fraction of the way from the last load at rest to the limit load; the
-# longest after which motion is final, as a fraction of the precision; how many steps the load
-# returns after motion, and the factor of the next. A large step makes contacts slide that would not
-# on the way, and they stay where they slid: without the return F_crit is up to 0.14 ⟨f_n⟩ smaller.
+# Load steps: the first, as a fraction of the way from the last load at rest to the limit load; how
+# many the load returns after motion, and the factor of the next. A large step makes contacts slide
+# that would not on the way, and they stay where they slid: without the return F_crit is up to
+# 0.14 ⟨f_n⟩ smaller.
 RISE = 0.04
-LAST_STEP = 1 / 16
 BACK, SHORTER = 8, 1 / 4
+# The longest step after which motion is final, and the distance at which the limit load counts as
+# reached, as fractions of the precision.
+LAST_STEP, REACHED = 1 / 16, 1 / 4
 # Implicit steps after which the search for an equilibrium ends.
 MOST_STEPS = 150
 # Largest violation of Coulomb's law in steady motion, relative to the fastest contact, and the
@@ -305,7 +307,7 @@ def raised(push: Push, limit: float, protocol: Protocol) -> Asking[Raised]:
     share, moved_at, max_steps = 1.0, 0.0, protocol.max_steps
     while True:
         low, forces = past[-1]
-        if limit - low <= protocol.precision:
+        if limit - low <= REACHED * protocol.precision:
             return Raised(low, limit, forces, None, counts)
         rise = share * protocol.rise * (limit - low)
         load, final = low + rise, rise <= LAST_STEP * protocol.precision
