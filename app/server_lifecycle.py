@@ -11,7 +11,7 @@ from contextlib import suppress
 
 from panel import config
 
-from granforce.records import InputError, InputWarning
+from granforce.records import InputError, InputWarning, ResultWarning
 from granforce.study.scan import warm_up
 from granforce.system.cancelling import end_everything
 from granforce.system.compiled import compile_ahead
@@ -54,7 +54,8 @@ def on_server_loaded(server_context: object) -> None:
             "the app computes in threads of its own, and cannot run with --num-threads or "
             "PANEL_NUM_THREADS: start panel serve without"
         )
-    warnings.simplefilter("ignore", InputWarning)  # notes on a visitor's files are on the page
+    for kind in (InputWarning, ResultWarning):  # the page says what they say
+        warnings.simplefilter("ignore", kind)
     # xarray imports dask, if installed, with the first array it examines, which fails if two
     # threads do so at once.
     with suppress(ImportError):
