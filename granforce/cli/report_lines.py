@@ -2,33 +2,17 @@
 
 import textwrap
 
+from granforce.quantities import QUANTITIES
 from granforce.system.wording import spaced
 
 # The largest number of contacts that a report on exact results lists.
 FEW = 30
-# Names as in --json; those that are stored have the long names of the stored arrays.
-MEANINGS = {
-    "dimension": "dimension h of the ensemble",
-    "eta1": "indeterminacy η1 = ⟨δF⟩/⟨|G|⟩",
-    "acceptance": "fraction of attempts that were accepted",
-    "rejected": "attempts that found no equilibrium",
-    "unconverged": "attempts that ran out of iterations",
-    "skipped": "states that needed no relaxation (h = 0)",
-    "rattlers": "grains outside the backbone",
-    "unloaded_contacts": "contacts that cannot carry force",
-    "worst_r_hat": "largest split R̂ of any component",
-    "least_bulk_size": "smallest bulk effective sample size",
-    "least_tail_size": "smallest tail effective sample size",
-    "turns": "reflections of the billiard walk",
-    "refused": "paths discarded because of too many reflections",
-    "dropped": "states discarded while the chains warmed up",
-    "held": "coordinates f_n ± f_t/μ that are zero in all of S",
-    "original_distance": "distance of the original network from the centre",
+# By names as in --json, of lines that are not quantities of the store, or say more or else.
+_MEANINGS = {
     "determined_contacts": "contacts with the same force in all networks",
     "undetermined_clusters": "connected groups of undetermined contacts",
     "position_of_f_n_in_tenths": "number of undetermined contacts whose original f_n is in the "
     "first, …, last tenth of its interval",
-    "programs": "linear programs solved",
     "again": "of these, solved a second time, with refined steps or by HiGHS",
     "expected_reduction": "estimated fraction by which the mean standard error of f_n decreases "
     "once this f_n is known, from covariances",
@@ -49,9 +33,7 @@ MEANINGS = {
     "backbone_grains": "grains that can carry force",
     "backbone_contacts": "contacts that can carry force",
     "friction": "friction coefficient μ",
-    "mu": "friction coefficient μ",
     "pressure": "pressure P0; undefined in an open packing",
-    "packing_fraction": "packing fraction φ, rattlers included",
     "coordination": "mean number z of contacts of a backbone grain, including those with walls; "
     "walls and rattlers do not count as grains",
     "mean_normal_force": "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
@@ -81,14 +63,8 @@ MEANINGS = {
     # of results
     "entry": "name of the result in the store",
     "cached": "whether the result was already in the store",
-    "seconds": "wall time of the computation",
-    "setup_seconds": "wall time before the first step",
-    "sampling_seconds": "wall time of the steps",
     "states": "number of states",
-    "eta2": "indeterminacy η2 from pairs of states",
-    "eta3": "indeterminacy η3 from intervals",
     "exact_eta3": "η3 of the exact intervals; undefined if some are infinite",
-    "accepted": "number of accepted attempts",
     "mean_iterations": "mean number of iterations of a relaxation",
     "largest_residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
     "largest_violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
@@ -104,10 +80,6 @@ MEANINGS = {
     "f_n_high": "largest f_n",
     "f_t_low": "smallest f_t, negative in the other direction",
     "f_t_high": "largest f_t",
-    "cluster": "cluster of undetermined contacts, −1 where determined",
-    "correlation": "corr(f_n, ΔF_n) of the original network",
-    "correlation_low": "smallest corr(f_n, ΔF_n) of any state",
-    "correlation_high": "largest corr(f_n, ΔF_n) of any state",
     "reached": "whether the requested size or accuracy was reached",
     "largest_duality_gap": "largest possible error of a bound, certified, in units of ⟨f_n⟩",
     "ln_volume": "logarithm of the volume V of S, with forces in units of ⟨f_n⟩",
@@ -130,16 +102,8 @@ MEANINGS = {
     "mean_critical_force": "mean critical force F_crit, the force pair at which grains start to "
     "move",
     "critical_force_deciles": "F_crit: smallest value, deciles, largest value",
-    "critical_low": "F_crit: largest load at rest",
-    "critical_high": "smallest load not at rest, or the limit load",
     "limit_load": "largest force pair that can be balanced",
-    "decay_exponent": "exponent α of the mean displacement |u| ~ r^−α",
-    "decay_low": "lower end of the 95 % interval of α",
-    "decay_high": "upper end of the 95 % interval of α",
     "fit_range": "distances r of the fit, in the packing's units; undefined in small packings",
-    "loads_at_rest": "loads that ended at rest",
-    "loads_moving": "loads that ended in steady motion",
-    "loads_undecided": "loads that ended in unsteady motion",
     "largest_breach": "largest violation of Coulomb's law by a first motion, relative to the "
     "fastest contact",
     "load_factor": "largest multiple of the load that contact forces can balance",
@@ -166,8 +130,6 @@ MEANINGS = {
     "decrease with the other sign of f_t (--reverse)",
     "error": "median standard error of a measured f_n, in units of the mean measured f_n; without "
     "--error, chosen so that χ² equals its degrees of freedom",
-    "chi_square": "χ² of the likeliest network",
-    "freedom": "degrees of freedom of χ²",
     "mean_change_of_f_n": "mean |inferred − measured| f_n",
     "suspects": "contacts that deviate by more than 3 σ",
     "mean_standard_error": "mean standard error of a force",
@@ -257,6 +219,15 @@ INFER = (
     *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error", *MIXING),
     *("held", "setup_seconds", "sampling_seconds", "seconds", "cached"),
 )
+
+MEANINGS = {
+    name: _MEANINGS[name] if name in _MEANINGS else QUANTITIES[name].meaning
+    for lines in (
+        *(PACK, PEGS, IMPORT, WALK, SCAN, MEASURE, UNIFORM, VOLUME, INTERVALS, BOUNDS, LIMIT_LOADS),
+        *(LOADS, LOAD_FACTOR, REST, INFORMATIVE, STRESS, PERTURB, CRITICAL, INFER),
+    )
+    for name in lines
+}
 
 
 def explained(names: tuple[str, ...]) -> str:
