@@ -12,7 +12,7 @@ from granforce.explore.outline import Outline
 from granforce.explore.stress_outline import StressOutline
 from granforce.explore.volume import Volume
 from granforce.forces.ensemble import Ensemble
-from granforce.study.schema import extension, labelled
+from granforce.study.schema import extension, labelled, stored
 from granforce.types import Floats, Integers
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
@@ -35,12 +35,8 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
         correlation = measures.correlation(original[some, 0], measures.normal_extent(*within))
     return labelled(
         {
-            "backbone": bounds.contacts,
+            **stored(bounds),
             "original": original,
-            "low": low,
-            "high": high,
-            "interval_gap": bounds.gap,
-            "max_gap": bounds.max_gap,
             "position": position,
             "cluster": clusters_of(S, bounds),
             "eta3": measures.eta3(low, high) if some.all() else np.nan,
@@ -77,10 +73,7 @@ def informative_dataset(
     """
     dataset = labelled(
         {
-            "backbone": informative.contacts,
-            "part_expected": informative.expected,
-            "mean_before": informative.before,
-            "mean_after": informative.after,
+            **stored(informative),
             **extension(S),
             "force_scale": S.force_scale,
             "seconds": seconds,
@@ -93,11 +86,8 @@ def limit_loads_dataset(S: Ensemble, loads: LimitLoads, *, seconds: float = 0.0)
     """LimitLoads as a dataset."""
     return labelled(
         {
-            "backbone": loads.contacts,
+            **stored(loads),
             "original": S.original[S.positions(loads.contacts)],
-            "limit_load": loads.load,
-            "load_gap": loads.gap,
-            "max_gap": loads.max_gap,
             "force_scale": S.force_scale,
             "seconds": seconds,
         },
@@ -109,14 +99,7 @@ def stress_dataset(S: Ensemble, outline: StressOutline, *, seconds: float = 0.0)
     """A StressOutline as a dataset."""
     return labelled(
         {
-            "stress_angle": outline.angles,
-            "stress_support": outline.support,
-            "stress_gap": outline.gap,
-            "stress_inner": outline.inner,
-            "stress_outer": outline.outer,
-            "stress_own": outline.original,
-            "friction": outline.friction,
-            "friction_bound": outline.friction_bound,
+            **stored(outline),
             **extension(S),
             "seconds": seconds,
         },
@@ -128,17 +111,12 @@ def volume_dataset(S: Ensemble, volume: Volume) -> xr.Dataset:
     """A Volume as a dataset."""
     return labelled(
         {
-            "log_volume": volume.log_volume,
-            "log_volume_error": volume.error,
-            "log_volume_ladders": volume.ladders,
-            "log_volume_per_grain": volume.per_grain,
-            "extent": volume.extent,
+            **stored(volume),
             "reached": volume.reached,
             **extension(S),
             "coordination": S.coordination,
             "force_scale": S.force_scale,
             **S.skipped,
-            "seconds": volume.seconds,
         },
         {"counts": json.dumps(volume.counts)},
     )
@@ -152,9 +130,7 @@ def outline_dataset(
         {
             "backbone": S.index,
             "axes": axes,
-            "inner": outline.inner,
-            "outer": outline.outer,
-            "outline_gap": outline.gap,
+            **stored(outline),
             "programs": outline.counts["programs"],
             "force_scale": S.force_scale,
             "seconds": seconds,

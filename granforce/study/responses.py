@@ -11,7 +11,7 @@ from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb.critical_force import CriticalForce
 from granforce.records import Packing
-from granforce.study.schema import extension, labelled
+from granforce.study.schema import extension, labelled, stored
 from granforce.types import Floats
 
 
@@ -24,22 +24,15 @@ def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> x
     (position,) = S.positions([contact])
     return labelled(
         {
-            "backbone": [contact],
-            "limit_load": [critical.limit_load],
-            "critical_low": [critical.low],
-            "critical_high": [critical.high],
-            "load_residual": [critical.residual],
-            "load_violation": [critical.violation],
-            "motion_breach": [moved.breach],
+            **stored(critical),
+            **stored(moved),
             "pair_opening": [moved.opening[position]],
             "opened": [moved.opened.sum()],
             "slid": [moved.slid.sum()],
             "kept": [moved.kept.sum()],
-            "displacement": moved.displacement[None],
             "shell_radius": (edges[1:] + edges[:-1]) / 2,
             "profile": decay.profile(S.packing, moved.displacement, contact, edges)[None],
             **{name: [count] for name, count in critical.counts.items()},
-            "contact_seconds": [critical.seconds],
         }
     )
 

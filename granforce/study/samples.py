@@ -10,7 +10,7 @@ from granforce.experiment.infer import Draws, Inference
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
-from granforce.study.schema import extension, labelled
+from granforce.study.schema import extension, labelled, stored
 from granforce.types import Floats, Integers
 
 
@@ -21,13 +21,10 @@ def walk_dataset(
     pick = _picked(len(done.states), keep)
     return labelled(
         {
+            **stored(done),
             **_measured(S, done.states, pick),
-            "residual": done.residual[pick],
-            "violation": done.violation[pick],
-            "sweeps": done.sweeps[pick],
-            "attempts": done.attempts[pick],
+            **{name: getattr(done, name)[pick] for name in Walk._fields[1:-1]},
             "mean_sweeps": done.sweeps.mean() if len(done.sweeps) else np.nan,
-            "acceptance": done.acceptance,
             **done.counts,
             **S.skipped,
             "seconds": seconds,
@@ -53,9 +50,7 @@ def uniform_dataset(
         {
             **_measured(S, drawn.flat, pick),
             **_drawn(drawn, pick),
-            "r_hat": drawn.mixing.r_hat,
-            "bulk_size": drawn.mixing.bulk,
-            "tail_size": drawn.mixing.tail,
+            **stored(drawn.mixing),
             **S.skipped,
             "seconds": seconds,
         }
@@ -79,15 +74,11 @@ def inference_dataset(
     error of unmeasured components, in ⟨f_n⟩.
     """
     arrays: dict[str, Any] = {
+        **stored(inference),
         "backbone": S.index,
         "original": S.original,
         "measured": measured,
         "sigma": sigma,
-        "inferred": inference.forces,
-        "deviation": inference.deviation,
-        "suspect": inference.suspects,
-        "chi_square": inference.chi_square,
-        "freedom": inference.freedom,
         "unmeasured": unmeasured,
         "bounded": int(S.bounded),
         "force_scale": S.force_scale,
@@ -101,7 +92,6 @@ def inference_dataset(
     if inference.draws is not None:
         pick = _picked(len(inference.draws.flat), keep)
         arrays |= {"states": inference.draws.flat[pick], **_drawn(inference.draws, pick)}
-        arrays |= {"expected": inference.mean, "standard_error": inference.error}
     return labelled(arrays)
 
 

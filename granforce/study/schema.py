@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
 
+from granforce.fields import fields
 from granforce.quantities import MEAN, QUANTITIES, Field, whole
 from granforce.records import Contacts, Packing, Shapes
 
 if TYPE_CHECKING:  # no kernels needed to read a store
     from granforce.forces.ensemble import Ensemble
+
+T = TypeVar("T")
 
 
 class Variable(NamedTuple):
@@ -24,9 +27,6 @@ class Variable(NamedTuple):
     units: str
     long_name: str
 
-
-_CONTACT_ARRAYS = ("contact_i", "contact_j", *Contacts._fields[2:])
-_SHAPE_ARRAYS = ("corners", "sides", "mass", "inertia")
 
 # The reduced study: one row per cell, with scalars of its dataset, and samples of its contacts.
 ROW_SCALARS = (
@@ -92,6 +92,19 @@ VARIABLES = {
 }
 
 
+def stored(record: Any) -> dict[str, Any]:
+    """The fields of a record that are stored, by their names in the store.
+
+    A record of one contact gives arrays of length 1; fields without a value are left out.
+    """
+    arrays = {}
+    for name, field in fields(type(record)).items():
+        value = getattr(record, name, None) if field.stored else None
+        if value is not None:
+            arrays[field.stored] = [value] if field.each else value
+    return arrays
+
+
 def extension(S: Ensemble) -> dict[str, Any]:
     """The dimension of S, and the number of directions too narrow to count."""
     return {
@@ -126,12 +139,9 @@ def declared(name: str) -> Variable:
 
 def packing_dataset(packing: Packing) -> xr.Dataset:
     """A Packing as a dataset with dims grain, contact, axis, component; info as JSON in attrs."""
-    arrays = packing._asdict()
-    info, contacts = arrays.pop("info"), arrays.pop("contacts")
-    arrays |= zip(_CONTACT_ARRAYS, contacts, strict=True)
-    arrays |= zip(_SHAPE_ARRAYS, arrays.pop("shapes") or (), strict=False)
-    given = {name: values for name, values in arrays.items() if values is not None}
-    return labelled(given, {"info": json.dumps(info, default=to_builtin)})
+    arrays = stored(packing) | stored(packing.contacts)
+    arrays |= stored(packing.shapes) if packing.shapes is not None else {}
+    return labelled(arrays, {"info": json.dumps(packing.info, default=to_builtin)})
 
 
 def dataset_packing(dataset: xr.Dataset) -> Packing:
@@ -140,17 +150,21 @@ def dataset_packing(dataset: xr.Dataset) -> Packing:
     Tuples in info are returned as lists.
     """
     arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
-    values = {name: dataset[name].values if name in dataset else None for name in _CONTACT_ARRAYS}
-    shaped = "mass" in dataset
     return Packing(
-        contacts=Contacts._make(values[name] for name in _CONTACT_ARRAYS),
-        shapes=Shapes(*(dataset[name].values for name in _SHAPE_ARRAYS)) if shaped else None,
+        contacts=_loaded(Contacts, dataset),
+        shapes=_loaded(Shapes, dataset) if "mass" in dataset else None,
         mu=float(dataset["mu"]),
         pressure=float(dataset["pressure"]),
         info=json.loads(dataset.attrs["info"]),
         tilt=float(dataset.get("tilt", 0.0)),
         **arrays,
     )
+
+
+def _loaded(kind: Callable[..., T], dataset: xr.Dataset) -> T:
+    """A record of stored arrays; None for those that the dataset lacks."""
+    names = {name: field.stored for name, field in fields(kind).items()}
+    return kind(**{k: dataset[v].values if v in dataset else None for k, v in names.items()})
 
 
 def to_builtin(value: Any) -> Any:
