@@ -1,5 +1,6 @@
-"""Records of the public interface: equality, and warnings about results that were not requested."""
+"""Records of the public interface: equality, declared fields, and warnings about results."""
 
+import pydoc
 import warnings
 
 import numpy as np
@@ -7,7 +8,13 @@ import pytest
 from packings import packed
 
 import granforce as gf
+from granforce.docs import hooks
+from granforce.fields import fields
+from granforce.labelled import table, to_dataset
+from granforce.quantities import QUANTITIES
 from granforce.records import ResultWarning
+from granforce.study.bounds import intervals_dataset
+from granforce.study.schema import VARIABLES
 
 
 def test_records_are_equal_if_their_fields_are():
@@ -48,3 +55,33 @@ def test_every_result_says_if_it_is_not_what_was_requested():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gf.infer(S, measured, sigma)
+
+
+def test_a_field_reads_the_same_wherever_it_is_shown():
+    S = gf.ensemble(gf.scene("groove", 0.5))
+    bounds = gf.intervals(S)
+    field = fields(gf.Intervals)["low"]
+    assert field.text in pydoc.render_doc(gf.Intervals, renderer=pydoc.plaintext)
+    labelled, stored = gf.to_dataset(bounds, S)["low"], intervals_dataset(S, bounds)["low"]
+    assert labelled.attrs == stored.attrs == {"units": field.unit, "long_name": field.long_name}
+    assert labelled.dims == stored.dims == VARIABLES["low"].dims == tuple(field.dims.split())
+    assert f"| `low` | contact, component | force | {field.meaning}; " in hooks.library()
+
+
+def test_stored_fields_of_records_are_quantities():
+    names = set()
+    for name in gf.__all__:
+        kind = getattr(gf, name)
+        for field in fields(kind).values() if isinstance(kind, type) else ():
+            names |= {field.stored}
+            if field.stored and not field.each:
+                assert field.dims == QUANTITIES[field.stored].dims
+    assert {"x", "states", "interval_gap", "critical_low", "expected"} < names
+    assert names <= QUANTITIES.keys() | {""}
+
+
+def test_a_unit_is_that_of_the_field_and_not_read_from_a_name():
+    S = gf.ensemble(packed(12, 0.3))
+    forces = np.array(S.original)
+    frame = table(to_dataset(forces, S).rename(states="length [km]"))
+    assert "f_n_length [km] [packing]" in frame
