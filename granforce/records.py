@@ -665,7 +665,10 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
 
 def _check_own_images(cell: Cell, diameter: float) -> None:
     if not cell.tilt and np.any(cell.box <= diameter):
-        raise InputError(f"box sides must be above the largest diameter, got {cell.box}")
+        raise InputError(
+            f"box sides must be above the largest diameter, {diameter:g}, got {cell.box}: do the "
+            "radii, positions and box have the same unit of length?"
+        )
     # A tilted cell may be lower than a diameter, because its images are displaced sideways; if it
     # is lower than a radius, every search would visit hundreds of images.
     if cell.tilt and cell.box[1] < diameter / 2:

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, Protocol, SupportsIndex
 
 import numpy as np
 
-from granforce.packing.importers.text import LARGEST, EmptyError, Source, read_text
+from granforce.packing.importers.text import LARGEST, EmptyError, Source, number, read_text
 from granforce.records import InputError, brief_list
 from granforce.types import Floats, Integers, Mask
 
@@ -411,7 +411,7 @@ def _readings(source: Source, wanted: Sequence[str], given: Mapping[str, str]) -
 def _number(text: str) -> float:
     """The number in the text if it is finite, otherwise NaN."""
     try:
-        value = float(text)
+        value = number(text)
     except ValueError:
         return np.nan
     return value if abs(value) <= LARGEST else np.nan

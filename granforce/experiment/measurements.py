@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from granforce.fields import record
-from granforce.packing.importers.text import LARGEST, Source, read_csv
+from granforce.packing.importers.text import LARGEST, Source, number, read_csv
 from granforce.records import InputError
 from granforce.types import Floats, Integers
 
@@ -66,7 +66,7 @@ def read_measurement(source: Source) -> Measurement:
 def _value(text: str, name: str, place: str) -> float:
     """One number, or NaN for an empty field."""
     try:
-        value = float(text or "nan")
+        value = number(text or "nan")
     except ValueError:
         value = math.inf
     if abs(value) > LARGEST:

@@ -21,6 +21,7 @@ from scipy import optimize
 from granforce.experiment.boundary import boundary
 from granforce.experiment.listing import Listing
 from granforce.packing.importers.geometry import components
+from granforce.packing.importers.text import number
 from granforce.records import Contacts, InputError, make_contacts, positive
 from granforce.types import Floats, Integers, Mask
 
@@ -102,7 +103,7 @@ def read_outline(text: str) -> str | WallOutline:
 
 def _outline(shape: str, numbers: str) -> WallOutline:
     try:
-        values = tuple(float(part) for part in numbers.split(","))
+        values = tuple(map(number, numbers.split(",")))
     except ValueError:
         values = ()
     if len(values) != _SHAPES[shape] or not np.all(np.isfinite(values)):
@@ -120,7 +121,7 @@ def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
     """(name, (f_x, f_y, σ)) of 'right: fx fy sigma', the force of grains on a wall."""
     name, _, numbers = str(text).partition(":")
     try:
-        values = tuple(float(part) for part in numbers.replace(",", " ").split())
+        values = tuple(map(number, numbers.replace(",", " ").split()))
     except ValueError:
         values = ()
     if len(values) != 3 or not np.all(np.isfinite(values)):

@@ -24,7 +24,7 @@ from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import NotJammedError, Packing, brief_list
-from granforce.tolerances import ADMISSIBLE, CARRYING, SEEN_CARRYING
+from granforce.tolerances import ADMISSIBLE, CARRYING, INTERVAL_GAP, SEEN_CARRYING
 from granforce.types import Floats, Integers, Mask
 
 
@@ -73,7 +73,8 @@ def _raise_contradiction(full: Ensemble) -> None:
     assert full.known is not None
     A, b, T = full.scaled_balance
     message = knowledge.contradiction(
-        A, b, T, full.known, full.slopes, full.index, full.force_scale, full.slack
+        *(A, b, T, full.known, full.slopes, full.index, full.force_scale, full.slack),
+        full.friction,
     )
     if message is not None:
         raise NotJammedError(message)
@@ -189,7 +190,8 @@ def _unbalanced_message(full: Ensemble) -> str:
             "the contacts cannot carry this stress (`granforce stress`, gf.stress_outline and "
             "gf.admissible_stress say which they can), or "
         )
-    named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
+    least = min(INTERVAL_GAP, 0.5 * load.max(initial=0.0))  # rounding of the program
+    named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > least)
     pulling = np.flatnonzero(full.original[:, 0] < -ADMISSIBLE * full.force_scale)
     if len(pulling):
         carries += (

@@ -303,12 +303,13 @@ def contradiction(
     index: Integers,
     scale: float,
     slack: Floats,
+    friction: Floats,
 ) -> str | None:
     """The message that names the conflicting conditions, with proof; None if no conflict was found.
 
     A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩; slack:
-    `Ensemble.slack`. The conditions named are those with a multiplier in the program that minimises
-    the total relaxation.
+    `Ensemble.slack`; friction (N_c,): `Ensemble.friction`. The conditions named are those with a
+    multiplier in the program that minimises the total relaxation.
     """
     whole, right, _ = extended(A, b, T, known, mu, known.value)
     (rows, n), sides = A.shape, len(known.contact)
@@ -326,14 +327,20 @@ def contradiction(
         if certificates.proves_empty(whole, right, multiplier, slack):
             given = y[n + sides :][:count]
             given[sides:] += y[n + sides + count :]
-            return _statements(known, mu, index, scale, multiplier[rows:], given)
+            return _statements(known, mu, index, scale, multiplier[rows:], given, friction)
         if y[n + sides :].sum() <= BALANCED:
             return None
     return None
 
 
 def _statements(
-    known: Polygons, mu: Floats, index: Integers, scale: float, multiplier: Floats, given: Floats
+    known: Polygons,
+    mu: Floats,
+    index: Integers,
+    scale: float,
+    multiplier: Floats,
+    given: Floats,
+    friction: Floats,
 ) -> str:
     """The conditions with a multiplier, largest first, and the necessary relaxation."""
     contact, component = pins(known, mu)
@@ -344,15 +351,14 @@ def _statements(
     relation += ["="] * (len(contact) - len(relation))
     size = np.abs(multiplier) / np.abs(multiplier).max()
     given = given * units(mu)[contact, component] * scale
+    named = [k for k in np.argsort(-size, kind="stable") if size[k] > _WEIGHTY]
     texts = []
-    for k in np.argsort(-size, kind="stable"):
-        if size[k] > _WEIGHTY:
-            c = index[contact[k]]
-            text = f"{_NAMES[component[k]]} {relation[k]} {value[k]:.6g} on contact {c}"
-            if given[k] > BALANCED * scale:
-                text += f" (must be relaxed by {given[k]:.3g})"
-            texts.append(text)
-    smooth = any(text.startswith(f"{_NAMES[1]} = 0 ") for text in texts)
+    for k in named:
+        text = f"{_NAMES[component[k]]} {relation[k]} {value[k]:.6g} on contact {index[contact[k]]}"
+        if given[k] > BALANCED * scale:
+            text += f" (must be relaxed by {given[k]:.3g})"
+        texts.append(text)
+    smooth = any(component[k] == 1 and friction[contact[k]] == 0 for k in named)
     frictionless = ", and f_t = 0 where μ is 0" if smooth else ""
     return (
         f"no network satisfies all known forces{frictionless}; these conflict: {'; '.join(texts)}"

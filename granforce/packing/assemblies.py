@@ -8,6 +8,7 @@ them. Each other body carries its weight downwards.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
@@ -132,7 +133,7 @@ def blocks(
         return with_network(packing)
     except NotJammedError as error:
         legend = _legend(names) if "grains" in str(error) else ""
-        raise NotJammedError(f"{error}{_missed(packing)}{legend}") from None
+        raise NotJammedError(f"{error}{_missed(packing, names)}{legend}") from None
 
 
 def with_network(packing: Packing) -> Packing:
@@ -164,15 +165,19 @@ def _frictions(
     if materials is None and not pairs:
         return mu
     named = [] if materials is None else list(materials)
-    given = {frozenset(pair): value for pair, value in pairs.items()}
+    given: dict[frozenset[Any], Any] = {}
+    for pair, value in pairs.items():
+        if given.setdefault(frozenset(pair), value) != value:
+            both = " and ".join(map(brief, pair))
+            raise InputError(f"friction is given twice for {both}, with two values: give it once")
     for material in sorted(frozenset().union(*given) - set(named), key=str)[:1]:
         raise InputError(f"friction is given for {brief(material)}, but no body has this material")
     ends = zip(contacts.i.tolist(), contacts.j.tolist(), strict=True)
     return [given.get(frozenset((named[i], named[j])), mu) for i, j in ends]
 
 
-def _missed(packing: Packing) -> str:
-    """Words on pairs that may be contacts: their number, smallest gap, and the tolerance."""
+def _missed(packing: Packing, names: Sequence[str]) -> str:
+    """Words on bodies that touch nothing, and on pairs that may be contacts."""
     shapes, tolerance = packing.shapes, packing.info["tolerance"]
     assert shapes is not None
     outlines = [
@@ -182,18 +187,42 @@ def _missed(packing: Packing) -> str:
     held = left_open_in(packing)
     near = _MISSED * packing.r.max()
     doubts = _contacts(outlines, packing.x, packing.r, held, tolerance, near=near)[3]
-    if not doubts["nearly_touching"]:
-        return ""
-    gaps = [gap for _, _, gap in doubts["nearly_touching"]]
-    return "; " + nearly_touching(gaps, tolerance)
+    words = ""
+    if gaps := [gap for _, _, gap in doubts["nearly_touching"]]:
+        words += "; " + nearly_touching(gaps, tolerance)
+    if pairs := [f"{names[i]} and {names[j]}" for i, j in doubts["corner_on_corner"]]:
+        words += (
+            f"; bodies {brief_list(pairs)} meet corner on corner, where no normal is determined, "
+            "which is no contact: move one so that a corner meets an edge"
+        )
+    doubted = [body for some in doubts.values() for pair in some for body in pair[:2]]
+    touching = [*packing.contacts.i, *packing.contacts.j, *doubted]
+    for k in np.setdiff1d(np.flatnonzero(~held), touching)[:1]:
+        gaps = [
+            np.inf if j == k else _meeting(outlines[k], outlines[j], tolerance).gap
+            for j in range(len(outlines))
+        ]
+        if len(gaps) > 1:
+            nearest = int(np.argmin(gaps))
+            words += (
+                f"; body {names[k]} touches no other: the nearest, body {names[nearest]}, is "
+                f"{gaps[nearest]:.3g} away; move it until they touch"
+            )
+    return words
 
 
 def nearly_touching(gaps: Sequence[float], tolerance: float) -> str:
     """Words on pairs of bodies with these gaps, which are no contacts."""
     pairs = counted(len(gaps), "pair of bodies nearly touches", "pairs of bodies nearly touch")
     return larger_tolerance(
-        f"{pairs}, with gaps from {min(gaps):.2g}, and no contact at the tolerance {tolerance:.2g}"
+        f"{pairs}, with gaps from {_up(min(gaps))}, and no contact at the tolerance {tolerance:.2g}"
     )
+
+
+def _up(gap: float) -> str:
+    """A gap in two digits, rounded up, so that it can be given as a tolerance."""
+    digits = Decimal(gap)
+    return f"{digits.quantize(Decimal(1).scaleb(digits.adjusted() - 1), ROUND_CEILING):.2g}"
 
 
 def larger_tolerance(pairs: str) -> str:
@@ -273,7 +302,12 @@ def _contacts(
         elif met.gap < 0:
             raise InputError(
                 f"bodies {names[i]} and {names[j]} overlap by {-met.gap:.3g}, more than the "
-                f"tolerance {tolerance:.3g}; move one, or raise --tolerance (tolerance=)"
+                f"tolerance {tolerance:.3g}; "
+                + (
+                    f"move one, or give --tolerance {_up(-met.gap)} (tolerance=)"
+                    if -met.gap <= _MISSED * r.max()
+                    else "move one, or correct its corners"
+                )
             )
         elif met.gap <= near:
             doubts["nearly_touching"].append([i, j, met.gap])

@@ -63,7 +63,11 @@ def polygon(corners: npt.ArrayLike, name: str) -> Floats:
                 f"the corners of {name} are in the wrong order, so that its sides cross; list "
                 "them one after the other around the body"
             )
-        raise InputError(f"{name} is not convex; divide it into convex parts")
+        raise InputError(
+            f"{name} is not convex: bodies of several parts cannot be read, and convex parts given "
+            "as bodies are separate bodies, which can move apart; in Python, make_contacts_at "
+            "takes the points where a body of any shape is touched"
+        )
     return corners if turned > 0 else corners[::-1].copy()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,7 +136,9 @@ def _fixed(table: Table) -> Integers:
 
 def _from_json(name: str, text: str) -> _Bodies:
     try:
-        given = json.loads(text)
+        given = json.loads(text, object_pairs_hook=partial(_object, name))
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"{name}: not JSON ({brief(str(error))}); repair it") from None
     bodies = given.get("bodies") if isinstance(given, dict) else None
@@ -153,12 +156,26 @@ def _from_json(name: str, text: str) -> _Bodies:
     materials = [body.get("material") for body in bodies]
     if not all(isinstance(material, str | None) for material in materials):
         raise InputError(f"{name}: a material is a text")
-    friction = {}
-    for row in _rows_of(given.get("friction", []), name):
-        friction[row[0], row[1]] = row[2]
+    friction: dict[Any, float] = {}
+    for *pair, mu in _rows_of(given.get("friction", []), name):
+        if friction.setdefault(frozenset(pair), mu) != mu:
+            raise InputError(
+                f"{name}: two friction coefficients of {brief(pair[0])} and {brief(pair[1])}: "
+                f"{friction[frozenset(pair)]:g} and {mu:g}; give each pair once"
+            )
     names = [str(k) for k in range(len(bodies))]
     density = [body.get("density") for body in bodies]
     return _Bodies(shapes, density, held, names, materials, friction)
+
+
+def _object(name: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; InputError for a key that it has twice."""
+    given = dict(pairs)
+    keys = [key for key, _ in pairs]
+    for key in given:
+        if keys.count(key) > 1:
+            raise InputError(f"{name}: the key {brief(key)} is given twice in one object")
+    return given
 
 
 def _rows_of(given: Any, name: str) -> list[list[Any]]:

@@ -181,9 +181,16 @@ def check_contacts(
     i, j, gap = contacts.i, contacts.j, contacts.gap
     for c in np.flatnonzero(np.abs(gap) > allowed * np.minimum(r[i], r[j]))[:1]:
         state = "overlap" if gap[c] < 0 else "are apart"
+        usual = np.median(contacts.length / (r[i] + r[j]))
+        unit = "check numbers, positions, radii and box"
+        if abs(usual - 1) > allowed:
+            unit += (
+                f" (distances are usually {usual:.3g} times the sum of the radii: do positions and "
+                "radii have the same unit of length?)"
+            )
         raise InputError(
             f"{place(c)}: {_pair(i, j, c)} {state} by {abs(gap[c]):.3g}, more than "
-            f"{allowed:.0%} of a radius; check numbers, positions, radii and box"
+            f"{allowed:.0%} of a radius; {unit}"
         )
     if twice := repeated(contacts):
         before, c = twice
@@ -222,7 +229,8 @@ def check_disks(
     for c in np.flatnonzero(-gap > allowed * np.minimum(r[i], r[j]))[:1]:
         raise InputError(
             f"{place(j[c])}: {_pair(i, j, c)} overlap by {-gap[c]:.3g}, more than "
-            f"{allowed:.0%} of a radius; check positions, radii and box"
+            f"{allowed:.0%} of a radius; check positions, radii and box, and that their unit of "
+            "length is the same"
         )
 
 

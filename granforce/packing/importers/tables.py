@@ -18,6 +18,7 @@ from granforce.packing.importers.text import (
     Table,
     check_grains,
     make_table,
+    of_frame,
     read_csv,
     renamed,
 )
@@ -41,8 +42,8 @@ _SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
 
 @packing_noted
 def read_table(
-    grains: Source,
-    contacts: Source | None = None,
+    grains: Source | Any,
+    contacts: Source | Any | None = None,
     *,
     mu: Any,
     box: npt.ArrayLike | None = None,
@@ -56,7 +57,9 @@ def read_table(
     tolerance: float | None = None,
     most_grains: int | None = None,
 ) -> Packing:
-    """A Packing from a CSV of grains and, optionally, a CSV of contacts (paths or open files).
+    """A Packing from a table of grains and, optionally, a table of contacts.
+
+    Each is a CSV file (a path or an open file) or a pandas DataFrame.
 
     grains: columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and open,
     1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
@@ -83,9 +86,11 @@ def read_table(
         raise InputError("tolerance has no effect with a table of contacts: leave it out")
     prescribed = pressure is not None
     pressure = positive(1.0 if pressure is None else pressure, "pressure")
-    if hasattr(grains, "columns"):
-        raise InputError("read_table reads files; pass centres and radii of a table to from_disks")
-    files = [read_csv(grains), *([] if contacts is None else [read_csv(contacts)])]
+    given = {"grains": grains} | ({} if contacts is None else {"contacts": contacts})
+    files = [
+        of_frame(source, name) if hasattr(source, "columns") else read_csv(source)
+        for name, source in given.items()
+    ]
     table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *files)
     pairs = [_with_full_names(one) for one in pairs]
     _check_columns(table, "x", "y", "r")
@@ -152,7 +157,7 @@ def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
 def _with_full_names(table: Table) -> Table:
     """The table with forces called f_n and f_t, without their unit."""
     header = [_SHORT.get(name, name) for name in table.header]
-    named = make_table(table.name, header, table.rows, table.lines)
+    named = make_table(table.name, header, table.rows, table.lines, table.word)
     return named.in_packing_unit(_SHORT.values())
 
 
@@ -187,10 +192,7 @@ def _joined(
     table: Table, grains: Table, x: Floats, r: Floats, cell: Cell, forces: bool | None, mu: float
 ) -> tuple[Contacts, Floats | None]:
     """Contacts of a table and their forces (N_c, 2), or None without forces."""
-    count = len(grains.rows)
-    index = grains.index("id") if "id" in grains.header else {row: row for row in range(count)}
-    i, j = table.lookup("i", index), table.lookup("j", index)
-    joined = listed(x, r, cell, i, j, table.place, _given_branches(table))
+    joined = _listed(table, grains, x, r, cell)
     if forces is None:
         forces = "f_n" in table.header or "f_t" in table.header
     if not forces:
@@ -199,6 +201,29 @@ def _joined(
     without_friction = mu == 0 and "f_t" not in table.header
     tangential = np.zeros(len(normal)) if without_friction else table.numbers("f_t")
     return joined, np.column_stack([normal, tangential])
+
+
+def _listed(table: Table, grains: Table, x: Floats, r: Floats, cell: Cell) -> Contacts:
+    """The contacts of a table; the InputError for those that count grains from 1 says so."""
+
+    def counted(index: Mapping[Any, int]) -> Contacts:
+        i, j = table.lookup("i", index), table.lookup("j", index)
+        return listed(x, r, cell, i, j, table.place, _given_branches(table))
+
+    if "id" in grains.header:
+        return counted(grains.index("id"))
+    rows = range(len(grains.rows))
+    try:
+        return counted({row: row for row in rows})
+    except InputError as error:
+        try:
+            counted({row + 1: row for row in rows})
+        except InputError:
+            raise error from None
+        raise InputError(
+            f"{error}; i and j seem to count the rows of {grains.name} from 1: without ids they "
+            f"count from 0, so give it a column id with 1 … {len(rows)}"
+        ) from None
 
 
 def _given_branches(table: Table) -> Floats | None:

@@ -41,6 +41,13 @@ Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 PACKING = " [packing]"
 
 
+def number(text: str) -> float:
+    """The number that a text is, as `float`; but ValueError for 1_5, which is not 15."""
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
 class EmptyError(InputError):
     """A file contains nothing."""
 
@@ -52,10 +59,11 @@ class Table(NamedTuple):
     header: tuple[str, ...]  # column names
     rows: list[list[str]]  # as many fields as columns
     lines: list[int]  # line number of each row in the file
+    word: str = "line"  # what these numbers count
 
     def place(self, row: int) -> str:
         """'file, line n' of a row."""
-        return f"{self.name}, line {self.lines[row]}"
+        return f"{self.name}, {self.word} {self.lines[row]}"
 
     def some(self, rows: Iterable[int]) -> Table:
         """The table with some of its rows, in this order."""
@@ -77,7 +85,7 @@ class Table(NamedTuple):
                     "table with --unit packing, or multiply it and leave out the brackets"
                 )
         header = [name.removesuffix(PACKING) for name in self.header]
-        return make_table(self.name, header, self.rows, self.lines)
+        return make_table(self.name, header, self.rows, self.lines, self.word)
 
     def require(self, *columns: str) -> None:
         """InputError unless all these columns are present."""
@@ -99,7 +107,7 @@ class Table(NamedTuple):
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
             try:
-                values[row] = float(text)
+                values[row] = number(text)
             except ValueError:
                 values[row] = math.nan
             if not abs(values[row]) <= LARGEST:
@@ -126,7 +134,7 @@ class Table(NamedTuple):
             first = rows.setdefault(_label(text), row)
             if first != row:
                 raise InputError(
-                    f"{self.place(row)}: {column} {_quoted(text)} already appears in line "
+                    f"{self.place(row)}: {column} {_quoted(text)} already appears in {self.word} "
                     f"{self.lines[first]}; give each grain once"
                 )
         return rows
@@ -149,7 +157,9 @@ class Table(NamedTuple):
         return positions
 
 
-def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: list[int]) -> Table:
+def make_table(
+    name: str, header: Sequence[str], rows: list[list[str]], lines: list[int], word: str = "line"
+) -> Table:
     """A Table, checked to have as many fields in every row as column names.
 
     Raises InputError naming a row of another length, or a repeated column name.
@@ -159,7 +169,7 @@ def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: l
             raise InputError(
                 f"{name}: column {some_of([column])} appears twice; rename or remove one"
             )
-    table = Table(name, tuple(header), rows, lines)
+    table = Table(name, tuple(header), rows, lines, word)
     for row, fields in enumerate(rows):
         if len(fields) != len(header):
             raise InputError(
@@ -281,6 +291,24 @@ def read_csv(source: Source) -> Table:
     return make_table(name, [column.lower() for column in header], rows, numbers[1:])
 
 
+def of_frame(frame: Any, name: str) -> Table:
+    """The Table of a pandas DataFrame, whose rows count from 0; named columns of its index count.
+
+    Missing values are empty fields. Raises InputError for a table without rows.
+    """
+    if any(level is not None for level in frame.index.names):
+        frame = frame.reset_index()
+    if not len(frame):
+        raise InputError(f"the DataFrame of {name} is empty")
+    columns = [
+        ["" if value != value else str(value) for value in frame.iloc[:, k].tolist()]
+        for k in range(frame.shape[1])
+    ]
+    rows = [list(row) for row in zip(*columns, strict=True)]
+    header = [str(column).strip().lower() for column in frame.columns]
+    return make_table(f"the DataFrame of {name}", header, rows, list(range(len(rows))), "row")
+
+
 def _from_the_header(lines: list[str]) -> list[str]:
     """The lines, with comments (# or %) above the header left blank.
 
@@ -299,7 +327,7 @@ def _from_the_header(lines: list[str]) -> list[str]:
 
 def is_number(text: str) -> bool:
     try:
-        float(text)
+        number(text)
     except ValueError:
         return False
     return True
@@ -354,13 +382,13 @@ def _zstd(name: str) -> Any:
 def _label(text: str) -> int | str:
     """An integer if the grain's name is one ('7', '7.0', '+7'), otherwise its text."""
     try:
-        number = float(text)
+        value = number(text)
     except ValueError:
         return text
-    if not number.is_integer():
+    if not value.is_integer():
         return text
     # Beyond 2⁵³ floats do not distinguish consecutive integers.
-    return int(number) if abs(number) < 2**53 else text
+    return int(value) if abs(value) < 2**53 else text
 
 
 def _quoted(text: str) -> str:
