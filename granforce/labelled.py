@@ -121,18 +121,26 @@ def labelled_dataset(
     return xr.Dataset(variables, labels).set_coords(texts)
 
 
+CONTACT_LABELS = ("i", "j", "x", "y", "n_x", "n_y", "wall")  # coordinates of `contact_labels`
+
+
 def contact_labels(packing: Packing, contacts: Integers | None = None) -> dict[str, Any]:
     """Coordinates of contacts (k,), by default all of the packing: grains, and point of contact."""
     if contacts is None:
         contacts = np.arange(len(packing.contacts.i))
     every, at = packing.contacts, packing.contact_points[contacts]
     point = {"units": LENGTH, "long_name": "point of contact"}
+    normal = {"units": "1", "long_name": "unit normal from i to j"}
+    wall = packing.are_walls[np.stack([every.i, every.j])].any(axis=0)[contacts]
     return {
         "contact": contacts,
         "i": ("contact", every.i[contacts], {"long_name": "first grain"}),
         "j": ("contact", every.j[contacts], {"long_name": "second grain"}),
         "x": ("contact", at[:, 0], point),
         "y": ("contact", at[:, 1], point),
+        "n_x": ("contact", every.normal[contacts, 0], normal),
+        "n_y": ("contact", every.normal[contacts, 1], normal),
+        "wall": ("contact", wall.astype(np.int64), {"long_name": "1 where j is a wall, else 0"}),
     }
 
 
@@ -167,7 +175,7 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
     order = [name for name in _RUNNING if any(name in values.dims for values in columns.values())]
     frame = xr.Dataset(columns).to_dataframe([*order, rows]).reset_index()
     named = {name: column_name(None, name, _word(dataset[name])) for name in (*order, rows)}
-    labels = ("i", "j", "x", "y") if rows == "contact" else ()
+    labels = CONTACT_LABELS if rows == "contact" else ()
     first = [*named.values(), *labels]
     frame = frame.rename(columns=named)
     return frame[[*first, *(name for name in columns if name not in first)]]

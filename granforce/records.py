@@ -187,6 +187,17 @@ class Packing(NamedTuple):
         return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan
 
     @property
+    def are_walls(self) -> Mask:
+        """Which grains (N,) are walls, or fixed bodies among bodies of other shapes."""
+        count, walls = len(self.r), self.info.get("walls")
+        if isinstance(walls, int):
+            walls = np.arange(count) >= count - walls
+        else:
+            walls = np.arange(count) >= self.info.get("disks", count)
+        fixed = np.isnan(self.load).all(axis=1)
+        return walls | fixed if self.shapes is not None else walls
+
+    @property
     def walls(self) -> Floats:
         """Ends of the walls (k, 4), length; none if only their contacts with grains are known."""
         ends = self.info.get("walls")  # some importers count walls

@@ -255,7 +255,16 @@ COMMANDS = {  # with lines that appear in this form only, and are explained all 
         *("timestep", "time", "contacts_skipped"),
     },
 }
-LABELS = {"contact", "i", "j", "x", "y"}  # columns, and what a report on no packing has
+LABELS = {
+    "contact",
+    "i",
+    "j",
+    "x",
+    "y",
+    "n_x",
+    "n_y",
+    "wall",
+}  # columns, and what a report on no packing has
 
 
 def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsys):

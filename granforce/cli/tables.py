@@ -10,6 +10,7 @@ import xarray as xr
 
 from granforce.cli.results import get_packing
 from granforce.labelled import (
+    CONTACT_LABELS,
     Declared,
     column_name,
     in_mean_forces,
@@ -80,7 +81,7 @@ def write_states(arguments: argparse.Namespace, parameters: Parameters, stored: 
     states = stored["states"].values.astype(np.float64)
     dataset = of_contacts(arguments, parameters, stored, {"states": (quantity("states"), states)})
     if path.endswith(".npz"):
-        names = {name: dataset[name].values for name in ("contact", "i", "j", "x", "y")}
+        names = {name: dataset[name].values for name in ("contact", *CONTACT_LABELS)}
         name = column_name(None, "states", arguments.unit)
         _write_arrays(path, {name: dataset["states"].values, **names})
     else:

@@ -227,7 +227,11 @@ def add_infer(commands: Commands) -> None:
     add_flaws_and_walls(command, series)
     add_scheduler(command)
     many = command.options.keys() - single - {"frames", "files"}
-    command.leaves_out("without --frames", lambda arguments: arguments.frames is None, many)
+    command.leaves_out(
+        "without --frames (--frames all reads the two files of photoelastic frames)",
+        lambda arguments: arguments.frames is None,
+        many,
+    )
     command.leaves_out(
         "with --frames", lambda arguments: arguments.frames is not None, single - shared
     )

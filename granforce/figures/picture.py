@@ -11,7 +11,6 @@ import numpy.typing as npt
 from granforce.explore.intervals import intervals
 from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
-from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
 from granforce.records import (
     InputError,
@@ -101,7 +100,7 @@ def plot(
     low, high = _window(packing)
     limits: dict[str, Any] = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     sides = style.equal_scales(high - low, backend)
-    count = int((~left_open_in(packing)).sum())
+    count = int((~packing.are_walls).sum())
     kind = ("disk", "disks") if packing.shapes is None else ("body", "bodies")
     title = f"{counted(count, *kind)}, μ = {packing.mu:g}{scale}"
     return style.frame(elements, backend, title=title, x="x", y="y", **limits, **sides)
@@ -234,18 +233,18 @@ def _ends(packing: Packing, numbers: npt.NDArray[Any], forces: Floats) -> tuple[
         return begin, begin + branch
     c = packing.contacts.picked(numbers)
     begin = packing.cell.wrapped(packing.x[c.i])
-    reach = np.where(left_open_in(packing)[c.j], c.arm_i, c.length)
+    reach = np.where(packing.are_walls[c.j], c.arm_i, c.length)
     return begin, begin + reach[:, None] * c.normal
 
 
 def _bodies(packing: Packing, backend: str) -> list[Any]:
     """Disks, or bodies of other shapes; of those the fixed ones too, darker."""
-    disks = np.flatnonzero(~left_open_in(packing))
+    disks = np.flatnonzero(~packing.are_walls)
     if len(disks) > MOST_DISKS:
         return []
     if packing.shapes is not None:
         drawn = bodies(packing)
-        fixed = np.flatnonzero(left_open_in(packing))
+        fixed = np.flatnonzero(packing.are_walls)
         return [
             _polygons([drawn[k] for k in which], backend, colour)
             for which, colour in ((fixed, EDGE), (disks, FILL))
@@ -270,7 +269,7 @@ def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[An
     """Walls as given, else short lines along external supports at the points of contact."""
     if len(packing.walls):
         return [hv.Segments(packing.walls, label="wall").opts(backend=backend, color="#000000")]
-    c, held = packing.contacts.picked(numbers), left_open_in(packing)
+    c, held = packing.contacts.picked(numbers), packing.are_walls
     touched = np.flatnonzero(held[c.j])
     if packing.shapes is not None or not len(touched):
         return []
@@ -282,7 +281,7 @@ def _walls(packing: Packing, numbers: npt.NDArray[Any], backend: str) -> list[An
 
 def _window(packing: Packing) -> tuple[Floats, Floats]:
     """Lower left and upper right corners of the picture: the cell, or the disks if it is open."""
-    disks = ~left_open_in(packing)
+    disks = ~packing.are_walls
     x, r = packing.x[disks], packing.r[disks, None]
     margin = 0.1 * packing.r[disks].mean()
     corner, opposite = packing.cell.extent

@@ -222,7 +222,8 @@ def nearly_touching(gaps: Sequence[float], tolerance: float) -> str:
 def _up(gap: float) -> str:
     """A gap in two digits, rounded up, so that it can be given as a tolerance."""
     digits = Decimal(gap)
-    return f"{digits.quantize(Decimal(1).scaleb(digits.adjusted() - 1), ROUND_CEILING):.2g}"
+    up = digits.quantize(Decimal(1).scaleb(digits.adjusted() - 1), ROUND_CEILING)
+    return f"{float(up):.2g}"
 
 
 def larger_tolerance(pairs: str) -> str:

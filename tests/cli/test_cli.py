@@ -138,7 +138,8 @@ def test_walk_and_measure_agree(run, tmp_path):
     assert walked["eta2"] == measured["eta2"] > 0
     lines = file.read_text().splitlines()
     assert (
-        lines[0] == "contact,i,j,x,y,f_n [packing],f_n_seen_low [packing],f_n_seen_high [packing]"
+        lines[0] == "contact,i,j,x,y,n_x,n_y,wall,"
+        "f_n [packing],f_n_seen_low [packing],f_n_seen_high [packing]"
     )
     assert len(lines) > 20
 
@@ -274,7 +275,7 @@ def test_limit_loads_of_chosen_contacts(run, tmp_path):
     report = json.loads(run(*words)[1])
     assert report["least_limit_load [packing]"] >= 0
     assert report["largest_duality_gap"] <= 1e-8
-    assert bounds.read_text().startswith("contact,i,j,x,y,limit_load [packing]\n")
+    assert bounds.read_text().startswith("contact,i,j,x,y,n_x,n_y,wall,limit_load [packing]\n")
 
 
 def test_rest_tells_whether_the_forces_themselves_balance(run):

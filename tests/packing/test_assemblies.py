@@ -443,7 +443,11 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
         (ROWS.replace("7,1,1,0", "7,0.5,0.2,0"), {}, "body 7 is not convex"),
         (ROWS.replace(*CROSSED), {}, "corners of body 7 are in the wrong order"),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,0.9"), {}, "bodies 7 and ball overlap by 0.4"),
-        (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.31"), {}, r"gaps from 0\.01, .* 3e-09: a larger"),
+        (
+            ROWS.replace("ball,0.5,1.3", "ball,0.5,1.31"),
+            {},
+            r"gaps from 0\.011, .* 3e-09: a larger",
+        ),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.9"), {}, "the bodies are 0 ground, 1 7, 2 ball"),
         (ROWS.replace(",2,0", ",-2,0"), {}, "the density of body 7"),
         (GIVEN.replace("corners", "corner"), {}, 'either "corners" or "disk"'),

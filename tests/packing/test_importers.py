@@ -6,7 +6,6 @@ import tracemalloc
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -978,12 +977,9 @@ def test_more_grains_than_are_taken_are_refused_before_contacts_are_looked_at(ki
         broken(kind, grains - 1)
 
 
-def test_disks_without_radius_and_tables_in_memory_are_named():
+def test_disks_without_radius_are_named():
     with pytest.raises(InputError, match="2 centres, 1 radii"):
         gf.from_disks([[0, 0], [2, 0]], [1], 0.3, walls="floor", gravity=1)
-    disks = pd.DataFrame({"x": [0.0, 2.0], "y": [0.0, 0.0], "r": [1.0, 1.0]})
-    with pytest.raises(InputError, match="to from_disks"):
-        gf.read_table(disks, mu=0.3)
 
 
 def test_options_of_a_table_are_judged_before_it_is_read(tmp_path):
