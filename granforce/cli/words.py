@@ -161,7 +161,7 @@ def add_infer(commands: Commands) -> None:
         help="a packing (FILE.npz); with --frames: a folder, *_solved.mat files, or a file of "
         "positions and one of contacts",
     )
-    add_made_packing(command, lambda given: given.frames is None and bool(given.files))
+    add_made_packing(command, lambda given: given.frames is None and len(given.files) == 1)
     group = command.add_argument_group("the inference")
     group.add_argument(
         "--measured",
