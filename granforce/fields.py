@@ -15,7 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def record(kind: C) -> C:
     """A decorator of records (named tuples and dataclasses): a short repr, and help on all fields.
 
-    Named tuples are equal if all their fields are, arrays by their elements.
+    Named tuples are equal if all their fields are, arrays by their elements; also to plain tuples.
 
     Fields are Annotated with a Field or, if neither labelled nor stored, with a text alone.
     """
@@ -70,7 +70,8 @@ def _names(kind: Any) -> Iterable[str]:
 
 
 def _same(record: Any, other: Any) -> bool:
-    return type(record) is type(other) and all(map(_equal, record, other))
+    alike = type(other) in (type(record), tuple) and len(record) == len(other)
+    return alike and all(map(_equal, record, other))
 
 
 def _differ(record: Any, other: Any) -> bool:

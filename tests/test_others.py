@@ -28,7 +28,8 @@ KERNELS = {
     ("system/part_compiler.py", "_engine"),
     ("system/part_compiler.py", "_add_module"),
 }
-_OURS = {"_asdict", "_fields", "_make", "_replace", "_exit"}  # documented, in spite of their names
+# documented, in spite of their names
+_OURS = {"_asdict", "_fields", "_make", "_replace", "_exit", "_repr_mimebundle_"}
 _TYPES = {
     "_ActionsContainer",
     "_ArgumentGroup",
