@@ -118,4 +118,5 @@ from granforce.study.store import open_store as open_store
 
 __version__: str
 __all__: list[str]
+_BY_QUESTION: dict[str, dict[str, str]]
 _HOME: dict[str, str]

@@ -91,8 +91,10 @@ def test_the_site_builds_without_a_warning(tmp_path):
     ]
     assert done.stdout.split() == [str(site / "index.html")]
     library = (site / "reference" / "library.html").read_text()
-    for name, home in PUBLIC.items():
-        assert f'id="granforce.{home}.{name}"' in library, name
+    at = [library.index(f'id="granforce.{home}.{name}"') for name, home in PUBLIC.items()]
+    assert at == sorted(at)
+    questions = re.findall(r'<h2 id="[\w-]+">(.*?)<', library)
+    assert questions == list(granforce._BY_QUESTION)
     for name in ("measures.eta3", "figures.save"):
         assert f'id="granforce.{name}"' in library
     assert "granforce intervals" in (site / "reference" / "cli.html").read_text()

@@ -38,18 +38,7 @@ mtd[columnalign="left"] { text-align: left }
 mtd[columnalign="right"] { text-align: right }
 """
 
-# Sections of the library reference, by the module that a name comes from.
-SECTIONS = {
-    "records": "Records and errors",
-    "cell": "Records and errors",
-    "packing": "Packings",
-    "experiment": "Experiments",
-    "forces": "Force networks",
-    "motion": "Contact dynamics",
-    "explore": "Exploring S",
-    "perturb": "Local perturbation",
-    "study": "Stored results",
-}
+FIRST = ("pack", "ensemble", "intervals", "walk", "sample_uniform", "plot")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -109,23 +98,26 @@ def pictured(match: re.Match[str]) -> str:
 
 
 def library() -> str:
-    """Every public name by section, with its example."""
+    """Every public name by the question it answers, with its example."""
     shown = examples()
-    sections: dict[str, list[str]] = {}
-    for name, home in granforce._HOME.items():
-        if home:
-            section = SECTIONS.get(home.partition(".")[0], "Other")
-            sections.setdefault(section, []).append(entry(f"{home}.{name}", name, shown))
-        else:  # a module
-            names = importlib.import_module(f"granforce.{name}").__all__
-            sections[f"gf.{name}"] = [
-                entry(f"{name}.{one}", f"{name}.{one}", shown) for one in names
-            ]
-    text = "# Library\n\nAll public names, as `import granforce as gf` gives them.\n"
-    for section, entries in sections.items():
-        text += f"\n## {section}\n\n" + "\n".join(entries)
+    first = ", ".join(f"[`{name}`][granforce.{granforce._HOME[name]}.{name}]" for name in FIRST)
+    text = (
+        "# Library\n\nAll public names, as `import granforce as gf` gives them.\n\n"
+        f"Start with {first} and [`measures`](#measures-of-states).\n"
+    )
+    for question, names in granforce._BY_QUESTION.items():
+        entries = (entry(*one, shown) for name in names for one in entry_names(name))
+        text += f"\n## {question}\n\n" + "\n".join(entries)
     rest = "".join(f"\n### {name}\n{example}" for name, example in shown.items())
     return text + (f"\n## More examples\n{rest}" if rest else "")
+
+
+def entry_names(name: str) -> list[tuple[str, str]]:
+    """Path and name of each entry of a public name: one, or those of a module."""
+    if home := granforce._HOME[name]:
+        return [(f"{home}.{name}", name)]
+    names = importlib.import_module(f"granforce.{name}").__all__
+    return [(f"{name}.{one}", f"{name}.{one}") for one in names]
 
 
 def entry(path: str, name: str, shown: dict[str, str]) -> str:
