@@ -53,14 +53,14 @@ FROM_BROWSER = {
         {"built": str, "mu": float},  # by hand
         # "file", "fall", "limit" or "measured", for a scene with loads (3 N) on its disks
         {
-            **{"find": str, "scene": str, "built": str, "mu": float},
+            **{"find": str, "S": int, "scene": str, "built": str, "mu": float},
             **{"load": [float, ...], "plane": [int, int]},
         },
     ),
     "StatusLine": ({"stop": True}, {"cancel": True}, {"read": True}),  # a failure was read
 }
 
-MEASURED = {"scene": str, "mu": float, "plane": [int, int]}  # of a small scene
+MEASURED = {"plane": [int, int], "S": int}  # S: the number in the request
 NETWORK = {"normal": Array, "tangential": Array, "residual": float}
 NETWORKS = NETWORK | {"residual": Array}  # several, one after the other
 # The networks through which f_n of a contact can be pulled, and what stops it at both ends.
@@ -99,10 +99,10 @@ TO_BROWSER = {
     ),
     "Workbench": (
         {"error": str},
-        {"fall": [float, ...]},  # motion (3 N) of the disks; empty if nothing falls
+        {"fall": [float, ...], "S": int},  # motion (3 N) of the disks; empty if nothing falls
         {"file": str},  # base64
-        {"limit": float, "load": list},  # times the push that the disks can bear
-        {"limit": None, "load": list},  # however hard it is
+        {"limit": float, "S": int},  # times the push that the disks can bear
+        {"limit": None, "S": int},  # however hard it is
         {"measured": {"most": float, "outline": list}, **MEASURED},
         {"measured": {"bounds": list, "outline": list}, **MEASURED},
     ),

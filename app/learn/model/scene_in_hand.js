@@ -4,6 +4,7 @@ import { Body } from "./polytope.js"
 import { middleOf } from "./middle.js"
 
 const PULLS = 100 // undo steps
+let cuts = 0 // of all scenes since the page was opened
 
 export class SceneInHand {
   /** scene: as from small_scenes.drawn; changed(): called when text and picture have to be updated. */
@@ -17,8 +18,11 @@ export class SceneInHand {
     if (!body.whole) body.u = middleOf(body)
   }
 
-  /** Drop the server's results for one friction and load: a falling motion, bounds, and a sufficient friction. */
-  forget() { Object.assign(this, { fall: null, bounds: null, enough: null }) }
+  /**
+   * Drop the server's results for one friction and load: a falling motion, bounds, and a sufficient friction. Requests
+   * carry the number `S`, and answers with another one are dropped.
+   */
+  forget() { Object.assign(this, { fall: null, bounds: null, enough: null, S: ++cuts }) }
 
   /** Highlighted contacts: the selected ones, and those read from the point. */
   get lit() { return new Set([...this.contacts, ...this.read]) }

@@ -216,8 +216,8 @@ class Workbench {
 
   /** Request a file, the falling motion, or exact results, for the present scene. */
   find(what) {
-    const { model, view, hand: { scene: { name: scene, built }, mu, body } } = this
-    ask(model, view, { find: what, scene, built, mu, load: [...body.load], plane: this.space.shadow })
+    const { model, view, hand: { scene: { name: scene, built }, mu, body, S } } = this
+    ask(model, view, { find: what, S, scene, built, mu, load: [...body.load], plane: this.space.shadow })
   }
 
   /** Above three dimensions, results that need linear programs. */
@@ -229,13 +229,14 @@ class Workbench {
   arrived(news) {
     const { hand, space, push } = this
     if (news.error) return this.refused(news.error)
-    if (news.file) saveBytes(news.file, `${hand.scene.name}.npz`)
-    if (news.limit !== undefined && push.size && news.load.every((v, k) => v === hand.body.load[k])) push.tell(hand, (news.limit ?? Infinity) * push.size)
-    if (news.fall && hand.body.empty) {
+    if (news.file) return saveBytes(news.file, `${hand.scene.name}.npz`)
+    if (news.S !== hand.S) return
+    if (news.limit !== undefined && push.size) push.tell(hand, (news.limit ?? Infinity) * push.size)
+    if (news.fall) {
       hand.fall = news.fall.length ? news.fall : null
       this.changed()
     }
-    if (news.measured && news.scene === hand.scene.name && news.mu === hand.mu && !hand.body.whole) {
+    if (news.measured) {
       const { bounds = null, outline, most = null } = news.measured
       hand.bounds = bounds
       Object.assign(hand.body, { bounded: most === null, most })

@@ -80,13 +80,14 @@ class Workbench(Scripted):
             match message:
                 case {
                     "find": what,
+                    "S": number,
                     "scene": scene,
                     "built": built,
                     "mu": mu,
                     "load": load,
                     "plane": plane,
                 }:
-                    self._find(what, scene, built, mu, load, plane)
+                    self._find(what, number, scene, built, mu, load, plane)
                 case {"scene": name} if name in (*scene_links.SMALL, scene_links.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
@@ -98,9 +99,16 @@ class Workbench(Scripted):
             self.tell({"error": str(error)})
 
     def _find(
-        self, what: str, scene: str, built: str, mu: float, load: list[float], plane: list[int]
+        self,
+        what: str,
+        number: int,
+        scene: str,
+        built: str,
+        mu: float,
+        load: list[float],
+        plane: list[int],
     ) -> None:
-        """Send results for a scene at this μ, under these loads.
+        """Send results for a scene at this μ, under these loads; number: by which the page knows S.
 
         Nothing for a scene that was replaced, or is about to be: the answer would stop the
         computation of the next one.
@@ -115,12 +123,12 @@ class Workbench(Scripted):
                     file = base64.b64encode(small_scenes.file_of(packing, load))
                     return {"file": file.decode()}
                 case "limit":
-                    return {"limit": small_scenes.limit(packing, load), "load": load}
+                    return {"limit": small_scenes.limit(packing, load), "S": number}
                 case "fall":
-                    return {"fall": small_scenes.falling(packing, load).tolist()}
+                    return {"fall": small_scenes.falling(packing, load).tolist(), "S": number}
                 case _:
-                    values = {"scene": scene, "mu": mu, "plane": plane}
-                    return {"measured": small_scenes.measured(packing, load, plane), **values}
+                    found = small_scenes.measured(packing, load, plane)
+                    return {"measured": found, "plane": plane, "S": number}
 
         tasks = {"file": self._saving, "limit": self._pushing}
         tasks.get(what, self._task).start(compute, self.tell)

@@ -259,7 +259,7 @@ def _at_rest(view):
 def _measure(scene):
     """What a page asks of a scene once friction has rested."""
     of = {"built": scene["built"], "mu": scene["mu"], "load": [*scene["load"]]}
-    return {"find": "measured", "scene": scene["name"], "plane": [0, 2], **of}
+    return {"find": "measured", "S": len(scene["i"]), "scene": scene["name"], "plane": [0, 2], **of}
 
 
 def test_a_file_is_not_lost_to_a_later_request(page):
@@ -290,4 +290,4 @@ def test_what_is_found_of_a_scene_is_not_told_of_the_next(page):
     view.hear({"scene": "column"})
     view.hear(late)
     _at_rest(view)
-    assert [message["scene"] for message in told] == ["column"]
+    assert [message["S"] for message in told] == [len(view.scene["i"])]
