@@ -56,18 +56,32 @@ def to_dataset(
 ) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
 
-    result: a Packing, a record returned by `intervals`, `walk` and others, the list from
-    `critical_forces`, networks (N_c, 2), (S, N_c, 2) or (chains, S, N_c, 2), or a number per
-    contact (N_c,), such as limit loads of all of S. ensemble: of the result, not needed for a
-    Packing, Volume, Outline or StressOutline. Coordinates: contact, its number in the packing; i
-    and j, its grains; x and y, the point of contact, length; component, "f_n" or "f_t"; polygon,
-    "inner" or "outer" for an outline's corners; angle, of a StressOutline. unit: of forces,
-    "packing", or "mean" for the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of the
-    command line; quantities relative to ⟨f_n⟩ by definition, such as residuals, are always in it.
-    Numbers and texts of the record become attributes, forces among them in this unit, too.
+    Parameters
+    ----------
+    result : record, list or array
+        A Packing, a record returned by `intervals`, `walk` and others, the list from
+        `critical_forces`, networks (N_c, 2), (S, N_c, 2) or (chains, S, N_c, 2), or a number per
+        contact (N_c,), such as limit loads of all of S.
+    ensemble : Ensemble, optional
+        Of the result; not needed for a Packing, Volume, Outline or StressOutline.
+    unit : {"packing", "mean"}
+        Of forces: the packing's, or the mean normal force ⟨f_n⟩ of the ensemble, as ``--unit`` of
+        the command line. Quantities relative to ⟨f_n⟩ by definition, such as residuals, are always
+        in it.
 
-    Raises InputError for anything else, for a unit without effect, and if the ensemble is missing
-    or does not match.
+    Returns
+    -------
+    xr.Dataset
+        Coordinates: contact, its number in the packing; i and j, its grains; x and y, the point of
+        contact, length; component, "f_n" or "f_t"; polygon, "inner" or "outer" for an outline's
+        corners; angle, of a StressOutline. Numbers and texts of the record become attributes, with
+        forces in the same unit.
+
+    Raises
+    ------
+    InputError
+        For anything else, for a unit without effect, and if the ensemble is missing or does not
+        match.
     """
     choice(unit, UNITS, "unit")
     declared = _declared(result, ensemble)

@@ -60,15 +60,36 @@ def carrying(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Carrying:
-    """Least f_n of contacts over the networks within some σ of a measurement; a Carrying.
+    """Least f_n of contacts over the networks within some σ of a measurement.
 
-    measured, sigma, unmeasured: as for `infer`. contacts: numbers in the packing, by default all
-    that were not measured. within: bounds on each measured component, in σ; if the most likely
-    network is farther away, its distance and a tenth, so that there always is a network. Forces
-    that were not measured are bounded by ten times the largest measured one.
+    Forces that were not measured are bounded by ten times the largest measured one. Each contact
+    takes one linear program, or none if f_n = 0 in a known network.
 
-    Each contact takes one linear program, or none if f_n = 0 in a known network. Raises InputError
-    and NotJammedError as `infer` does.
+    Parameters
+    ----------
+    ensemble, measured, sigma, unmeasured
+        As for `infer`.
+    contacts : (k,) array of int, optional
+        Numbers in the packing, by default all that were not measured.
+    within : float, default 3
+        Bounds on each measured component, in σ; if the most likely network is farther away, its
+        distance and a tenth, so that there always is a network.
+    workers : int, default 1
+        Threads.
+    progress : callable, optional
+        progress(done, total).
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Carrying
+        least (k,), force, and where it is above 0.
+
+    Raises
+    ------
+    InputError, NotJammedError
+        As `infer` does.
     """
     within = positive(within, "within")
     m, s = checked(ensemble, measured, sigma)

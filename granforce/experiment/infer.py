@@ -137,19 +137,48 @@ def infer(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Inference:
-    """The admissible network with the least Σ ((f − m)/σ)², and draws around it; an Inference.
+    """The admissible network with the least Σ ((f − m)/σ)², and draws around it.
 
-    measured, sigma: m and σ (N_c of S, 2), force; NaN for components that were not measured. σ may
-    be one number, or two for f_n and f_t. states: minimum number of draws from the normal
-    distribution of the measurement truncated by S, for error bars, by `chains` independent chains.
-    workers: threads, which do not change the result. progress(done, total) counts draws.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    measured : (N_c, 2) array
+        m, force, of the contacts of S; NaN for components that were not measured.
+    sigma : float, (2,) or (N_c, 2) array
+        Standard errors σ, force: one, two for f_n and f_t, or one for each component.
+    states : int, default 0
+        Minimum number of draws from the normal distribution of the measurement truncated by S, for
+        error bars.
+    seed : int, default 0
+        Seed of the draws.
+    unmeasured : float, optional
+        Unmeasured components count as 0 with a standard error of this many ⟨f_n⟩. The default in a
+        bounded S, 1000, only selects the least of networks that fit equally well. In an unbounded S
+        it is 1: where the measurement does not bound a force either, only this does, and its error
+        bar depends on it.
+    chains : int, default 4
+        Independent chains of draws.
+    workers : int, default 1
+        Threads, which do not change the result.
+    progress : callable, optional
+        progress(done, total) counts draws.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
 
-    unmeasured: unmeasured components count as 0 with a standard error of this many ⟨f_n⟩. The
-    default in a bounded S, 1000, only selects the least of networks that fit equally well. In an
-    unbounded S it is 1: where the measurement does not bound a force either, only this does, and
-    its error bar depends on it.
+    Returns
+    -------
+    Inference
+        forces (N_c, 2), χ² and its degrees of freedom, and the draws, if there are any.
 
-    Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.
+    Raises
+    ------
+    InputError
+        For inconsistent shapes and σ ≤ 0.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)

@@ -68,18 +68,46 @@ def informative(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Informative:
-    """The k contacts whose f_n, if known, would shorten the mean interval most; an Informative.
+    """The k contacts whose f_n, if known, would shorten the mean interval most.
 
-    The mean is over all contacts, including the measured one, whose interval vanishes.
-    Based on `states` uniform states: if forces were normally distributed, a known f_n of contact c
-    would leave √(1 − ρ²) of the standard deviation of another one, where ρ is their correlation.
-    The best `check` contacts are then sorted by exact bounds, with f_n fixed at its mean over the
-    states. Of contacts whose f_n determine each other, one is listed, with the numbers of the
-    others. sample: a UniformSample of S to use instead of new states. workers: threads;
-    progress(done, total) counts the checked contacts. watch(Informative) is called before the first
-    of them, with the order by covariance.
+    The mean is over all contacts, including the measured one, whose interval vanishes. If forces
+    were normally distributed, a known f_n of contact c would leave √(1 − ρ²) of the standard
+    deviation of another one, where ρ is their correlation over uniform states. The best contacts
+    are then sorted by exact bounds, with f_n fixed at its mean over the states. Of contacts whose
+    f_n determine each other, one is listed, with the numbers of the others.
 
-    Raises InputError if nothing is left to measure, and as `sample_uniform` does.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, bounded.
+    k : int, default 10
+        Number of contacts to list.
+    states : int, default 400
+        Number of uniform states.
+    seed : int, default 0
+        Seed of the states.
+    check : int, default 10
+        How many of the best contacts get exact bounds.
+    sample : UniformSample, optional
+        Of S, to use instead of new states.
+    workers : int, default 1
+        Threads.
+    watch : callable, optional
+        watch(Informative) is called before the first check, with the order by covariance.
+    progress : callable, optional
+        progress(done, total) counts the checked contacts.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Informative
+        The best contact first.
+
+    Raises
+    ------
+    InputError
+        If nothing is left to measure, and as `sample_uniform` does.
     """
     k, check = whole(k, "k", 1), whole(check, "check")
     if sample is None:

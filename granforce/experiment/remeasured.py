@@ -77,12 +77,31 @@ def remeasured(
 ) -> Remeasured:
     """The network with the least Σ ((f − m)/σ)², with error bars from repeated measurement.
 
-    A Remeasured, with the arguments of `infer`; `unmeasured` is 2 by default, and 1 in an unbounded
-    S. Its draws are independent of each other (their mixing is not diagnosed: NaN) and need no
-    set-up: one contact program each, eight at a time.
-    workers: threads, which do not change the result.
+    Draws are independent of each other (their mixing is not diagnosed: NaN) and need no set-up: one
+    contact program each, eight at a time.
 
-    Raises InputError for inconsistent shapes and σ ≤ 0, NotJammedError if S is empty.
+    Parameters
+    ----------
+    ensemble, measured, sigma, seed, chains, progress, cancel
+        As for `infer`.
+    states : int, default 200
+        Number of draws.
+    unmeasured : float, optional
+        As for `infer`, but 2 by default, and 1 in an unbounded S.
+    workers : int, default 1
+        Threads, which do not change the result.
+
+    Returns
+    -------
+    Remeasured
+        An Inference whose draws estimate its error.
+
+    Raises
+    ------
+    InputError
+        For inconsistent shapes and σ ≤ 0.
+    NotJammedError
+        If S is empty.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)

@@ -144,23 +144,51 @@ def intervals(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Intervals:
-    """Least and largest f_n and f_t over S on contacts (numbers in the packing; default all of S).
-
-    workers: threads; the result does not depend on their number. states (…, N_c, 2): known
-    states of S. skip: a contact with f_n = 0 in one of them, or in the optimum of another program,
-    needs no program for its least f_n. watch(Bound) is called with each bound as it is computed:
-    all upper bounds of f_n, then the lower ones, then those of f_t, each in order of decreasing
-    widths (N_c,), which affect only this order; bounds with f_n = 0 may be sent again at the end,
-    changed by 10⁻⁸ ⟨f_n⟩ at most. progress(done, total) is called as programs end. cancel() →
-    True ends early: missing bounds are NaN and ``converged`` is False.
+    """Least and largest f_n and f_t over S on contacts, with certificates.
 
     In an unbounded S, bounds that a self-balanced change of forces moves without end are ±inf, and
     all others are certified as usual; rounding then allows a gap of up to 10⁻¹² of the largest sum
     of the bounded forces.
 
-    Raises InputError for a contact that cannot carry force, NotJammedError if S is empty,
-    UndecidedError and UnboundedError if it cannot be proved which forces are bounded, Cancelled if
-    cancelled before the first program.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contacts : (k,) array of int, optional
+        Numbers in the packing, by default all contacts of S.
+    workers : int, default 1
+        Threads. The result does not depend on their number.
+    states : (…, N_c, 2) array, optional
+        Known states of S, force.
+    skip : bool, default True
+        A contact with f_n = 0 in one of the states, or in the optimum of another program, needs no
+        program for its least f_n.
+    widths : (N_c,) array, optional
+        Expected widths, which affect only the order in which bounds are computed.
+    watch : callable, optional
+        watch(Bound) is called with each bound as it is computed: all upper bounds of f_n, then the
+        lower ones, then those of f_t, each in order of decreasing widths. Bounds with f_n = 0 may
+        be sent again at the end, changed by 10⁻⁸ ⟨f_n⟩ at most.
+    progress : callable, optional
+        progress(done, total) is called as programs end.
+    cancel : callable, optional
+        Polled; returning True ends early: missing bounds are NaN and ``converged`` is False.
+
+    Returns
+    -------
+    Intervals
+        low and high (k, 2), force: column 0 is f_n, column 1 is f_t.
+
+    Raises
+    ------
+    InputError
+        For a contact that cannot carry force.
+    NotJammedError
+        If S is empty.
+    UndecidedError, UnboundedError
+        If it cannot be proved which forces are bounded.
+    Cancelled
+        If cancelled before the first program.
     """
     places = _positions(ensemble, contacts)
     frictionless = ensemble.mu == 0
@@ -290,7 +318,22 @@ def _intervals(
 def limit_loads(
     ensemble: Ensemble, contacts: npt.ArrayLike | None = None, **options: Any
 ) -> Floats:
-    """Limit loads F (k,), force, of the given contacts; see `limit_load_bounds`."""
+    """Limit loads F of contacts, without the certificates of `limit_load_bounds`.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contacts : (k,) array of int, optional
+        Numbers in the packing, by default all contacts of S.
+    **options
+        Of `limit_load_bounds`, whose errors it raises.
+
+    Returns
+    -------
+    (k,) array
+        F, force.
+    """
     return limit_load_bounds(ensemble, contacts, **options).load
 
 
@@ -306,12 +349,29 @@ def limit_load_bounds(
 ) -> LimitLoads:
     """Largest F ≥ 0 of a pair +F n on grain j and −F n on grain i for which S is not empty.
 
-    One program per contact (numbers in the packing; default all of S), for the static limit load of
-    PRE 79, 052302. The pair adds F to the normal force on the contact, in the balance and in the
-    pressure, but not in the contact's own cone. (Left out of the pressure, the limit would be
-    F/(1 − F ℓ/2P0V).) Infinite if neither grain has to balance, as no equation then contains the
-    load, and in an unbounded S where contact forces balance the pair alone. Options and errors as
-    in `intervals`.
+    One program per contact, for the static limit load of PRE 79, 052302. The pair adds F to the
+    normal force on the contact, in the balance and in the pressure, but not in the contact's own
+    cone. (Left out of the pressure, the limit would be F/(1 − F ℓ/2P0V).) Infinite if neither grain
+    has to balance, as no equation then contains the load, and in an unbounded S where contact
+    forces balance the pair alone.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contacts : (k,) array of int, optional
+        Numbers in the packing, by default all contacts of S.
+    workers : int, default 1
+        Threads. The result does not depend on their number.
+    progress : callable, optional
+        progress(done, total) is called as programs end.
+    cancel : callable, optional
+        Polled, as by `intervals`, which raises the same errors.
+
+    Returns
+    -------
+    LimitLoads
+        load (k,), force, inf without a limit, with its duality gap.
     """
     places = [int(place) for place in _positions(ensemble, contacts)]
     met = np.diff(ensemble.A.tocsc().indptr)[:: ensemble.per_contact] > 0

@@ -87,15 +87,37 @@ def outline(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Outline:
-    """The outline of S on the axes (2, N_c, 2): points (axes[0]·F, axes[1]·F)/⟨f_n⟩ over S.
+    """The outline of S on two axes: points (axes[0]·F, axes[1]·F)/⟨f_n⟩ over S.
 
-    tolerance: largest distance of the outer polygon from the inner one, relative to the extent of
-    the outline. workers: threads; the result does not depend on them. progress(done, total) counts
-    directions; total is the number known so far. cancel() → True ends early, with ``converged``
-    False and the polygons found so far, or Cancelled before the first program.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, bounded.
+    axes : (2, N_c, 2) array
+        The axes.
+    tolerance : float, default 0.001
+        Largest distance of the outer polygon from the inner one, relative to the extent of the
+        outline.
+    workers : int, default 1
+        Threads. The result does not depend on their number.
+    progress : callable, optional
+        progress(done, total) counts directions; total is the number known so far.
+    cancel : callable, optional
+        Polled; returning True ends early, with ``converged`` False and the polygons found so far.
 
-    Raises InputError for axes of another shape or of zeros and if S is not bounded, NotJammedError
-    if it is empty.
+    Returns
+    -------
+    Outline
+        Polygons inside and around the outline, in ⟨f_n⟩.
+
+    Raises
+    ------
+    InputError
+        For axes of another shape or of zeros and if S is not bounded.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled before the first program.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     tolerance = positive(tolerance, "tolerance")

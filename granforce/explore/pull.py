@@ -90,15 +90,40 @@ def pull(
     workers: int = 1,
     cancel: Cancel | None = None,
 ) -> Pull:
-    """The points of S nearest to `state` with f_n of one contact at the given values; a Pull.
+    """The points of S nearest to `state` with f_n of one contact at the given values.
 
-    contact: its number in the packing. values (k,), force. state (N_c, 2), force: by default the
-    original network. Nearest: the least Σ |F_c − F_state,c|² over all contacts. At the very ends of
-    the interval f_n differs from the value by 10⁻⁶ of its width (rarely more, at most 10⁻⁴).
-    workers: threads; no result depends on their number.
+    Nearest: the least Σ |F_c − F_state,c|² over all contacts. At the very ends of the interval f_n
+    differs from the value by 10⁻⁶ of its width (rarely more, at most 10⁻⁴).
 
-    Raises InputError for a contact that carries no force, and for values outside the exact
-    interval, which the message gives; NotJammedError if S is empty.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contact : int
+        Number in the packing.
+    values : (k,) array
+        f_n, force, within the exact interval.
+    state : (N_c, 2) array, optional
+        Force; by default the original network.
+    workers : int, default 1
+        Threads. No result depends on their number.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Pull
+        states (k, N_c, 2), force, and the contacts that are open or slide.
+
+    Raises
+    ------
+    InputError
+        For a contact that carries no force, and for values outside the exact interval, which the
+        message gives.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled.
     """
     position = ensemble.position(contact)
     values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
@@ -193,13 +218,36 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
 def reach(
     ensemble: Ensemble, contact: int, *, workers: int = 1, cancel: Cancel | None = None
 ) -> Reach:
-    """Exact least and largest f_n of one contact (its number in the packing); a Reach.
+    """Exact least and largest f_n of one contact.
 
-    Contacts that are open or slide at an end are those that limit f_n there. workers: threads;
-    results do not depend on their number.
+    Contacts that are open or slide at an end are those that limit f_n there.
 
-    Raises InputError for a contact that carries no force, UndecidedError if the interval could not
-    be certified, NotJammedError if S is empty.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contact : int
+        Number in the packing.
+    workers : int, default 1
+        Threads. No result depends on their number.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Reach
+        low and high, force, and the contacts that limit f_n there.
+
+    Raises
+    ------
+    InputError
+        For a contact that carries no force.
+    UndecidedError
+        If the interval could not be certified.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled.
     """
     position = ensemble.position(contact)
     keys = [(position, 0, side) for side in (0, 1)]

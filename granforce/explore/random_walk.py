@@ -131,25 +131,64 @@ def walk(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Walk:
-    """Random walk until `states` accepted states in all; chains follow each other in the result.
-
-    chains: independent walks from the original network, with states divided evenly; workers:
-    threads, each of which vectorises many chains. Neither changes the states of a chain. relax:
-    "nearest", "nearest_piqp", "gauss_seidel", "gauss_seidel_only" (the paper's walk), or a function
-    as `nearest`; options: of the relaxation. max_attempts: per chain, by default 20 per state.
-    whole: whether fewer states than requested are an error; otherwise there may be fewer, or none.
-    begun: a Walk of one chain with the same arguments and fewer states, which is continued; its
-    last state is computed again and must agree.
-    enough(): called after each state of a single chain; True ends it with the states so far.
-    progress(done, total); watch(WalkState) receives each state as it is accepted, from the worker
-    thread; neither changes the result. cancel() returning True raises Cancelled.
+    """Random walk through S until `states` accepted states in all.
 
     If S is a single point (h = 0), every state is that point and no relaxation is done, unless skip
-    is False: sweeps end at a small residual, not exactly at that point. A warning says if S is
-    unbounded: forces then grow with the number of states.
+    is False: sweeps end at a small residual, not exactly at that point. A warning reports an
+    unbounded S: forces then grow with the number of states.
 
-    Raises InputError for sizes below 1, for several chains with `begun` or `enough`, and if `begun`
-    has other arguments; NotJammedError if max_attempts yield too few states of a whole walk.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    states : int, default 1000
+        Accepted states of all chains together.
+    seed : int, default 0
+        Seed of all chains.
+    chains : int, default 1
+        Independent walks from the original network, with states divided evenly; they follow each
+        other in the result.
+    workers : int, default 1
+        Threads, each of which vectorises many chains. Neither workers nor chains change the states
+        of a chain.
+    relax : str or callable, default "nearest"
+        "nearest", "nearest_piqp", "gauss_seidel", "gauss_seidel_only" (the paper's walk), or a
+        function like `nearest`.
+    max_attempts : int, optional
+        Per chain, by default 20 per state.
+    whole : bool, default True
+        Whether fewer states than requested are an error; otherwise there may be fewer, or none.
+    skip : bool, default True
+        Whether to skip relaxations in an S of a single point.
+    begun : Walk, optional
+        A Walk of one chain with the same arguments and fewer states, which is continued; its last
+        state is computed again and must agree.
+    enough : callable, optional
+        enough() is called after each state of a single chain; True ends it with the states so far.
+    progress : callable, optional
+        progress(done, total); does not change the result.
+    watch : callable, optional
+        watch(WalkState) receives each state as it is accepted, from the worker thread; does not
+        change the result.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **options
+        Of the relaxation.
+
+    Returns
+    -------
+    Walk
+        states (states, N_c, 2), force, and the effort to reach them.
+
+    Raises
+    ------
+    InputError
+        For sizes below 1, for several chains with `begun` or `enough`, and if `begun` has other
+        arguments.
+    NotJammedError
+        If max_attempts yield too few states of a whole walk.
+    Cancelled
+        If cancelled.
     """
     states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)

@@ -257,18 +257,49 @@ def sample_uniform(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> UniformSample:
-    """At least `states` states of S in all, uniform in its affine hull; a UniformSample.
+    """At least `states` states of S in all, uniform in its affine hull.
 
-    chains: independent chains of equal length (states are rounded up to that); workers: threads;
-    the result does not depend on their number. effective: requested effective sample size (bulk and
-    tail, of every component): more states are drawn, up to 10 times the larger of both
-    numbers, until it is reached; ``reached`` says whether it was. method: "billiard", or
-    "hit_and_run", a slow independent check. previous: a UniformSample of this ensemble to continue,
-    drawn with the same chains, seed and method. progress(done, total) counts states; cancel() →
-    True ends early with the states so far, or raises Cancelled before sampling has begun.
+    If S is one point (h = 0), every state is that point.
 
-    If S is one point (h = 0), every state is that point. Raises InputError for sizes below 1,
-    unbounded forces, and another sample than asked for to continue; NotJammedError if S is empty.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, bounded.
+    states : int, default 1000
+        Least number of states of all chains together.
+    chains : int, default 4
+        Independent chains of equal length (states are rounded up to that).
+    seed : int, default 0
+        Seed of all chains.
+    workers : int, default 1
+        Threads. The result does not depend on their number.
+    effective : float, optional
+        Requested effective sample size (bulk and tail, of every component): more states are drawn,
+        up to 10 times the larger of both numbers, until it is reached. ``reached`` shows whether it
+        was.
+    method : {"billiard", "hit_and_run"}
+        Hit-and-run is a slow independent check.
+    previous : UniformSample, optional
+        A sample of this ensemble to continue, drawn with the same chains, seed and method.
+    progress : callable, optional
+        progress(done, total) counts states.
+    cancel : callable, optional
+        Polled; returning True ends early with the states so far, or raises Cancelled before
+        sampling has begun.
+
+    Returns
+    -------
+    UniformSample
+        states (chains, k, N_c, 2), force, with diagnostics.
+
+    Raises
+    ------
+    InputError
+        For sizes below 1, unbounded forces, and a previous sample with other arguments.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled before the first state.
     """
     states, chains = whole(states, "states", 1), whole(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)

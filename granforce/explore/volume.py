@@ -120,14 +120,40 @@ def volume(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Volume:
-    """ln V of S with a standard error of `accuracy`; a Volume.
+    """ln V of S with a standard error of `accuracy`.
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
-    of ⟨f_n⟩; a single point has ln V = 0. workers: threads; the result does not depend on their
-    number. progress(done, total) counts paths, weighted by their costs; total is an estimate.
+    of ⟨f_n⟩; a single point has ln V = 0.
 
-    Raises InputError for an accuracy below 0.01 and unbounded forces, NotJammedError if S
-    is empty.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, bounded.
+    accuracy : float, default 0.05
+        Standard error of ln V, at least 0.01.
+    seed : int, default 0
+        Seed of the sampling.
+    workers : int, default 1
+        Threads. The result does not depend on their number.
+    progress : callable, optional
+        progress(done, total) counts paths, weighted by their costs; total is an estimate.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Volume
+        log_volume and its standard error. ``reached``: the error is as requested, and both ladders
+        agree.
+
+    Raises
+    ------
+    InputError
+        For an accuracy below 0.01 and unbounded forces.
+    NotJammedError
+        If S is empty.
+    Cancelled
+        If cancelled.
     """
     begin = time.perf_counter()
     accuracy, seed = positive(accuracy, "accuracy", least=LEAST_ACCURACY), random_seed(seed)

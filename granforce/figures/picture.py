@@ -57,18 +57,39 @@ def plot(
 ) -> hv.Overlay:
     """A packing to scale, with contacts as lines of width f_n, coloured with a colour bar.
 
-    Bodies of other shapes are drawn with lines through the contact points, along the forces.
-    states: a network (k, 2), networks (…, k, 2), also of several chains, a Walk or a UniformSample;
-    their mean is drawn, in the packing's unit of force; by default the packing's own network.
-    contacts (k,): their numbers in the packing, needed if there are fewer than in the packing
-    (`Ensemble.index`). colour: "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation
-    of f_n over states), "interval" (length of the exact interval of f_n, computed here), or numbers
-    (k,). label: their quantity and unit, for the colour bar; by default the name of a pandas or
-    xarray object. numbers: write its number at each contact. Walls are drawn as given, or where
-    they are touched. backend: "bokeh" or "matplotlib"; `figures.save` writes .html with the first,
-    and .pdf, .png, .svg with the second.
+    Bodies of other shapes are drawn with lines through the contact points, along the forces. Walls
+    are drawn as given, or where they are touched.
 
-    Raises InputError for states that do not match these contacts, and for an unknown colour.
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    states : (…, k, 2) array, Walk or UniformSample, optional
+        A network, or networks, also of several chains, in the packing's unit of force; their mean
+        is drawn. By default the packing's own network.
+    colour : str or (k,) array, default "mobilisation"
+        "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation of f_n over states),
+        "interval" (length of the exact interval of f_n, computed here), or numbers.
+    contacts : (k,) array of int, optional
+        Their numbers in the packing, needed if there are fewer than in the packing
+        (`Ensemble.index`).
+    label : str, optional
+        Quantity and unit of the numbers, for the colour bar; by default the name of a pandas or
+        xarray object.
+    numbers : bool, default False
+        Write its number at each contact.
+    backend : {"bokeh", "matplotlib"}
+        `figures.save` writes .html with the first, and .pdf, .png, .svg with the second.
+
+    Returns
+    -------
+    hv.Overlay
+        A HoloViews object.
+
+    Raises
+    ------
+    InputError
+        For states that do not match these contacts, and for an unknown colour.
     """
     style.ready(backend)
     count = len(packing.contacts.i)

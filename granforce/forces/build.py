@@ -38,17 +38,37 @@ def ensemble(
 ) -> Ensemble:
     """The set S of admissible force networks of a packing.
 
-    mu: friction coefficient of the cones, by default the packing's; or those (N_c,) of all
-    contacts. One number for a packing with several: of the roughest, the others in proportion.
-    prescribed: "pressure", the
-    whole "stress", or "none" (nothing but loads, or forces outside). stress (3,): σ_xx, σ_yy and
-    σ_xy, force per length, by default those of the packing's own network. known: a Known, bounds on
-    single forces. frozen: mask (N_c,) or positions of contacts held at their original forces, which
-    drops the pressure row (PRL 94, 178001). prune: leave out rattlers and contacts that carry
-    nothing in any state of S. Grains whose load is NaN need not balance.
+    Parameters
+    ----------
+    packing : Packing
+        Grains, contacts and loads. Grains whose load is NaN need not balance.
+    mu : float or (N_c,) array, optional
+        Friction coefficient of the cones, by default the packing's. One number for a packing with
+        several: of the roughest, the others in proportion.
+    prescribed : {"pressure", "stress", "none"}
+        "stress" is the whole stress, "none" nothing but loads, or forces outside.
+    stress : (3,) array, optional
+        σ_xx, σ_yy and σ_xy, force per length, by default those of the packing's own network.
+    known : Known, optional
+        Bounds on single forces.
+    frozen : array, optional
+        Mask (N_c,) or positions of contacts held at their original forces, which drops the pressure
+        row (PRL 94, 178001).
+    prune : bool, default True
+        Leave out rattlers and contacts that carry nothing in any state of S.
 
-    Raises NotJammedError where S is empty, naming the grains with the largest unbalanced load, or
-    the known forces that conflict; InputError for conditions that exclude each other.
+    Returns
+    -------
+    Ensemble
+        A, b, the contacts that can carry force (`index`) and ⟨f_n⟩ (`force_scale`).
+
+    Raises
+    ------
+    NotJammedError
+        Where S is empty, naming the grains with the largest unbalanced load, or the known forces
+        that conflict.
+    InputError
+        For conditions that exclude each other.
     """
     count = len(packing.contacts.i)
     contacts, mu = with_friction(packing.contacts, packing.mu if mu is None else mu)

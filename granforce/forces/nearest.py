@@ -57,12 +57,28 @@ def nearest(
     max_iterations: int = MOST_STEPS,
     cancel: Cancel | None = None,
 ) -> Relaxation:
-    """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
+    """The point of S with the least Σ |F_c − F_start,c|².
 
-    start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
-    distance to the optimum below 10⁻⁶ ⟨f_n⟩; ``converged`` is False where that was not reached (S
-    is empty, or max_iterations were too few): forces are the last iterate, inside the cones.
-    cancel() returning True raises Cancelled.
+    Ends when the residual is below the tolerance and the distance to the optimum below 10⁻⁶ ⟨f_n⟩.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    start : (N_c, 2) array
+        Force.
+    tolerance : float, default 10⁻¹⁰
+        Residual, in ⟨f_n⟩.
+    max_iterations : int, default 100
+        Of the solver.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Relaxation
+        ``converged`` is False where the end was not reached (S is empty, or max_iterations were too
+        few): forces are the last iterate, inside the cones.
     """
     (relaxation,) = nearest_of_many(
         ensemble, [start], tolerance=tolerance, max_iterations=max_iterations, cancel=cancel
@@ -81,7 +97,19 @@ def nearest_of_many(
 ) -> list[Relaxation]:
     """`nearest` of each of the starts, vectorised: bit-identical results.
 
-    starts: arrays (N_c, 2), force. Other arguments as of `nearest`.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    starts : sequence of (N_c, 2) array
+        Force.
+    tolerance, max_iterations, cancel
+        As for `nearest`.
+
+    Returns
+    -------
+    list of Relaxation
+        In the order of the starts.
     """
     if cancel is not None:
         with cancelling.scope(cancel):

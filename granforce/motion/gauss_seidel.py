@@ -40,16 +40,37 @@ def gauss_seidel(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Relaxation:
-    """One step of contact dynamics from rest, by sweeps until it has ended; a Relaxation.
+    """One step of contact dynamics from rest, by sweeps until it has ended.
 
-    start (N_c, 2): first guess, force. order: "sequential" or "random" (a new permutation each
-    sweep, from seed). options: tolerance (10⁻¹⁰), the residual in ⟨f_n⟩ that counts as balance;
-    rest (10⁻³), the residual from which the nearest network replaces further sweeps, None to
-    sweep down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also
-    True if grains move steadily: then no equilibrium is near, and the residual shows it. cancel()
-    returning True raises Cancelled.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    start : (N_c, 2) array
+        First guess, force.
+    order : {"sequential", "random"}
+        Of the contacts in a sweep; "random" is a new permutation each sweep.
+    seed : int, default 0
+        Seed of the random order.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **options
+        tolerance (10⁻¹⁰), the residual in ⟨f_n⟩ that counts as balance; rest (10⁻³), the residual
+        from which the nearest network replaces further sweeps, None to sweep down to the tolerance;
+        max_iterations, the most sweeps (100,000).
 
-    Raises InputError if the whole stress is prescribed or forces are known.
+    Returns
+    -------
+    Relaxation
+        ``converged`` is also True if grains move steadily: then no equilibrium is near, and the
+        residual shows it.
+
+    Raises
+    ------
+    InputError
+        If the whole stress is prescribed or forces are known.
+    Cancelled
+        If cancelled.
     """
     refuse_options(gauss_seidel, options, [*inspect.signature(SideBySide).parameters][2:])
     order = choice(order, ("sequential", "random"), "order")

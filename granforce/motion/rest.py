@@ -65,16 +65,38 @@ def rest(
 ) -> Rest:
     """Whether contact dynamics leaves a packing at rest, under its own forces and with noise.
 
-    packing: a Packing with forces, of any origin, or its Ensemble. noise: standard deviations of
-    the normal noise on every component, in ⟨f_n⟩; draws: number of draws of each, from seed.
-    conditions: of a Packing, as for `ensemble`. cancel() returning True raises Cancelled.
-
     Forces with a residual or violation above 0.05 ⟨f_n⟩ are no network: grains may come to rest
     elsewhere, at other forces, which is reported as not at rest. Smaller errors, of simulations or
     of rounded files, show only in `distance`.
 
-    Raises NotJammedError if S is empty, InputError if the packing has no forces, and for conditions
-    with an Ensemble.
+    Parameters
+    ----------
+    packing : Packing or Ensemble
+        A Packing with forces, of any origin, or its Ensemble.
+    noise : tuple of float, default (0.0001, 0.01)
+        Standard deviations of the normal noise on every component, in ⟨f_n⟩.
+    draws : int, default 3
+        Number of draws for each of them.
+    seed : int, default 0
+        Seed of the noise.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **conditions
+        Of a Packing, as for `ensemble`.
+
+    Returns
+    -------
+    Rest
+        at_rest, the network reached, and the draws that came to rest.
+
+    Raises
+    ------
+    NotJammedError
+        If S is empty.
+    InputError
+        If the packing has no forces, and for conditions with an Ensemble.
+    Cancelled
+        If cancelled.
     """
     S = ensemble_at(packing, **conditions)
     draws = whole(draws, "draws", least=1)

@@ -61,20 +61,45 @@ def blocks(
 ) -> Packing:
     """A Packing of rigid bodies, with the admissible network nearest to equal normal forces.
 
-    bodies: corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for
-    each; a fixed body may be a thin wall, (2, 2). mu: friction coefficient, or those (N_c,) of all
-    contacts. fixed: numbers of the bodies that cannot move. weights (N,): by default the areas;
-    masses are in proportion, and gravity points along −y. materials (N,): labels of the materials
-    of the bodies, and friction: μ of pairs of them if it is not mu, {("stone", "wood"): 0.4, …}.
-    tolerance: distance up to which surfaces touch or may overlap, in the unit of the bodies; by
-    default 10⁻⁹ times the largest body. balanced: whether to look for a network; otherwise
-    forces are 0, even if nothing balances. An edge on an edge touches at both ends of the shared
-    part. Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
-    contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. names: of the bodies, for
-    messages; by default their numbers.
+    An edge on an edge touches at both ends of the shared part.
 
-    Raises InputError for bodies that overlap, NotJammedError if nothing balances the weights, and
-    UndecidedError (an InputError, too) where rounding leaves this open, close to the limit.
+    Parameters
+    ----------
+    bodies : sequence of array
+        Corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for each; a
+        fixed body may be a thin wall, (2, 2).
+    mu : float or (N_c,) array
+        Friction coefficient, or those of all contacts.
+    fixed : array of int, default ()
+        Numbers of the bodies that cannot move.
+    weights : (N,) array, optional
+        Force along −y, by default the areas; masses are in proportion.
+    materials : (N,) sequence, optional
+        Labels of the materials of the bodies.
+    friction : mapping, optional
+        μ of pairs of materials if it is not mu, {("stone", "wood"): 0.4, …}.
+    tolerance : float, optional
+        Distance up to which surfaces touch or may overlap, in the unit of the bodies; by default
+        10⁻⁹ times the largest body.
+    balanced : bool, default True
+        Whether to look for a network; otherwise forces are 0, even if nothing balances.
+    names : sequence of str, optional
+        Names of the bodies, for messages; by default their numbers.
+
+    Returns
+    -------
+    Packing
+        Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
+        contact, and nearly_touching [i, j, gap], up to 100 tolerances apart.
+
+    Raises
+    ------
+    InputError
+        For bodies that overlap.
+    NotJammedError
+        If nothing balances the weights.
+    UndecidedError
+        (An InputError, too) where rounding leaves this open, close to the limit.
     """
     try:
         bodies = list(bodies)

@@ -122,30 +122,64 @@ def pack(
 ) -> Packing:
     """A jammed packing of n disks with friction coefficient μ in a doubly periodic box.
 
-    radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii; in
-    other units of length, the same seed gives another packing unless the factor is a power of two,
-    as rounding decides which contacts form.
-    pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
-    radius, P0 and the mass density; dt is the longest step, used while no carrying grain moves
-    farther than 0.02. accuracy: largest violation of the laws of Signorini and Coulomb after a
-    step, as a velocity relative to the fastest carrying grain; sweeps: maximum per step. By
-    default dt is 0.1 and sweeps 600; from μ = 0.2 on, 0.03 and 150. drag_below: drag takes the
-    place of inertia once no grain's momentum changes by more than this in a step, in ⟨f_n⟩; only
-    for μ above 10⁻⁴, and by default 0.02, less from 2000 disks on. box: "square", or "isotropic",
-    whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear
-    too.
-    progress(steps done, None) is called repeatedly, as the total is unknown, and watch(Glimpse) at
-    least every 5 steps; neither changes a bit of the result. cancel() returning True raises
-    Cancelled.
+    Parameters
+    ----------
+    n : int
+        Number of disks.
+    mu : float
+        Friction coefficient μ.
+    seed : int, default 1
+        Seed of the radii and of the dilute gas at the start.
+    radii : str or (n,) array, default "uniform:0.5,1"
+        "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE", or the radii. In other units of
+        length, the same seed gives another packing unless the factor is a power of two, as rounding
+        decides which contacts form.
+    pressure : float, default 1
+        P0, force per length.
+    dt : float, optional
+        Longest time step, used while no carrying grain moves farther than 0.02. By default 0.1, and
+        0.03 from μ = 0.2 on. In units of the largest radius, P0 and the mass density.
+    box_mass : float, default 100
+        Inertia M_λ of the box, in the same units.
+    sweeps : int, optional
+        Maximum per step. By default 600, and 150 from μ = 0.2 on.
+    accuracy : float, default 0.01
+        Largest violation of the laws of Signorini and Coulomb after a step, as a velocity relative
+        to the fastest carrying grain.
+    drag_below : float, optional
+        Drag takes the place of inertia once no grain's momentum changes by more than this in a
+        step, in ⟨f_n⟩; by default 0.02, less from 2000 disks on. Only for μ above 10⁻⁴.
+    box : {"square", "isotropic"}
+        Sides and tilt of an isotropic box follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
+        jammed against shear too.
+    max_steps : int, default 100,000
+        Maximum number of time steps.
+    progress : callable, optional
+        progress(steps done, None) is called repeatedly, as the total is unknown. It does not change
+        a bit of the result.
+    watch : callable, optional
+        watch(Glimpse) is called at least every 5 steps. It does not change a bit of the result.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
 
-    Returns a Packing whose forces balance to 10⁻¹⁰ ⟨f_n⟩, and whose pressing contacts are closed to
-    10⁻¹¹ of the largest radius, without larger overlaps. Other pairs with gaps below 10⁻⁹ are
-    contacts without force; `margin` tells whether that is certain, from the largest gap of a
-    contact and the least of any other pair, which are also in `info`. info["unfinished_steps"] is
-    the number of steps that ended before they were accurate.
+    Returns
+    -------
+    Packing
+        Forces balance to 10⁻¹⁰ ⟨f_n⟩. Pressing contacts are closed to 10⁻¹¹ of the largest radius,
+        without larger overlaps. Other pairs with gaps below 10⁻⁹ are contacts without force;
+        `margin` shows whether that is certain, from the largest gap of a contact and the least of
+        any other pair, which are also in `info`. info["unfinished_steps"] is the number of steps
+        that ended before they were accurate.
 
-    Raises NotJammedError after max_steps, with the state reached, or once a state that fails the
-    test of rest returns again and again, and InputError for bad input.
+    Raises
+    ------
+    NotJammedError
+        After max_steps, with the state reached, or once a state that fails the test of rest returns
+        again and again.
+    InputError
+        For bad input.
+    Cancelled
+        If cancelled.
     """
     mu = friction(mu)
     pressure = moderate(pressure, "pressure")

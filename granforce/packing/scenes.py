@@ -65,11 +65,28 @@ class _Scene(NamedTuple):
 def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The Packing of a named scene, with the admissible network nearest to equal f_n.
 
-    name: one of SCENES, or of BLOCKS. mu: friction coefficient, by default the scene's. options:
-    angle (degrees) of the opening of the "groove" and of the lines of centres with the vertical in
-    the "pyramid" and the "column"; disks in the "column"; those of the functions in `masonry`.
+    Parameters
+    ----------
+    name : str
+        One of SCENES, or of BLOCKS.
+    mu : float, optional
+        Friction coefficient, by default the scene's.
+    **options
+        Of the scene: angle (degrees) of the opening of the "groove" and of the lines of centres
+        with the vertical in the "pyramid" and the "column"; disks in the "column"; those of the
+        functions in `masonry`.
 
-    Raises InputError for an unknown name, option or geometry, NotJammedError if nothing balances.
+    Returns
+    -------
+    Packing
+        With this network as its forces.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, option or geometry.
+    NotJammedError
+        If nothing balances.
     """
     return with_network(sketched(name, mu, **options))
 

@@ -161,14 +161,35 @@ def critical_force(
     cancel: Cancel | None = None,
     **protocol: Any,
 ) -> CriticalForce:
-    """F_crit of one contact (its number in the packing) with its bracket.
+    """F_crit of one contact with its bracket.
 
-    packing: a Packing, or its Ensemble. mu: friction coefficient for a Packing, by default its own.
-    limit_load: force, computed if not given. protocol: fields of Protocol. cancel() returning True
-    raises Cancelled.
+    Parameters
+    ----------
+    packing : Packing or Ensemble
+        The packing, or its ensemble.
+    contact : int
+        Number in the packing.
+    mu : float, optional
+        Friction coefficient for a Packing, by default its own.
+    limit_load : float, optional
+        Force, computed if not given.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **protocol
+        Fields of Protocol.
 
-    Raises InputError for a contact without force in any state of S, for mu with an Ensemble, and if
-    the search ends at a given limit load that is below the exact one.
+    Returns
+    -------
+    CriticalForce
+        low, F_crit, and high, the smallest load not at rest, or the limit load; both force.
+
+    Raises
+    ------
+    InputError
+        For a contact without force in any state of S, for mu with an Ensemble, and if the search
+        ends at a given limit load that is below the exact one.
+    Cancelled
+        If cancelled.
     """
     refuse_options(critical_force, protocol, Protocol._fields)
     S = ensemble_at(packing, mu=mu)
@@ -189,14 +210,38 @@ def critical_forces(
     cancel: Cancel | None = None,
     **protocol: Any,
 ) -> list[CriticalForce]:
-    """F_crit of contacts (numbers in the packing), computed together: a list of CriticalForce.
+    """F_crit of contacts, computed together.
 
-    limit_loads (k,): force, computed if not given. workers: threads; no result depends on their
-    number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
-    ends. Other options and errors as for `critical_force`.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contacts : (k,) sequence of int
+        Numbers in the packing.
+    limit_loads : (k,) array, optional
+        Force, computed if not given.
+    workers : int, default 1
+        Threads. No result depends on their number, nor on the other contacts.
+    finished : callable, optional
+        finished(k, CriticalForce) is called from the threads as each ends.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **protocol
+        Fields of Protocol.
 
-    Raises UndecidedError if a limit load cannot be certified, or is given as NaN; InputError if the
-    search ends at a given limit load that is below the exact one.
+    Returns
+    -------
+    list of CriticalForce
+        In the order of the contacts.
+
+    Raises
+    ------
+    UndecidedError
+        If a limit load cannot be certified, or is given as NaN.
+    InputError
+        As for `critical_force`.
+    Cancelled
+        If cancelled.
     """
     refuse_options(critical_forces, protocol, Protocol._fields)
     S, protocol = ensemble, checked(Protocol(**protocol))
@@ -357,14 +402,39 @@ def response(
 ) -> Response:
     """The first motion under a force pair on one contact, beyond its critical force.
 
-    force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩,
-    by default 0.01, above the limit load if the bracket ends there). critical: the CriticalForce,
-    computed to `precision` if not given. The motion is that of one step of contact dynamics from
-    rest, followed until the violation of Coulomb's law is at most 0.001 times the fastest relative
-    velocity. displacement and rotation of rattlers are NaN, as nothing moves them: use `S.grains`
-    for the others, or numpy's nanmax and nanmean. cancel() returning True raises Cancelled.
+    The motion is that of one step of contact dynamics from rest, followed until the violation of
+    Coulomb's law is at most 0.001 times the fastest relative velocity.
 
-    Raises InputError if the grains come to rest under this load, and for an unused precision.
+    Parameters
+    ----------
+    packing : Packing or Ensemble
+        The packing, or its ensemble.
+    contact : int
+        Number in the packing.
+    force : float, optional
+        The load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩, by
+        default 0.01, above the limit load if the bracket ends there).
+    mu : float, optional
+        Friction coefficient for a Packing, by default its own.
+    critical : CriticalForce, optional
+        Computed to `precision` if not given.
+    precision : float, optional
+        Error of the critical force, in ⟨f_n⟩.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Response
+        displacement and rotation of rattlers are NaN, as nothing moves them: use `S.grains` for the
+        others, or numpy's nanmax and nanmean.
+
+    Raises
+    ------
+    InputError
+        If the grains come to rest under this load, and for an unused precision.
+    Cancelled
+        If cancelled.
     """
     S = ensemble_at(packing, mu=mu)
     used = critical is None or (force is None and critical.moving is None)

@@ -97,12 +97,32 @@ def load_factor(
 ) -> LoadFactor:
     """The largest λ ≥ 0 for which S is not empty with λ times a load on the grains.
 
-    load (N, 3): force and torque on each grain of the packing, or "horizontal": the weights turned
-    to +x. Loads on grains whose balance is left open have no effect. One linear program, by HiGHS;
-    the network and the multipliers that certify the limit are checked here.
+    One linear program, by HiGHS; the network and the multipliers that certify the limit are checked
+    here.
 
-    Raises InputError if a pressure is prescribed, and if the load acts on no grain; UndecidedError
-    if the limit could not be certified.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, without prescribed pressure.
+    load : (N, 3) array or str, default "horizontal"
+        Force and torque on each grain of the packing, or "horizontal": the weights turned to +x.
+        Loads on grains whose balance is left open have no effect.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    LoadFactor
+        λ, inf without a limit, and a network at the limit.
+
+    Raises
+    ------
+    InputError
+        If a pressure is prescribed, and if the load acts on no grain.
+    UndecidedError
+        If the limit could not be certified.
+    Cancelled
+        If cancelled.
     """
     return _limit(with_idle(ensemble), load)
 
@@ -141,12 +161,31 @@ def critical_load(
 ) -> CriticalLoad:
     """The largest λ at which bodies stay at rest as λ times a load is raised, and the motion.
 
-    load: as for `load_factor`. The start is the packing's own network: another one may give another
-    critical load. precision: of the bracket, as a fraction of the load factor. protocol: the other
-    fields of Protocol. cancel() returning True raises Cancelled.
+    The start is the packing's own network: another one may give another critical load.
 
-    Raises the errors of `load_factor`, and InputError if no load moves the bodies, and for a
-    precision finer than that of the load factor.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, without prescribed pressure.
+    load : (N, 3) array or str, default "horizontal"
+        As for `load_factor`.
+    precision : float, default 10⁻⁴
+        Of the bracket, as a fraction of the load factor.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+    **protocol
+        The other fields of Protocol.
+
+    Returns
+    -------
+    CriticalLoad
+        low and high, the bracket of λ, and the motion above it.
+
+    Raises
+    ------
+    InputError, UndecidedError, Cancelled
+        As `load_factor`; InputError also if no load moves the bodies, and for a precision finer
+        than that of the load factor.
     """
     refuse_options(critical_load, protocol, Protocol._fields[1:])
     S, settings = with_idle(ensemble), checked(Protocol(**protocol))

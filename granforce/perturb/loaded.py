@@ -48,14 +48,35 @@ def loaded_networks(
     *,
     cancel: Cancel | None = None,
 ) -> Loaded:
-    """The networks nearest to `state` that balance force pairs on one contact; a Loaded.
+    """The networks nearest to `state` that balance force pairs on one contact.
 
-    contact: its number in the packing. loads (k,), force, positive if they push its grains apart.
-    state (N_c, 2), force: by default the original network. Nearest means the least Σ |F_c −
-    F_state,c|². cancel() returning True raises Cancelled.
+    Nearest means the least Σ |F_c − F_state,c|².
 
-    Raises InputError for a contact that carries no force, and for a load without a network (there
-    is none above the limit load).
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    contact : int
+        Number in the packing.
+    loads : (k,) array
+        Force, positive if they push its grains apart.
+    state : (N_c, 2) array, optional
+        Force; by default the original network.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
+
+    Returns
+    -------
+    Loaded
+        states (k, N_c, 2), force, without the load.
+
+    Raises
+    ------
+    InputError
+        For a contact that carries no force, and for a load without a network (there is none above
+        the limit load).
+    Cancelled
+        If cancelled.
     """
     position = ensemble.position(contact)
     loads = float_array(np.atleast_1d(real_array(loads, "loads")), (-1,), "loads")

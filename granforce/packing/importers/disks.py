@@ -44,17 +44,41 @@ def from_disks(
 ) -> Packing:
     """A Packing of disks, with the force network nearest to equal normal forces.
 
-    x (N, 2): centres. r (N,): radii. mu: friction coefficient. Disks closer than tolerance (in
-    largest radii) touch. box: sides (L_x, L_y) of a periodic cell at this pressure (by default 1),
-    and its tilt; by default the set is open and needs walls and gravity. walls: "floor", "box" (a
-    floor and two sides), at the extent of the disks, or segments (k, 4) x, y, x, y. Walls are held:
-    behind each place that a disk touches is one more grain, whose balance is not required. gravity:
-    g times the mass density, downwards: a disk weighs g π r². packing.info lists pairs in doubt as
-    nearly_touching [i, j, gap]: gaps within a factor of 100 of the tolerance, and far above those
-    of other contacts; an InputWarning says so.
+    Parameters
+    ----------
+    x : (N, 2) array
+        Centres.
+    r : (N,) array
+        Radii.
+    mu : float
+        Friction coefficient.
+    box : (2,) array, optional
+        Sides L_x, L_y of a periodic cell. By default the set is open and needs walls and gravity.
+    tilt : float, default 0
+        x component of the cell's second vector.
+    walls : str or (k, 4) array, optional
+        "floor", "box" (a floor and two sides), at the extent of the disks, or segments x, y, x, y.
+        Walls are held: behind each place that a disk touches is one more grain, whose balance is
+        not required.
+    gravity : float, default 0
+        g times the mass density, downwards: a disk weighs g π r².
+    pressure : float, optional
+        P0 of a periodic cell, force per length; by default 1.
+    tolerance : float, default 10⁻⁶
+        Disks closer than this, in largest radii, touch.
 
-    Raises InputError for overlapping disks and for inconsistent options, NotJammedError if no
-    network exists.
+    Returns
+    -------
+    Packing
+        info["nearly_touching"] lists pairs in doubt, [i, j, gap]: gaps within a factor of 100 of
+        the tolerance, and far above those of other contacts. An InputWarning reports them.
+
+    Raises
+    ------
+    InputError
+        For overlapping disks and for inconsistent options.
+    NotJammedError
+        If no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     r = float_array(r, (-1,), "radii")
