@@ -19,6 +19,7 @@ from granforce.study import series
 from granforce.study.evolution import SCALARS, evolution
 from granforce.study.store import open_store
 from granforce.system.terminal import Bar, print_list, print_notes
+from granforce.system.wording import number as read_number
 
 Number = TypeVar("Number", int, float)
 
@@ -112,7 +113,7 @@ def _chosen(
     """The numbers of the requested frames; refusal(number): the error of one that is not there."""
     if text == "all":
         return list(available)
-    numbers = set(different("--frames", text, float, "all, or ") or [])
+    numbers = set(different("--frames", text, read_number, "all, or ") or [])
     for number in sorted(numbers - set(available)):
         if refusal is not None:
             raise refusal(number)

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 from granforce.cli.parsing import Input, Output, Parser, StorePath
 from granforce.cli.report_lines import FEW, IMPORT, PEGS, explained
 from granforce.glossary import RELAXATIONS
+from granforce.system.wording import number
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 # Commands whose names are reserved in Python or used by a package: their functions end in "_".
@@ -321,7 +322,7 @@ def walls(word: str) -> str | list[list[float]]:
     if "," not in word:
         return word
     try:
-        segments = [[float(part) for part in segment.split(",")] for segment in word.split()]
+        segments = [[number(part) for part in segment.split(",")] for segment in word.split()]
     except ValueError:
         segments = []
     if any(len(segment) != 4 for segment in segments) or not segments:

@@ -14,6 +14,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, NoReturn
 
+from granforce.system.wording import integer, number
+
 LONGEST = 600  # characters of a message
 
 
@@ -151,6 +153,8 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = _NEGATIVE
         for name in (None, "store"):
             self.register("action", name, _Once)
+        for kind, read in ((float, number), (int, integer)):
+            self.register("type", kind, read)
 
     def error(self, message: str) -> NoReturn:
         self.exit(refused(f"{message}; see {self.prog} --help"))

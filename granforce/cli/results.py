@@ -25,13 +25,14 @@ from granforce.study.series import check_folder
 from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, content_of
 from granforce.system.terminal import Bar
+from granforce.system.wording import number
 
 
 def radii(text: str, n: int) -> str | list[float]:
     if ":" in text:
         return text
     try:
-        radii = [float(line) for line in content_of(text).decode().split()]
+        radii = [number(line) for line in content_of(text).decode().split()]
     except ValueError as error:
         raise InputError(f"radii file {text}: {error}") from None
     if len(radii) != n:
@@ -212,7 +213,7 @@ def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
     """The conditions in the options, as parameters of kinds."""
     chosen = {
         "prescribed": arguments.prescribe or "pressure",
-        "stress": numbers("--stress", arguments.stress, float),
+        "stress": numbers("--stress", arguments.stress, number),
     }
     return chosen | known_forces(arguments)
 

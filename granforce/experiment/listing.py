@@ -25,8 +25,9 @@ from typing import Any, NamedTuple, Protocol, SupportsIndex
 
 import numpy as np
 
-from granforce.packing.importers.text import LARGEST, EmptyError, Source, number, read_text
+from granforce.packing.importers.text import LARGEST, EmptyError, Source, read_text
 from granforce.records import InputError, brief_list
+from granforce.system.wording import number
 from granforce.types import Floats, Integers, Mask
 
 _GRAINS = ("frame", "id", "x", "y", "radius", "flag")

@@ -8,8 +8,9 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from granforce.fields import record
-from granforce.packing.importers.text import LARGEST, Source, number, read_csv
+from granforce.packing.importers.text import LARGEST, Source, read_csv
 from granforce.records import InputError
+from granforce.system.wording import number
 from granforce.types import Floats, Integers
 
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")

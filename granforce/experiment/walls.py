@@ -21,8 +21,8 @@ from scipy import optimize
 from granforce.experiment.boundary import boundary
 from granforce.experiment.listing import Listing
 from granforce.packing.importers.geometry import components
-from granforce.packing.importers.text import number
 from granforce.records import Contacts, InputError, make_contacts, positive
+from granforce.system.wording import number
 from granforce.types import Floats, Integers, Mask
 
 SIDES = ("left", "right", "bottom", "top")  # least and largest x, least and largest y

@@ -39,6 +39,7 @@ from granforce.records import (
 )
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
+from granforce.system.wording import number
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
@@ -306,7 +307,7 @@ def draw_radii(spec: str | npt.ArrayLike, n: int, rng: np.random.Generator) -> F
     else:
         kind, _, numbers = spec.partition(":")
         try:
-            values = [float(v) for v in numbers.split(",")]
+            values = [number(v) for v in numbers.split(",")]
         except ValueError:
             values = []
         if kind == "uniform" and len(values) == 2 and 0 < values[0] <= values[1] < np.inf:

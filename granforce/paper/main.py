@@ -20,7 +20,7 @@ from granforce.system import markdown
 from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
 from granforce.system.terminal import Bar, print_list, table
-from granforce.system.wording import json_text
+from granforce.system.wording import integer, json_text, number
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (
@@ -120,9 +120,9 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     if arguments.n is not None:
         plan = plan._replace(frozen_large=4 * plan.n, tails_n=4 * plan.n)
     if arguments.mu is not None:
-        plan = _at(plan, _numbers("mu", arguments.mu, lambda mu: friction(float(mu))))
+        plan = _at(plan, _numbers("mu", arguments.mu, lambda mu: friction(number(mu))))
     if arguments.sizes is not None:
-        sizes = _numbers("sizes", arguments.sizes, lambda n: number_of_disks(int(n)))
+        sizes = _numbers("sizes", arguments.sizes, lambda n: number_of_disks(integer(n)))
         plan = plan._replace(sizes=sizes)
     if not plan.frictions:
         raise InputError("--mu: give at least one friction coefficient")

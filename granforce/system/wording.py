@@ -1,4 +1,6 @@
-"""Values as text: in JSON (RFC 8259), which has neither NaN nor infinities, and in words."""
+"""Values as text: in JSON (RFC 8259), which has neither NaN nor infinities, and in words; numbers
+read from text.
+"""
 
 import json
 import math
@@ -17,6 +19,22 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def number(text: str) -> float:
+    """The number that a text is, as `float`; but ValueError for 1_5, which is not 15."""
+    return float(_without_underscores(text))
+
+
+def integer(text: str) -> int:
+    """The integer that a text is, as `int`; ValueError for 1_5."""
+    return int(_without_underscores(text))
+
+
+def _without_underscores(text: str) -> str:
+    if "_" in text:
+        raise ValueError(f"could not convert string to a number: {text!r}")
+    return text
 
 
 def counted(count: int, one: str, several: str) -> str:

@@ -517,3 +517,35 @@ def test_only_commands_about_packings_explain_the_compaction(command, shown, cap
     said = capsys.readouterr().out
     for option in ("--dt", "--box-mass", "--sweeps", "--step-accuracy"):
         assert (f"  {option} " in said) == shown
+
+
+@pytest.mark.parametrize("command", PARSERS)
+def test_options_with_a_number_take_no_underscores(command):
+    one = PARSERS[command]
+    for action in one._actions:
+        if action.type in (float, int):
+            with pytest.raises(argparse.ArgumentError, match="1_5"):
+                one._get_value(action, "1_5")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "pack -n 4 --mu 0.3 --radii uniform:1,1_5 --out p.npz",
+        "pack -n 4 --mu 0.3 --radii underscores.txt --out p.npz",
+        "pack --scene groove --scene-options angle=9_0 --out p.npz",
+        "perturb p.npz --contacts 1_0",
+        "scan --mu 0.1,0_3 --out s.zarr",
+        "study --mu 0_3",
+        "study --sizes 1_00",
+        "import table grains.csv --mu 0.3 --walls 0,0,1_0,0",
+    ],
+)
+def test_lists_of_numbers_take_no_underscores(line, here, capsys):
+    (here / "underscores.txt").write_text("1\n1\n1\n1_5\n")
+    try:
+        assert parser.main(line.split()) == 2
+    except SystemExit as ended:
+        assert ended.code == 2
+    said = capsys.readouterr().err
+    assert "_" in said and said.count("\n") == 1 and "unrecognized" not in said

@@ -35,6 +35,7 @@ from granforce.quantities import quantity
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.system.terminal import print_notes, print_report, report_after
+from granforce.system.wording import integer, number
 
 LOADS = COUNTS[:3]  # by outcome; then comes the work done
 
@@ -53,7 +54,7 @@ def solved(dataset: xr.Dataset) -> dict[str, int]:
 
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
-    chosen = different("--contacts", arguments.contacts, int)
+    chosen = different("--contacts", arguments.contacts, integer)
     _, parameters, dataset, ends = stored_result(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
@@ -96,8 +97,8 @@ def perturb(arguments: argparse.Namespace) -> None:
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
     """Exact bounds or limit loads."""
-    contacts = different("--contacts", arguments.contacts, int)
-    edges = numbers("--slice", arguments.slice, float)
+    contacts = different("--contacts", arguments.contacts, integer)
+    edges = numbers("--slice", arguments.slice, number)
     chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
     return stored_result(arguments, kind, arguments.out, **chosen)
 

@@ -27,6 +27,7 @@ from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, InputWarning, Packing, whole
 from granforce.system.terminal import print_notes, print_report
+from granforce.system.wording import number
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -77,7 +78,7 @@ def scene_options(text: str | None) -> dict[str, float]:
         return {}
     pairs = importers.read_columns(text, "--scene-options")
     try:
-        return {name: float(value) for name, value in pairs.items()}
+        return {name: number(value) for name, value in pairs.items()}
     except ValueError:
         raise InputError(
             f"--scene-options {text[:40]!r}: give NAME=NUMBER,NAME=NUMBER, such as width=0.5"

@@ -33,6 +33,7 @@ from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.terminal import Bar, print_notes, print_report, report_after, table
+from granforce.system.wording import number
 from granforce.types import Rows
 
 # Digits in the table of a scan, whose numbers are means; the store has them exactly.
@@ -159,7 +160,7 @@ def measure(arguments: argparse.Namespace) -> None:
 
 def scan(arguments: argparse.Namespace) -> int:
     """Compute cells by processes into a store; print their table. Returns 1 if a cell failed."""
-    mus = different("--mu", arguments.mu, float) or []
+    mus = different("--mu", arguments.mu, number) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     worker_count(arguments.workers, "--workers")
     to_table = arguments.out is not None and arguments.out.endswith(".csv")

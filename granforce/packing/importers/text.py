@@ -21,6 +21,7 @@ import numpy as np
 
 from granforce.records import InputError, are_whole
 from granforce.system.files import content_of, path_text
+from granforce.system.wording import number
 from granforce.types import Floats, Integers, Mask
 
 # Larger numbers cannot be lengths or forces, and their squares would overflow.
@@ -39,13 +40,6 @@ Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
 # Suffix allowed in the names of columns of forces in the packing's unit.
 PACKING = " [packing]"
-
-
-def number(text: str) -> float:
-    """The number that a text is, as `float`; but ValueError for 1_5, which is not 15."""
-    if "_" in text:
-        raise ValueError(text)
-    return float(text)
 
 
 class EmptyError(InputError):
