@@ -161,14 +161,23 @@ def contact_labels(packing: Packing, contacts: Integers | None = None) -> dict[s
 def to_dataframe(
     result: Any, ensemble: Ensemble | None = None, *, unit: str = "packing"
 ) -> pd.DataFrame:
-    """The same as a pandas table: a row for each contact, or for each contact in each state.
+    """A result as a pandas table: a row for each contact, or for each contact in each state.
 
-    Columns have the names of the tables of the command line: contact, i, j, x, y, then component,
-    variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low [packing]`` for bounds.
-    `read_known` and ``--known`` read the file that the table's `to_csv` writes. Of intervals,
-    ``cluster`` is the cluster of undetermined contacts, −1 where determined. A Volume has a row for
-    each ladder, an Outline for each corner, a StressOutline for each angle, a Body for each contact
-    along each direction. Arguments and errors as for `to_dataset`.
+    `read_known` and ``--known`` read the file that the table's `to_csv` writes.
+
+    Parameters
+    ----------
+    result, ensemble, unit
+        As for `to_dataset`, which raises the same errors.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns have the names of the tables of the command line: contact, i, j, x, y, then
+        component, variable and unit, such as ``f_n [packing]`` for networks and ``f_n_low
+        [packing]`` for bounds. Of intervals, ``cluster`` is the cluster of undetermined contacts,
+        −1 where determined. A Volume has a row for each ladder, an Outline for each corner, a
+        StressOutline for each angle, a Body for each contact along each direction.
     """
     dataset = to_dataset(result, ensemble, unit=unit)
     if "contact" in dataset.dims or "angle" in dataset.dims:

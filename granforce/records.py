@@ -507,13 +507,27 @@ def make_contacts(
 ) -> Contacts:
     """Contacts from array-likes, cast once.
 
-    i, j (N_c,): grains, from 0. normal (N_c, 2): unit vectors from i to j. length (N_c,): centre
-    distances. r (N,): radii. Lever arms are the radii if no contact overlaps by more than 10⁻⁵ of
-    the largest radius, and otherwise extend to the middle of the overlap, a = r − overlap/2 (soft
-    disks).
+    Parameters
+    ----------
+    i, j : (N_c,) array of int
+        Grains, from 0.
+    normal : (N_c, 2) array
+        Unit vectors from i to j.
+    length : (N_c,) array
+        Centre distances.
+    r : (N,) array
+        Radii.
 
-    Raises InputError for grains outside 0 … N − 1, self-contacts, normals of other length,
-    distances ≤ 0.
+    Returns
+    -------
+    Contacts
+        Lever arms are the radii if no contact overlaps by more than 10⁻⁵ of the largest radius, and
+        otherwise extend to the middle of the overlap, a = r − overlap/2 (soft disks).
+
+    Raises
+    ------
+    InputError
+        For grains outside 0 … N − 1, self-contacts, normals of other length, distances ≤ 0.
     """
     r = float_array(r, (-1,), "radii")
     i, j = _numbers_of_grains(i, "i"), _numbers_of_grains(j, "j")
@@ -548,10 +562,28 @@ def make_contacts_at(
 ) -> Contacts:
     """Contacts of bodies of any shape, from the points where they touch.
 
-    i, j (N_c,): bodies, from 0. point (N_c, 2): points of contact. normal (N_c, 2): unit vectors
-    from i to j. x (N, 2): centres of mass. gap (N_c,): distance of the surfaces, by default 0.
+    Parameters
+    ----------
+    i, j : (N_c,) array of int
+        Bodies, from 0.
+    point : (N_c, 2) array
+        Points of contact.
+    normal : (N_c, 2) array
+        Unit vectors from i to j.
+    x : (N, 2) array
+        Centres of mass.
+    gap : (N_c,) array, optional
+        Distance of the surfaces, by default 0.
 
-    Raises InputError as `make_contacts`, and for normals that point away from body j.
+    Returns
+    -------
+    Contacts
+        For `make_packing`.
+
+    Raises
+    ------
+    InputError
+        As `make_contacts`, and for normals that point away from body j.
     """
     x = float_array(x, (-1, 2), "centres of mass")
     contacts = make_contacts(i, j, normal, np.ones(np.shape(i)), np.ones(len(x)))
@@ -597,16 +629,43 @@ def make_packing(
 ) -> Packing:
     """A Packing from array-likes, cast and validated once, all in one system of units.
 
-    x (N, 2): centres. r (N,): radii. box: sides (L_x, L_y) of the cell, inf in an open direction;
-    tilt: x component of its second vector. contacts: from `make_contacts`. forces (N_c, 2): f_n,
-    f_t of the packing's network, zeros if there is none. pressure: P0, force per length, NaN if
-    none is prescribed. mu: friction coefficient, or those (N_c,) of all contacts. load (N, 3):
-    external force and torque on each grain, by default none; a row of NaN leaves its balance open.
-    info: plain values to store with the packing. A tilt beyond ±L_x/2 is replaced by the one in
-    this range that spans the same lattice. shapes: of bodies other than disks.
+    Parameters
+    ----------
+    x : (N, 2) array
+        Centres.
+    r : (N,) array
+        Radii.
+    box : (2,) array
+        Sides L_x, L_y of the cell, inf in an open direction.
+    contacts : Contacts
+        From `make_contacts`.
+    forces : (N_c, 2) array
+        f_n, f_t of the packing's network, zeros if there is none.
+    mu : float or (N_c,) array
+        Friction coefficient, or those of all contacts.
+    pressure : float, default NaN
+        P0, force per length, NaN if none is prescribed.
+    load : (N, 3) array, optional
+        External force and torque on each grain, by default none; a row of NaN leaves its balance
+        open.
+    info : mapping, optional
+        Plain values to store with the packing.
+    tilt : float, default 0
+        x component of the cell's second vector. A tilt beyond ±L_x/2 is replaced by the one in this
+        range that spans the same lattice.
+    shapes : Shapes, optional
+        Of bodies other than disks.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains
-    that touch their own images, and shapes that do not match.
+    Returns
+    -------
+    Packing
+        The validated packing.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes, non-finite numbers, radii ≤ 0, repeated contacts, grains that touch their
+        own images, and shapes that do not match.
     """
     _check_kind("make_packing", contacts, Contacts)
     r = float_array(r, (-1,), "radii")

@@ -20,11 +20,6 @@ HOUSE = granforce.__path__[0]
 EXAMPLES = f"{HOUSE}/docs/examples.md"
 PAGES = f"{HOUSE}/docs/pages"
 PUBLIC = {name: home for name, home in granforce._HOME.items() if home}
-# Arguments that mean the same wherever they are taken.
-COMMON = (
-    *("ensemble", "packing", "states", "mu", "seed", "workers", "progress", "cancel"),
-    *("most_grains", "backend", "options"),
-)
 
 
 def examples():
@@ -52,22 +47,22 @@ def documented(name):
     return inspect.getdoc(getattr(granforce, name)) or ""
 
 
-def explained(name, seen=()):
-    """The docstring of a name, and those of the public names that it refers to."""
-    text = documented(name)
-    named = set(re.findall(r"`(\w+)`", text)) & set(PUBLIC) - {*seen, name}
-    return " ".join([text, *(explained(one, (*seen, name)) for one in named)])
+def explained(text):
+    """The arguments that the section of parameters explains."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n|\Z)", text, re.M | re.S)
+    heads = re.findall(r"^\*{0,2}(\w[\w, ]*?)(?: : .*)?$", section[1], re.M)
+    return [name for head in heads for name in head.split(", ")]
 
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_every_public_name_says_what_it_is(name):
-    """In a sentence, and of a function every argument."""
-    assert re.match(r"\S.*[.:;]", documented(name).partition("\n")[0] + "."), name
-    public = getattr(granforce, name)
+    """In a sentence, and of a function every argument, and the result."""
+    text, public = documented(name), getattr(granforce, name)
+    assert re.match(r"\S.*[.:;]", text.partition("\n")[0] + "."), name
     if inspect.isfunction(public):
-        words = set(re.findall(r"\w+", explained(name))) | set(COMMON)
-        named = inspect.signature(public).parameters.values()
-        assert {one.name for one in named if one.kind != one.VAR_POSITIONAL} <= words
+        signature = inspect.signature(public)
+        assert sorted(explained(text)) == sorted(signature.parameters)
+        assert ("\nReturns\n---" in text) == (signature.return_annotation != "None")
 
 
 def test_what_a_public_function_returns_is_public():

@@ -33,9 +33,24 @@ class Frame(NamedTuple):
 def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
     """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
 
-    Sorted by number. columns: of text files, as for `read_pegs`. InputWarnings name files that are
-    empty, and frames that are in one of two files only. Raises InputError if there are no frames,
-    or two with the same number.
+    InputWarnings name files that are empty, and frames that are in one of two files only.
+
+    Parameters
+    ----------
+    *paths : path
+        The folder, or the files.
+    columns : mapping, optional
+        Of text files, as for `read_pegs`.
+
+    Returns
+    -------
+    list of Frame
+        Sorted by number.
+
+    Raises
+    ------
+    InputError
+        If there are no frames, or two with the same number.
     """
     if not paths:
         raise InputError("give a folder of frames, or their files")

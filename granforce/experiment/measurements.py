@@ -43,11 +43,22 @@ class Measurement(NamedTuple):
 def read_measurement(source: Source) -> Measurement:
     """The Measurement in a CSV file; its `on` gives the arrays that `infer` takes.
 
-    source: a path or an open file. Columns: contact (its number in the packing), f_n, f_t, sigma_n,
-    sigma_t in the packing's unit, which names may end with: ``f_n [packing]``. Fields of components
-    that were not measured are empty or nan. Contacts without a line were not measured.
+    Parameters
+    ----------
+    source : path or open file
+        Columns: contact (its number in the packing), f_n, f_t, sigma_n, sigma_t in the packing's
+        unit, which names may end with: ``f_n [packing]``. Fields of components that were not
+        measured are empty or nan. Contacts without a line were not measured.
 
-    Raises InputError naming file and line.
+    Returns
+    -------
+    Measurement
+        Forces and standard errors of the measured contacts.
+
+    Raises
+    ------
+    InputError
+        Naming file and line.
     """
     table = read_csv(source).in_packing_unit(COLUMNS)
     contacts = table.whole("contact")

@@ -116,32 +116,59 @@ def read_pegs(
     wall_forces: Mapping[str, Sequence[float]] | None = None,
     most_grains: int | None = None,
 ) -> Photoelastic:
-    """A Photoelastic of one frame, from files of positions and contacts (paths or open files).
+    """A Photoelastic of one frame, from files of positions and contacts.
 
-    Without adjacency, positions is a *_solved.mat of PeGS 2, or frames from `open_frames`. frame:
-    its number, by default the last one in both files. scale: factor on the listed radii. reach:
-    largest gap between the disks of a candidate, in mean radii (0: no candidates). error: standard
-    error of a measured component, force; by default the one that makes χ² equal to its degrees of
-    freedom. Where two measurements of a contact differ by far more, half their difference is added
-    in quadrature.
-    reverse: change the sign of f_t (programs differ). repair: repair errors in up to a tenth of the
-    data (or in the given fraction); False: the first error raises. most_grains: largest number of
-    grains. columns: {name here: header or number in the files}, such as {"r": "diameter", "f_n":
-    "5"}, for columns that are not recognised.
+    Parameters
+    ----------
+    positions : path, open file or frames
+        Without adjacency, a *_solved.mat of PeGS 2, or frames from `open_frames`.
+    adjacency : path or open file, optional
+        The contacts.
+    mu : float
+        Friction coefficient.
+    frame : float, optional
+        Its number, by default the last one in both files.
+    reach : float, default 0.5
+        Largest gap between the disks of a candidate, in mean radii (0: no candidates).
+    scale : float, default 1
+        Factor on the listed radii.
+    error : float, optional
+        Standard error of a measured component, force; by default the one that makes χ² equal to its
+        degrees of freedom. Where two measurements of a contact differ by far more, half their
+        difference is added in quadrature.
+    reverse : bool, default False
+        Change the sign of f_t (programs differ).
+    repair : bool or float, default True
+        Repair errors in up to a tenth of the data (or in the given fraction); False: the first
+        error raises.
+    columns : mapping, optional
+        {name here: header or number in the files}, such as {"r": "diameter", "f_n": "5"}, for
+        columns that are not recognised.
+    flag : str, optional
+        Grains at walls are flagged in the files. "ignore" uses the grains at the boundary of the
+        frame instead, which are also used if nearly all grains are flagged; a note in the report
+        says so.
+    walls : str, optional
+        "open" (the balance of grains at walls is not required), "box", "annulus", "circle" or
+        "auto" (the best fit), found from the grains at walls or given with numbers
+        (`walls.read_outline`). By default contacts with walls count if the solver lists their
+        directions.
+    wall_forces : mapping, optional
+        {"right": (f_x, f_y, σ)}, forces of the grains on straight walls, measured by load cells.
+    most_grains : int, optional
+        Largest number of grains.
 
-    walls: "open" (the balance of grains at walls is not required), "box", "annulus", "circle" or
-    "auto" (the best fit), found from the grains at walls or given with numbers
-    (`walls.read_outline`). Grains at walls are flagged in the files. flag: "ignore" uses the grains
-    at the boundary of the frame instead, which are also used if nearly all grains are flagged; a
-    note in the report says so. By default contacts with walls count if the solver lists their
-    directions. wall_forces: {"right": (f_x, f_y, σ)}, forces of the grains on straight walls,
-    measured by load cells.
+    Returns
+    -------
+    Photoelastic
+        The report gives the repairs, by kind; how many inner grains cannot be balanced on the
+        listed contacts alone and with the candidates, with their total unbalance in mean measured
+        normal forces; and the result. Its notes are also InputWarnings.
 
-    The report gives the repairs, by kind; how many inner grains cannot be balanced on the listed
-    contacts alone and with the candidates, with their total unbalance in mean measured normal
-    forces; and the result. Its notes are also InputWarnings.
-
-    Raises InputError naming file and line.
+    Raises
+    ------
+    InputError
+        Naming file and line.
     """
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:

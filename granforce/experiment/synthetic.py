@@ -88,16 +88,42 @@ def synthetic_frame(
 ) -> SyntheticFrame:
     """A SyntheticFrame of a packing and its own forces, cut at the sides of its box.
 
-    noise: standard error of a component, in ⟨f_n⟩, independent on both sides of a contact. missed:
-    fraction of contacts that are not listed, weak ones first: a contact of force f is missed with
-    probability ∝ 1/(f + ⟨f_n⟩/2). false: listed pairs that are not contacts, as a fraction of the
-    true ones: the nearest other pairs, with forces of about 0.2 ⟨f_n⟩. blur: error of centres and
-    radii, in radii. walls: contacts through the sides of the box are listed as contacts with walls,
-    with their direction and force; False: grains there are only flagged. pixels: per unit of
-    length; newton: mean normal force. number: of the frame.
+    Parameters
+    ----------
+    packing : Packing
+        Disks, with forces.
+    noise : float, default 0.1
+        Standard error of a component, in ⟨f_n⟩, independent on both sides of a contact.
+    missed : float, default 0
+        Fraction of contacts that are not listed, weak ones first: a contact of force f is missed
+        with probability ∝ 1/(f + ⟨f_n⟩/2).
+    false : float, default 0
+        Listed pairs that are not contacts, as a fraction of the true ones: the nearest other pairs,
+        with forces of about 0.2 ⟨f_n⟩.
+    blur : float, default 0
+        Error of centres and radii, in radii.
+    walls : bool, default True
+        Contacts through the sides of the box are listed as contacts with walls, with their
+        direction and force; False: grains there are only flagged.
+    pixels : float, default 50
+        Per unit of length.
+    newton : float, default 0.01
+        Mean normal force.
+    number : int, default 1
+        Of the frame.
+    seed : int, default 0
+        Seed of the errors.
 
-    Raises InputError for values below 0 or beyond 10⁶⁰, and for a packing without forces or with
-    bodies other than disks.
+    Returns
+    -------
+    SyntheticFrame
+        Accepted by `read_pegs`, with the true forces.
+
+    Raises
+    ------
+    InputError
+        For values below 0 or beyond 10⁶⁰, and for a packing without forces or with bodies other
+        than disks.
     """
     refuse_shapes(packing, "photoelastic frames are made")
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):

@@ -100,7 +100,20 @@ def body(S: Ensemble) -> Body:
     half the angle of a groove), rounding moves far corners by a relative 10⁻¹⁴/(1 − μ/μ′): measured
     in grooves of 10° to 179°, they are right to 10⁻⁹ up to 1 − μ/μ′ = 10⁻⁵.
 
-    Raises InputError if S has more dimensions, or if forces are known.
+    Parameters
+    ----------
+    S : Ensemble
+        Of dimension h ≤ 3.
+
+    Returns
+    -------
+    Body
+        The network at its origin, its axes and corners, and rays along which S is unbounded.
+
+    Raises
+    ------
+    InputError
+        If S has more dimensions, or if forces are known.
     """
     if S.informed.any():
         raise InputError("gf.body does not accept known forces: leave them out")
@@ -122,10 +135,22 @@ def body(S: Ensemble) -> Body:
 
 @takes(Packing)
 def fall(packing: Packing, mu: float | None = None) -> Floats | None:
-    """The motion (N, 3) of the grains, velocity and r ω, that proves that nothing balances.
+    """The motion of the grains that proves that nothing balances.
 
     Loads do work in this motion, and no admissible contact force absorbs any: Aᵀu ≥ 0 in cone
-    coordinates (Farkas). Its largest entry is 1. None if S is not empty, or no proof was found.
+    coordinates (Farkas).
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    mu : float, optional
+        Friction coefficient, by default the packing's.
+
+    Returns
+    -------
+    (N, 3) array or None
+        Velocity and r ω; the largest entry is 1. None if S is not empty, or no proof was found.
     """
     whole = ensemble(packing, mu, prune=False)
     A, b, _ = whole.scaled_form

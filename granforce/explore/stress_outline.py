@@ -62,12 +62,28 @@ def stress_outline(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> StressOutline:
-    """The exact outline of the stresses that S can carry at its pressure; a StressOutline.
+    """The exact outline of the stresses that S can carry at its pressure.
 
-    angles: how many, evenly spaced from 0 on, or the angles themselves (k,). workers, progress,
-    cancel: as for `outline`. `stress_plane` gives the points of any networks.
+    `stress_plane` gives the points of any networks.
 
-    Raises InputError if the pressure is not prescribed, or if the whole stress is.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S, at a prescribed pressure.
+    angles : int or (k,) array, default 64
+        How many, evenly spaced from 0 on, or the angles themselves.
+    workers, progress, cancel
+        As for `outline`.
+
+    Returns
+    -------
+    StressOutline
+        The largest stress at each angle, and polygons inside and around the outline.
+
+    Raises
+    ------
+    InputError
+        If the pressure is not prescribed, or if the whole stress is.
     """
     if not isinstance(angles, (list, tuple, np.ndarray)):
         count = whole(angles, "the number of angles", 1, 4096)
@@ -97,9 +113,19 @@ def stress_outline(
 
 @takes(Ensemble)
 def stress_plane(ensemble: Ensemble, states: Floats) -> Floats:
-    """Points (…, 2) of the stresses of networks (…, N_c, 2): ((σ_xx − σ_yy)/2P, σ_xy/P).
+    """Points of the stresses of networks in the plane ((σ_xx − σ_yy)/2P, σ_xy/P).
 
-    NaN without forces.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    states : (…, N_c, 2) array
+        Networks, force.
+
+    Returns
+    -------
+    (…, 2) array
+        NaN without forces.
     """
     return plane_of(stress_of(ensemble.packing, ensemble.expand(states)))
 
@@ -113,12 +139,29 @@ def admissible_stress(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Floats:
-    """A stress (3,) that the contacts can carry at the packing's pressure, well inside the outline.
+    """A stress that the contacts can carry at the packing's pressure, well inside the outline.
 
-    σ_xx, σ_yy and σ_xy, force per length, as ``ensemble(packing, prescribed="stress", stress=…)``
-    takes them. workers, progress: as for `outline`. cancel() returning True raises Cancelled.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    workers, progress
+        As for `outline`.
+    cancel : callable, optional
+        Polled; returning True raises Cancelled.
 
-    Raises InputError as `stress_outline`.
+    Returns
+    -------
+    (3,) array
+        σ_xx, σ_yy and σ_xy, force per length, as ``ensemble(packing, prescribed="stress",
+        stress=…)`` takes them.
+
+    Raises
+    ------
+    InputError
+        As `stress_outline`.
+    Cancelled
+        If cancelled.
     """
     axes = stress_axes(ensemble)
     polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)

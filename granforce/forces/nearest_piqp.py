@@ -28,15 +28,28 @@ _AWAY = 1e-6
 def nearest_piqp(
     ensemble: Ensemble, start: Floats, *, tolerance: float = BALANCED, max_iterations: int = 200
 ) -> Relaxation:
-    """The point of S with the least Σ |F_c − F_start,c|².
+    """The point of S with the least Σ |F_c − F_start,c|², by PIQP.
 
-    start (N_c, 2), force. tolerance: of the solver's residuals and its duality gap, relative;
-    max_iterations: of interior points. Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n −
-    f_t/μ), in units of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
+    Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n − f_t/μ), in units of ⟨f_n⟩. Every
+    call sets up its own solver. A cached solver, updated with each start, would save a tenth to a
+    fifth of the time, but its rounding (1e-9 ⟨f_n⟩) depends on earlier calls, and the same start
+    would no longer give the same forces.
 
-    Every call sets up its own solver. A cached solver, updated with each start, would save a tenth
-    to a fifth of the time, but its rounding (1e-9 ⟨f_n⟩) depends on earlier calls, and the same
-    start would no longer give the same forces.
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    start : (N_c, 2) array
+        Force.
+    tolerance : float, default 10⁻¹⁰
+        Of the solver's residuals and its duality gap, relative.
+    max_iterations : int, default 200
+        Of interior points.
+
+    Returns
+    -------
+    Relaxation
+        ``converged`` is False where S is empty.
     """
     begin = time.perf_counter()
     tolerance = positive(tolerance, "tolerance", or_zero=True)

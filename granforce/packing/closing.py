@@ -79,6 +79,16 @@ def margin(packing: Packing) -> Margin:
     pair without force is a contact if its gap is below 10⁻⁹; gaps near this limit, on both sides,
     make the list of contacts uncertain. Soft or measured disks overlap, and their contacts have no
     margin.
+
+    Parameters
+    ----------
+    packing : Packing
+        Disks.
+
+    Returns
+    -------
+    Margin
+        Largest gap of a contact, and least gap of any other pair.
     """
     refuse_shapes(packing, "the margin is defined")
     if not len(packing.r):

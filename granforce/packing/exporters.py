@@ -27,11 +27,25 @@ def save_vtk(
 ) -> None:
     """Write a packing as two .vtp files (VTK XML PolyData), which ParaView opens.
 
-    grains: points with radius, number of contacts, load (F_x, F_y, 0) and torque. contacts: lines
-    from grain i along the branch to j, also across periodic sides, or to the wall if j is one; with
-    i, j, f_n, f_t, the force on j (a vector) and the gap as data of the lines, and f_n also at
-    their ends, for tubes. forces (N_c, 2): f_n, f_t, by default the packing's own. Lengths and
-    forces are in the packing's units. Raises InputError if a file cannot be written.
+    Lengths and forces are in the packing's units.
+
+    Parameters
+    ----------
+    packing : Packing
+        Disks.
+    grains : path
+        Points with radius, number of contacts, load (F_x, F_y, 0) and torque.
+    contacts : path
+        Lines from grain i along the branch to j, also across periodic sides, or to the wall if j is
+        one; with i, j, f_n, f_t, the force on j (a vector) and the gap as data of the lines, and
+        f_n also at their ends, for tubes.
+    forces : (N_c, 2) array, optional
+        f_n, f_t, by default the packing's own.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
     """
     refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts
@@ -72,11 +86,25 @@ def save_lammps(
 ) -> None:
     """Write a packing as two dumps of LAMMPS, which `read_lammps` reads back.
 
-    particles: ``dump custom`` with id, type, x, y and radius. contacts: ``dump local`` with atom1,
-    atom2, distance and, on atom1, the normal force fx, fy and the tangential force px, py. forces
-    (N_c, 2): f_n, f_t, by default the packing's own. A dump has no friction coefficient, no loads
-    (when it is read back, the loads balance the forces), no gaps and no walls: these become grains,
-    with a warning. Raises InputError if a file cannot be written.
+    A dump has no friction coefficient, no loads (when it is read back, the loads balance the
+    forces), no gaps and no walls: these become grains, with a warning.
+
+    Parameters
+    ----------
+    packing : Packing
+        Disks.
+    particles : path
+        ``dump custom`` with id, type, x, y and radius.
+    contacts : path
+        ``dump local`` with atom1, atom2, distance and, on atom1, the normal force fx, fy and the
+        tangential force px, py.
+    forces : (N_c, 2) array, optional
+        f_n, f_t, by default the packing's own.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
     """
     refuse_shapes(packing, "files for other programs are written")
     forces, c = _forces(packing, forces), packing.contacts

@@ -54,14 +54,35 @@ def evolution(
 ) -> tuple[xr.Dataset | None, list[tuple[int, str]]]:
     """Exact intervals of all snapshots, computed into the store at path or loaded from it.
 
-    numbers: of the snapshots, by default all. states: of a random walk from each, with this seed,
-    for η1 and η2; 0: none. workers, scheduler, progress: as for `scan.run`. Returns a dataset
-    (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact is a
-    pair of ids, NaN in snapshots without it) and SCALARS by frame (NaN if undefined: η1 and η2
-    without a walk, φ and P in an open box), whose attribute notes lists notes on each snapshot, or
-    None if no snapshot could be used; and (number, message) of the snapshots that failed.
+    Parameters
+    ----------
+    path : path
+        Folder of the store.
+    snapshots : Snapshots
+        From `open_lammps` or `open_mercury`.
+    numbers : sequence of int, optional
+        Of the snapshots, by default all.
+    states : int, default 0
+        Of a random walk from each, for η1 and η2; 0: none.
+    seed : int, default 0
+        Seed of the walks.
+    workers, scheduler, progress
+        As for `scan`.
 
-    Raises InputError if the store cannot be written.
+    Returns
+    -------
+    dataset : xr.Dataset or None
+        (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact
+        is a pair of ids, NaN in snapshots without it) and SCALARS by frame (NaN if undefined: η1
+        and η2 without a walk, φ and P in an open box); its attribute notes lists notes on each
+        snapshot. None if no snapshot could be used.
+    failed : list of tuple
+        (number, message) of the snapshots that failed.
+
+    Raises
+    ------
+    InputError
+        If the store cannot be written.
     """
     store = open_store(path)
     failed: list[tuple[int, str]] = []

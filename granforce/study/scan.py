@@ -4,6 +4,8 @@ Cells are independent and seeded, so a scan gives the same result for any number
 interrupted scan, or one that lost a worker, resumes.
 """
 
+from __future__ import annotations
+
 import logging
 import multiprocessing
 import os
@@ -89,18 +91,50 @@ def scan(
 ) -> tuple[list[dict[str, Any]], list[tuple[Parameters, str]]]:
     """Packings and walks for many μ and seeds, computed into the store at path or loaded from it.
 
-    mu: friction coefficients; for each, packings of n disks with the seeds 1 … seeds. packing:
-    other options of `pack`. states, walk_seed, chains: of each walk, as for `walk`. ensemble_mu:
-    friction of the cones, by default the packing's. relax: "nearest", "nearest_piqp",
-    "gauss_seidel" or "gauss_seidel_only". keep: number of states to store, by default all.
-    workers: processes on this machine; 1: this process. scheduler: address of a dask scheduler
-    whose workers see the same folder, to use instead. dtypes: {variable: type} with which to store
-    states, as {"states": "float32"}. progress(done, total) counts quarters of what is not stored.
+    Two and more workers are new processes: in a script, which must be a file, call it under ``if
+    __name__ == "__main__":``.
 
-    Returns a list of rows, as `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed,
-    packing_fraction, coordination, dimension h, eta1, eta2, eta3, …), and a list of (walk
-    parameters, error message). Raises InputError for wrong arguments. Two and more workers are new
-    processes: in a script, which must be a file, call it under ``if __name__ == "__main__":``.
+    Parameters
+    ----------
+    path : path
+        Folder of the store.
+    mu : float or sequence of float
+        Friction coefficients.
+    seeds : int, default 1
+        For each μ, packings with the seeds 1 … seeds.
+    n : int, default 400
+        Number of disks.
+    states, walk_seed, chains
+        Of each walk, as for `walk`.
+    ensemble_mu : float, optional
+        Friction of the cones, by default the packing's.
+    relax : str, default "nearest"
+        "nearest", "nearest_piqp", "gauss_seidel" or "gauss_seidel_only".
+    keep : int, optional
+        Number of states to store, by default all.
+    workers : int, default 2
+        Processes on this machine; 1: this process.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers see the same folder, to use instead.
+    dtypes : mapping, optional
+        {variable: type} with which to store states, as {"states": "float32"}.
+    progress : callable, optional
+        progress(done, total) counts quarters of what is not stored.
+    **packing
+        Other options of `pack`.
+
+    Returns
+    -------
+    rows : list of dict
+        As `pandas.DataFrame` and `figures.indeterminacy` take them (mu, seed, packing_fraction,
+        coordination, dimension h, eta1, eta2, eta3, …).
+    failed : list of tuple
+        (walk parameters, error message).
+
+    Raises
+    ------
+    InputError
+        For wrong arguments.
     """
     refuse_options(scan, packing, [*signature(kinds.PACKING.parameters).parameters][3:])
     seeds, mus = whole(seeds, "seeds", 1), [friction(one) for one in real_array(mu, "mu").ravel()]

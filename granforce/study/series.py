@@ -185,15 +185,37 @@ def infer_series(
     progress: Progress | None = None,
     **options: Any,
 ) -> Any:
-    """All frames inferred into the store at path, or loaded from it: (dataset, failed).
+    """All frames inferred into the store at path, or loaded from it.
 
-    frames: from `frames_of`. workers: processes; scheduler: address of a dask scheduler to use
-    instead. progress(done, total) counts frames. options: states (draws for each frame, at least 2,
-    or 0 for no error bars), seed and unmeasured as for `infer`, others as for `read_pegs`. The
-    dataset has a row for each frame; failed: (frame, message) of frames that failed, which are not
-    in the dataset.
+    Parameters
+    ----------
+    path : path
+        Folder of the store.
+    frames : sequence of Frame
+        From `frames_of`.
+    mu : float
+        Friction coefficient.
+    workers : int, default 2
+        Processes.
+    scheduler : str, optional
+        Address of a dask scheduler to use instead.
+    progress : callable, optional
+        progress(done, total) counts frames.
+    **options
+        states (draws for each frame, at least 2, or 0 for no error bars), seed and unmeasured as
+        for `infer`, others as for `read_pegs`.
 
-    Raises InputError if the store cannot be written, and for frames of another kind.
+    Returns
+    -------
+    dataset : xr.Dataset
+        A row for each frame.
+    failed : list of tuple
+        (frame, message) of frames that failed, which are not in the dataset.
+
+    Raises
+    ------
+    InputError
+        If the store cannot be written, and for frames of another kind.
     """
     for frame in frames:
         if not isinstance(frame, Frame):

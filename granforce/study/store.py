@@ -69,12 +69,25 @@ def default_path() -> Path:
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
     """The Store in a folder, which is created with the first saved entry if it is missing.
 
-    path: by default $GRANFORCE_CACHE, otherwise the user's cache folder. readonly: to read only,
-    which refuses a missing store. A folder without write permission can be opened; saving to it
-    raises InputError.
+    A folder without write permission can be opened; saving to it raises InputError.
 
-    Raises InputError for a file, for a folder with other contents, for one that cannot be created,
-    for a store of a newer schema unless readonly, and, if readonly, for a missing store.
+    Parameters
+    ----------
+    path : path, optional
+        By default $GRANFORCE_CACHE, otherwise the user's cache folder.
+    readonly : bool, default False
+        To read only, which refuses a missing store.
+
+    Returns
+    -------
+    Store
+        The store.
+
+    Raises
+    ------
+    InputError
+        For a file, for a folder with other contents, for one that cannot be created, for a store of
+        a newer schema unless readonly, and, if readonly, for a missing store.
     """
     path = _located(path)
     store = Store(path, readonly=readonly)

@@ -35,15 +35,32 @@ def read_blocks(
 ) -> Packing:
     """A Packing of rigid bodies from a file, as `blocks` makes it.
 
-    source: a path or an open file. CSV: a row for each corner, columns body (any label), x, y;
-    optionally r (above 0: the row is a disk), and density and fixed (0 or 1, or no and yes), alike
-    in all rows of a body. JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or
-    disk [x, y, r], and optionally density, fixed (true or false) and material, and in the object
-    "friction" of pairs of materials, [["stone", "wood", 0.4], …]. mu: friction coefficient of all
-    other contacts. density: mass per area of the bodies that have none in the file, by default 1.
-    tolerance: as for `blocks`. InputWarnings report pairs in doubt, which packing.info lists.
+    Parameters
+    ----------
+    source : path or open file
+        CSV: a row for each corner, columns body (any label), x, y; optionally r (above 0: the row
+        is a disk), and density and fixed (0 or 1, or no and yes), alike in all rows of a body.
+        JSON: an object {"bodies": […]} of objects with corners [[x, y], …] or disk [x, y, r], and
+        optionally density, fixed (true or false) and material, and in the object "friction" of
+        pairs of materials, [["stone", "wood", 0.4], …].
+    mu : float
+        Friction coefficient of all other contacts.
+    density : float, optional
+        Mass per area of the bodies that have none in the file, by default 1.
+    tolerance : float, optional
+        As for `blocks`.
 
-    Raises InputError naming the line or the body, NotJammedError if nothing balances the weights.
+    Returns
+    -------
+    Packing
+        InputWarnings report pairs in doubt, which info lists.
+
+    Raises
+    ------
+    InputError
+        Naming the line or the body.
+    NotJammedError
+        If nothing balances the weights.
     """
     file, text = read_text(source)
     if text.lstrip()[:1] in "{[":

@@ -91,17 +91,42 @@ def read_yade(
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
-    """A Packing from YADE's bodies and interactions (paths or open files).
+    """A Packing from YADE's bodies and interactions.
 
-    box: (L_x, L_y) of the plane, inf for an open direction; None: open. tilt: of the cell, whose
-    upper side begins at (tilt, L_y). columns: {name here: name in the files} for columns x, y, z,
-    r, id, id1, id2, fnx … fsz with other names. reverse: change the sign of shear forces.
+    Bodies that interact but are not listed are walls, if the list has ids. An InputWarning (also in
+    packing.info) reports how they are treated.
 
-    Bodies that interact but are not listed are walls, if the list has ids. Their forces on grains
-    become the grains' load or, with `walls`, contact forces: each wall is then one more grain,
-    "held" (its balance is not required, so it takes any force) or "pressing" (its load is its force
-    in the simulation). An InputWarning (also in packing.info) says so.
-    Raises InputError naming file and line.
+    Parameters
+    ----------
+    bodies, interactions : path or open file
+        The two lists.
+    mu : float
+        Friction coefficient.
+    box : (2,) array, optional
+        L_x, L_y of the plane, inf for an open direction; by default the set is open.
+    tilt : float, default 0
+        Of the cell, whose upper side begins at (tilt, L_y).
+    columns : mapping, optional
+        {name here: name in the files} for columns x, y, z, r, id, id1, id2, fnx … fsz with other
+        names.
+    walls : {"held", "pressing"}, optional
+        By default the walls' forces on grains become the grains' load. With `walls` they become
+        contact forces: each wall is then one more grain, "held" (its balance is not required, so it
+        takes any force) or "pressing" (its load is its force in the simulation).
+    reverse : bool, default False
+        Change the sign of shear forces.
+    most_grains : int, optional
+        Largest number of grains.
+
+    Returns
+    -------
+    Packing
+        With the forces of the simulation.
+
+    Raises
+    ------
+    InputError
+        Naming file and line.
     """
     cell = _cell(box, tilt)
     tables = _yade_bodies(bodies), _yade_links(interactions, bool(columns))
@@ -167,10 +192,26 @@ def read_mercury(
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
-    """A Packing from MercuryDPM's .data and .fstat (paths or open files).
+    """A Packing from MercuryDPM's .data and .fstat.
 
-    frame: number of the time step in the files, from 0; by default the last that is complete in
-    both. Other options as for `read_yade`. Raises InputError naming file and line.
+    Parameters
+    ----------
+    data, fstat : path or open file
+        The two files.
+    frame : int, optional
+        Number of the time step in the files, from 0; by default the last that is complete in both.
+    mu, box, tilt, walls, reverse, most_grains
+        As for `read_yade`.
+
+    Returns
+    -------
+    Packing
+        With the forces of the simulation.
+
+    Raises
+    ------
+    InputError
+        Naming file and line.
     """
     found = open_mercury(
         *(data, fstat, mu),
@@ -196,7 +237,18 @@ def open_mercury(
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Snapshots:
-    """The Snapshots in both files, by number; options as for `read_mercury`."""
+    """The Snapshots in both files, by number.
+
+    Parameters
+    ----------
+    data, fstat, mu, box, tilt, walls, reverse, most_grains
+        As for `read_mercury`.
+
+    Returns
+    -------
+    Snapshots
+        Its `read` gives the Snapshot of a number.
+    """
     mu, cell = friction(mu), _cell(box, tilt)
     steps, lost = _mercury_steps(data)
     contacts, times, cut = _mercury_contacts(fstat)

@@ -20,15 +20,27 @@ _EARLIER = {
 
 
 def read_known(source: Source) -> Known:
-    """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
+    """A Known from CSV with a column `contact` (numbers in the packing).
 
-    f_n, f_t: exact values; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as written by `granforce
-    intervals --out` (earlier versions: f_n_min, f_n_max, f_t_min, f_t_max). Forces are in the
-    packing's unit, which names may end with: ``f_n [packing]``. Columns `i` and `j`, if there are
-    any, are the grains of each contact, checked where the Known is used. Empty fields, nan,
-    infinite bounds and other columns are ignored. source: a path or an open file. Raises InputError
-    naming the offending line, also for an exact value outside its bounds, and for a column in
-    another unit.
+    Parameters
+    ----------
+    source : path or open file
+        Any of the columns f_n, f_t: exact values; f_n_low, f_n_high, f_t_low, f_t_high: bounds, as
+        written by `granforce intervals --out` (earlier versions: f_n_min, f_n_max, f_t_min,
+        f_t_max). Forces are in the packing's unit, which names may end with: ``f_n [packing]``.
+        Columns `i` and `j`, if there are any, are the grains of each contact, checked where the
+        Known is used. Empty fields, nan, infinite bounds and other columns are ignored.
+
+    Returns
+    -------
+    Known
+        For `ensemble`.
+
+    Raises
+    ------
+    InputError
+        Naming the offending line, also for an exact value outside its bounds, and for a column in
+        another unit.
     """
     table = _renamed(read_csv(source).in_packing_unit([*_COLUMNS, *_EARLIER]))
     contacts = table.whole("contact")

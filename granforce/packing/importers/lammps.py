@@ -113,23 +113,43 @@ def read_lammps(
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
-    """A Packing from a particle dump and a contact dump (paths or open files), in LAMMPS' units.
+    """A Packing from a particle dump and a contact dump, in LAMMPS' units.
 
-    particles: ``dump custom`` with id, x y (or xu yu, xs ys, xsu ysu) and radius (or diameter), in
-    any order. contacts: ``dump local`` with the two grains, their distance, normal and tangential
-    force on the first: columns named atom1 atom2 distance fx fy px py, or seven in this order and
-    possibly an index; if they are named, the distance, which is only a check, may be missing.
-    columns: {name here: name in the dumps} for columns with other names. Pairs without force are
-    neighbours, not contacts; pairs listed from both sides (newton off) count once.
+    Pairs without force are neighbours, not contacts; pairs listed from both sides (newton off)
+    count once. Grains are sorted by id. Coordinates are shifted so that the lower bounds of the box
+    are 0. The box may be tilted in the plane (xy). Directions that are not periodic are open;
+    unbalanced forces of grains become their load there.
 
-    frame: the timestep, by default the last that is complete in both files. reverse: change the
-    sign of tangential forces. Grains are sorted by id. Coordinates are shifted so that the lower
-    bounds of the box are 0. The box may be tilted in the plane (xy).
-    Directions that are not periodic are open; unbalanced forces of grains become their load there.
-    packing.info contains timestep, residual and violation (in ⟨f_n⟩), contacts_skipped
-    and notes, which are also InputWarnings. most_grains: largest number of grains.
+    Parameters
+    ----------
+    particles : path or open file
+        ``dump custom`` with id, x y (or xu yu, xs ys, xsu ysu) and radius (or diameter), in any
+        order.
+    contacts : path or open file
+        ``dump local`` with the two grains, their distance, normal and tangential force on the
+        first: columns named atom1 atom2 distance fx fy px py, or seven in this order and possibly
+        an index; if they are named, the distance, which is only a check, may be missing.
+    mu : float
+        Friction coefficient.
+    frame : int, optional
+        The timestep, by default the last that is complete in both files.
+    columns : mapping, optional
+        {name here: name in the dumps} for columns with other names.
+    reverse : bool, default False
+        Change the sign of tangential forces.
+    most_grains : int, optional
+        Largest number of grains.
 
-    Raises InputError naming file and line.
+    Returns
+    -------
+    Packing
+        info contains timestep, residual and violation (in ⟨f_n⟩), contacts_skipped and notes, which
+        are also InputWarnings.
+
+    Raises
+    ------
+    InputError
+        Naming file and line.
     """
     found = open_lammps(
         particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
@@ -148,7 +168,18 @@ def open_lammps(
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Snapshots:
-    """The Snapshots in both dumps, by timestep; options as for `read_lammps`."""
+    """The Snapshots in both dumps, by timestep.
+
+    Parameters
+    ----------
+    particles, contacts, mu, columns, reverse, most_grains
+        As for `read_lammps`.
+
+    Returns
+    -------
+    Snapshots
+        Its `read` gives the Snapshot of a number.
+    """
     mu = friction(mu)
     first, second = read_dump(particles), read_dump(contacts)
     steps = [step for step in first.at if step in second.at]

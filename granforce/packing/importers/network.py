@@ -160,16 +160,28 @@ def find(packing: Packing, **info: Any) -> Packing:
 
 @takes(Packing)
 def report(packing: Packing) -> dict[str, Any]:
-    """Properties of a packing, as a dict of plain numbers (None if a quantity is undefined).
+    """Properties of a packing, as plain numbers.
 
-    grains: those whose balance is required; grains_left_open: all others, such as walls.
-    backbone_grains: grains that can carry force; rattlers: grains that cannot. Lengths are in
-    largest radii (`Packing.r`), residual and violation of the packing's own network in ⟨f_n⟩.
-    mean_normal_force: ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure.
-    largest_contact_gap, least_other_gap: the `margin` of its contacts, undefined for soft disks
-    (overlaps beyond 10⁻⁵ of the largest radius) and for bodies of other shapes.
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
 
-    Raises NotJammedError if no admissible network exists.
+    Returns
+    -------
+    dict
+        grains: those whose balance is required; grains_left_open: all others, such as walls.
+        backbone_grains: grains that can carry force; rattlers: grains that cannot. Lengths are in
+        largest radii (`Packing.r`), residual and violation of the packing's own network in ⟨f_n⟩.
+        mean_normal_force: ⟨f_n⟩ (`Ensemble.force_scale`), in the packing's unit like the pressure.
+        largest_contact_gap, least_other_gap: the `margin` of its contacts, undefined for soft disks
+        (overlaps beyond 10⁻⁵ of the largest radius) and for bodies of other shapes. Quantities that
+        are undefined are None.
+
+    Raises
+    ------
+    NotJammedError
+        If no admissible network exists.
     """
     ens = ensemble(packing)
     loaded = bool(packing.forces.any())

@@ -40,12 +40,27 @@ def load_packing(
 ) -> Packing:
     """The Packing in an NPZ file, its contacts as they are.
 
-    source: a path or an open binary file. Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if
-    none), mu, i, j, nx, ny, branch, fn, ft; optionally seed, load, tilt, arm_i, arm_j and info
-    (JSON); friction_ratio (N_c,), friction of each contact over mu; for bodies other than disks
-    also levers, gap, corners, sides, mass and inertia.
-    unpacked: most bytes of all arrays together; most_grains: largest number of grains.
-    Raises InputError naming the error.
+    Parameters
+    ----------
+    source : path or open file
+        Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
+        optionally seed, load, tilt, arm_i, arm_j and info (JSON); friction_ratio (N_c,), friction
+        of each contact over mu; for bodies other than disks also levers, gap, corners, sides, mass
+        and inertia.
+    unpacked : int, default 10⁹
+        Most bytes of all arrays together.
+    most_grains : int, optional
+        Largest number of grains.
+
+    Returns
+    -------
+    Packing
+        As saved.
+
+    Raises
+    ------
+    InputError
+        Naming the error.
     """
     opened = hasattr(source, "read")
     name = str(getattr(source, "name", "the given file")) if opened else path_text(source)
@@ -66,10 +81,18 @@ def load_packing(
 def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
     """Write a packing as NPZ; `load_packing` reads it back exactly.
 
-    target: a path, which is written completely or not at all, or an open binary file.
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    target : path or open file
+        A path ending with .npz, which is written completely or not at all, or an open binary file.
 
-    Raises InputError if info has other values than numbers and strings, for a path that does not
-    end with .npz, or on a write error.
+    Raises
+    ------
+    InputError
+        If info has other values than numbers and strings, for a path that does not end with .npz,
+        or on a write error.
     """
     if not hasattr(target, "write"):
         path = expanded(target)

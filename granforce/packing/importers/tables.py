@@ -59,25 +59,53 @@ def read_table(
 ) -> Packing:
     """A Packing from a table of grains and, optionally, a table of contacts.
 
-    Each is a CSV file (a path or an open file) or a pandas DataFrame.
+    Parameters
+    ----------
+    grains : path, open file or DataFrame
+        CSV with columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and
+        open, 1 if the balance of a grain is not required and 0 otherwise.
+    contacts : path, open file or DataFrame, optional
+        Columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny, length
+        (otherwise nearest images are joined) and f_n, f_t (or fn, ft). Without contacts, grains
+        closer than the tolerance touch.
+    mu : float
+        Friction coefficient.
+    box : (2,) array, optional
+        L_x, L_y, inf for an open direction; by default the set is open.
+    tilt : float, default 0
+        Of the cell, whose upper side begins at (tilt, L_y).
+    columns : mapping, optional
+        {name here: name in the files} for columns with other names.
+    forces : bool, optional
+        Whether to read f_n, f_t, by default if present; they then determine the pressure (in an
+        open set: the loads). Without forces, the network nearest to equal normal forces at the
+        pressure (in an open set: under the loads) is computed.
+    reverse : bool, default False
+        Change the sign of f_t.
+    pressure : float, optional
+        P0, force per length; by default 1.
+    walls : str or (k, 4) array, optional
+        "floor", "box" or segments, as for `from_disks`; only without forces.
+    gravity : float, default 0
+        As for `from_disks`; only without forces.
+    tolerance : float, optional
+        In largest radii, by default 10⁻⁶.
+    most_grains : int, optional
+        Largest number of grains.
 
-    grains: columns x, y, r; optionally id; fx, fy, torque (external load in an open set); and open,
-    1 if the balance of a grain is not required and 0 otherwise. contacts: columns i, j (ids, or row
-    numbers from 0 without an id column); optionally nx, ny, length (otherwise nearest images are
-    joined) and f_n, f_t (or fn, ft). Without contacts, grains closer than tolerance (in largest
-    radii, by default 10⁻⁶) touch.
-    box: (L_x, L_y), inf for an open direction; None: open. tilt: of the cell, whose upper side
-    begins at (tilt, L_y). columns: {name here: name in the files} for columns with other names.
-    forces: whether to read f_n, f_t, by default if present; they then determine the pressure (in an
-    open set: the loads). reverse: change the sign of f_t. Without forces, the network nearest to
-    equal normal forces at the pressure (by default 1; in an open set: under the loads) is computed.
-    walls ("floor", "box" or segments) and gravity are for tables without forces, as in
-    `from_disks`. most_grains: largest number of grains. InputWarnings, whose texts are also in
-    packing.info["notes"], report forces that do not balance, overlaps, and pairs in doubt, which
-    packing.info["nearly_touching"] lists [i, j, gap]: gaps within a factor of 100 of the tolerance
-    and below 0.1, and far above those of other contacts.
+    Returns
+    -------
+    Packing
+        InputWarnings, whose texts are also in info["notes"], report forces that do not balance,
+        overlaps, and pairs in doubt, which info["nearly_touching"] lists [i, j, gap]: gaps within a
+        factor of 100 of the tolerance and below 0.1, and far above those of other contacts.
 
-    Raises InputError naming file and line, NotJammedError if no network exists.
+    Raises
+    ------
+    InputError
+        Naming file and line.
+    NotJammedError
+        If no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     if tolerance is None:
