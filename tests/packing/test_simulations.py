@@ -195,6 +195,12 @@ def test_a_series_leaves_out_empty_frames_and_says_so(name, tmp_path, capsys):
     assert re.search("time ?step 0 has no (atoms|particles): there is 1", capsys.readouterr().err)
 
 
+def test_a_comment_without_an_end_cuts_off_no_contact():
+    data, fstat = some_empty("mercury", ("", "", "contacts"))
+    found = read_mercury(*given(data, fstat.rstrip("\n")), MU, frame=1, box=(3, 3))
+    assert found.pressure == pytest.approx(2.0)
+
+
 def test_a_single_frame_that_is_cut_off_is_refused():
     text = particles(100)
     with pytest.raises(InputError, match="8 rows, but 9 are announced; is the file cut off"):

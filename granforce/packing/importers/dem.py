@@ -471,7 +471,7 @@ def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str],
             rows.append((number, line.replace(",", " ").split()))
     if not rows:
         raise InputError(f"{name}: no line with numbers")
-    return name, rows, comments, text.endswith("\n")
+    return name, rows, comments, text.endswith("\n") or line.lstrip().startswith("#")
 
 
 def _yade_links(source: Source, named: bool) -> Table:
