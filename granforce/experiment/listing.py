@@ -267,7 +267,7 @@ def read_frames(
 
 
 def _fitting(grains: Sequence[Columns], contacts: Sequence[Columns]) -> TextFrames:
-    """The first readings of both files by which contacts join neighbours, or else the first.
+    """The readings of both files by which most contacts join neighbours, or else the first.
 
     If the grains have no frames, a third column of 0 and 1 of the contacts is a flag.
     """
@@ -276,8 +276,9 @@ def _fitting(grains: Sequence[Columns], contacts: Sequence[Columns]) -> TextFram
         for one in grains
         for two in sorted(contacts, key=lambda two: _SLIDING not in two.values and not one.framed)
     ]
-    fitting = [pair for pair in pairs if len(pairs) == 1 or _fit(*pair) >= _FITS]
-    one, two = (fitting or pairs)[0]
+    joined = [_joined(*pair) for pair in pairs] if len(pairs) > 1 else [1]
+    fitting = [pair for pair, count in zip(pairs, joined, strict=True) if count]
+    one, two = pairs[joined.index(max(joined))]
     first = two.values["id1"]
     if len(fitting) != 1 and _SLIDING in two.values and len(np.unique(first)) == 1 < len(first):
         raise InputError(
@@ -288,13 +289,14 @@ def _fitting(grains: Sequence[Columns], contacts: Sequence[Columns]) -> TextFram
     return _with_frames(one, two)
 
 
-def _fit(grains: Columns, contacts: Columns) -> float:
-    """Fraction of the contacts that join neighbours in the last frame, with any order of ids."""
+def _joined(grains: Columns, contacts: Columns) -> int:
+    """Number of contacts in the last frame; 0 if too few join neighbours, with any order of ids."""
     try:
         listing = _with_frames(grains, contacts).listing()
     except InputError:
-        return 0.0
-    return max(listing.fit, *(other.fit for _, _, other in listing.renumbered()))
+        return 0
+    fit = max(listing.fit, *(other.fit for _, _, other in listing.renumbered()))
+    return len(listing.ends) if fit >= _FITS else 0
 
 
 def _by_name(columns: Mapping[str, str]) -> dict[str, str]:

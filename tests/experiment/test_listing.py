@@ -220,6 +220,19 @@ def test_a_third_column_of_zeros_and_ones_is_a_flag(made, taken, flag, ids):
     assert "id1, id2, flag (not used), tangential, normal" in found.report["columns"]
 
 
+@pytest.mark.parametrize(
+    "number, first, marked", [(0, 0, lambda k: k == 5), (1, 1, lambda k: k != 5)]
+)
+def test_a_flag_is_no_grain_where_few_contacts_happen_to_fit(made, taken, number, first, marked):
+    """Grains of one frame; of contacts without frames, the first grain is no frame."""
+    grains, rows = made
+    ids = {row[1]: k + first for k, row in enumerate(grains)}
+    flagged = [
+        [ids[row[1]], ids[row[2]], int(marked(k)), *row[3:]] for k, row in enumerate(sorted(rows))
+    ]
+    same(read([[number, ids[row[1]], *row[2:]] for row in grains], flagged), taken)
+
+
 def test_frames_are_no_flag():
     """Two frames 0 and 1, in which grain 1 takes part in every contact."""
     grains = [[f, k, 2.0 * k, 0.0, 1.0, 0] for f in (0, 1) for k in range(3)]
