@@ -145,7 +145,7 @@ def contact_labels(packing: Packing, contacts: Integers | None = None) -> dict[s
     every, at = packing.contacts, packing.contact_points[contacts]
     point = {"units": LENGTH, "long_name": "point of contact"}
     normal = {"units": "1", "long_name": "unit normal from i to j"}
-    wall = packing.are_walls[np.stack([every.i, every.j])].any(axis=0)[contacts]
+    wall = {"long_name": "1 where i or j is a wall or a fixed body, else 0"}
     return {
         "contact": contacts,
         "i": ("contact", every.i[contacts], {"long_name": "first grain"}),
@@ -154,7 +154,7 @@ def contact_labels(packing: Packing, contacts: Integers | None = None) -> dict[s
         "y": ("contact", at[:, 1], point),
         "n_x": ("contact", every.normal[contacts, 0], normal),
         "n_y": ("contact", every.normal[contacts, 1], normal),
-        "wall": ("contact", wall.astype(np.int64), {"long_name": "1 where j is a wall, else 0"}),
+        "wall": ("contact", packing.touch_walls[contacts].astype(np.int64), wall),
     }
 
 

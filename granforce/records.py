@@ -198,6 +198,11 @@ class Packing(NamedTuple):
         return walls | fixed if self.shapes is not None else walls
 
     @property
+    def touch_walls(self) -> Mask:
+        """Which contacts (N_c,) are with `are_walls`."""
+        return self.are_walls[np.stack([self.contacts.i, self.contacts.j])].any(axis=0)
+
+    @property
     def walls(self) -> Floats:
         """Ends of the walls (k, 4), length; none if only their contacts with grains are known."""
         ends = self.info.get("walls")  # some importers count walls

@@ -8,7 +8,7 @@ import xarray as xr
 
 from granforce import measures
 from granforce.records import Packing
-from granforce.types import Floats, Integers
+from granforce.types import Floats, Integers, Mask
 
 from . import geometry
 
@@ -31,6 +31,7 @@ class Replay(NamedTuple):
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     contact_normals: Floats  # (N_c, 2) n, from grain i to j
     contact_points: Floats  # (N_c, 2) at their image in the cell, length
+    at_walls: Mask  # (N_c,) contacts with walls or fixed bodies
     friction: Floats  # (N_c,) friction coefficients
     force_scale: float  # ⟨f_n⟩, force
     given: bool  # whether the original network came with the packing; otherwise it was computed
@@ -145,6 +146,7 @@ def _replay(
         backbone=backbone,
         contact_normals=packing.contacts.normal[backbone],
         contact_points=packing.contact_points[backbone],
+        at_walls=packing.touch_walls[backbone],
         friction=packing.contacts.picked(backbone).friction(numbers["summary"]["mu"]),
         force_scale=scale,
         given=packing.info.get("forces") != "found",

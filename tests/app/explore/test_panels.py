@@ -50,6 +50,7 @@ from app.widgets import label_places
 from app.widgets.file_drop import Dropper
 from app.widgets.plot_style import lines
 from granforce import measures
+from granforce.labelled import CONTACT_LABELS
 from granforce.measures import statistics
 from granforce.packing.neighbours import find_pairs
 from granforce.packing.scenes import scene
@@ -596,15 +597,21 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
         for k, axis in enumerate("xy"):
             written = column[f"{name}_{axis}" if name else axis]
             np.testing.assert_allclose(written, values[place, k], rtol=1e-8, atol=1e-8)
-    assert "wall" not in column
+    assert not column["wall"].any()
 
 
-def test_the_table_of_contacts_says_which_j_are_walls():
-    packing = gf.scene("box")
+@pytest.mark.parametrize("name", ["box", "arch"])
+def test_the_table_of_contacts_says_which_are_with_walls_like_the_library(name):
+    packing = gf.scene(name)
     S = gf.ensemble(packing)
     columns = files.contacts(first_replay(S, 1), None, 0)
-    np.testing.assert_array_equal(columns["wall"], packing.contacts.j[S.index] >= 2)
-    assert columns["wall"].any() and "wall" in files.COLUMNS
+    table = gf.to_dataframe(gf.intervals(S), S)
+    for column in CONTACT_LABELS:
+        np.testing.assert_allclose(columns[column], table[column])
+    fixed = packing.are_walls
+    ends = fixed[packing.contacts.i] | fixed[packing.contacts.j]
+    np.testing.assert_array_equal(columns["wall"], ends[S.index])
+    assert columns["wall"].any()
 
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])

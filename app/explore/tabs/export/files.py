@@ -43,11 +43,9 @@ def contacts(
         normal, tangential = held.forces.T
     first = np.unique(replay.links.contact, return_index=True)[1]
     columns = {"contact": replay.backbone, "i": replay.links.i[first], "j": replay.links.j[first]}
-    behind = columns["j"] >= replay.bodies
-    if behind.any():
-        columns["wall"] = behind.astype(int)
     columns["x"], columns["y"] = replay.contact_points.T
     columns["n_x"], columns["n_y"] = replay.contact_normals.T
+    columns["wall"] = replay.at_walls.astype(int)
     known = [] if knowledge is None else [one.contact for one in knowledge.known]
     if known:
         columns["known"] = np.isin(np.arange(len(replay.backbone)), known).astype(int)
@@ -89,11 +87,11 @@ COLUMNS = {
     "contact": "number of the contact in the packing",
     "i": "number of the first disk; the normal n points from i to j",
     "j": "number of the second disk",
-    "wall": "1 where j is the number of a wall or a fixed support, else 0",
     "x": "place of the contact, in the unit of length of the packing",
     "y": "place of the contact, in the unit of length of the packing",
     "n_x": "component of the normal n",
     "n_y": "component of the normal n",
+    "wall": "1 where i or j is a wall or a fixed body, else 0",
     "known": "1 where the normal force is held, else 0",
     "f_n_original": "normal force as packed",
     "f_t_original": "tangential force as packed, along t = (-n_y, n_x)",
