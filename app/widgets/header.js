@@ -2,6 +2,7 @@
 
 import { button, createElement } from "../browser/dom.js"
 import { copyButton } from "../browser/clipboard.js"
+import { keepFocus } from "../browser/kept_focus.js"
 import { lastChapter, lastView } from "../browser/local_storage.js"
 
 const HALF = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 2a10 10 0 1 0 0 20 10 10 0 0 0 0-20zm0 2v16a8 8 0 0 1 0-16z"/></svg>'
@@ -41,7 +42,11 @@ export function render({ model }) {
     event.preventDefault()
   }
   window.addEventListener("keydown", key)
-  model.on("remove", () => window.removeEventListener("keydown", key))
+  const leaveFocus = keepFocus()
+  model.on("remove", () => {
+    window.removeEventListener("keydown", key)
+    leaveFocus()
+  })
   model.on(["dark", "door"], show)
   show()
   return root

@@ -2,6 +2,7 @@
 // the chosen option of widgets.
 
 import { createElement } from "../browser/dom.js"
+import { focused } from "../browser/kept_focus.js"
 import { plain } from "../browser/to_object.js"
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
@@ -21,13 +22,6 @@ export function render({ model }) {
     const value = words(node, "option:checked"), label = words(node, "label, legend, .name")
     const keys = [value, label, node.textContent.trim()].map((text) => labels[text])
     return [...new Set(keys.filter(Boolean))].slice(0, 2)
-  }
-
-  /** The element with the focus, inside any shadow root. */
-  function focused() {
-    let node = document.activeElement
-    while (node?.shadowRoot?.activeElement) node = node.shadowRoot.activeElement
-    return node
   }
 
   /** From an element outwards, through shadow roots. */
@@ -125,7 +119,7 @@ export function render({ model }) {
 
   function typed(event) {
     const node = focused()
-    if (!/^(Tab|Arrow.*)$/.test(event.key) || !node?.matches(":focus-visible")) return hide()
+    if (!/^(Tab|Arrow.*)$/.test(event.key) || !node.matches(":focus-visible")) return hide()
     const [word, keys] = termsAt(outwards(node))
     if (!word) hide()
     else if (word !== at) show(word, keys)
