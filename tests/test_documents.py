@@ -255,11 +255,11 @@ def test_what_the_study_tells_is_what_is_shipped(document, study, tmp_path):
     assert copied.read_text() == text(document)
 
 
-def changed(told, statement, sampler="", **numbers):
+def changed(told, id, case="", **numbers):
     """The claims and findings with other numbers for one of them."""
     return [
         [
-            row | numbers if (row["statement"], row["sampler"]) == (statement, sampler) else row
+            row | numbers if (row["id"], row["sampler"] or row["span"]) == (id, case) else row
             for row in told[name]
         ]
         for name in ("claims", "findings")
@@ -267,37 +267,27 @@ def changed(told, statement, sampler="", **numbers):
 
 
 @pytest.mark.parametrize(
-    ("statement", "sampler", "numbers", "told_then"),
+    ("id", "case", "numbers", "told_then"),
     [
+        ("eta3-turns", "exact", {"verdict": "undecided"}, "^Whether the exact intervals"),
+        ("eta2-turns", "uniform", {"verdict": "reproduced"}, r"then falls for [^.;]*uniform"),
+        ("exact-peak", "", {"high": 4.0}, "longest at one friction coefficient"),
+        ("extent-correlation", "intermediate", {"low": -0.1}, "Whether strong contacts"),
+        ("relative-correlation", "intermediate", {"high": 0.1}, "whether they are shorter"),
+        ("part-of-load", "intermediate", {"high": 1.1}, None),
+        ("exact-peak", "", {"verdict": "too few data"}, None),
         (
-            "η3(μ) is not monotonic",
-            "exact",
-            {"verdict": "undecided"},
-            "^Whether the exact intervals",
-        ),
-        (
-            "η2(μ) is not monotonic",
-            "uniform",
-            {"verdict": "reproduced"},
-            r"then falls for [^.;]*uniform",
-        ),
-        (highlights.PEAK, "", {"high": 4.0}, "longest at one friction coefficient"),
-        (highlights.STRONG, "", {"low": -0.1}, "Whether strong contacts have longer"),
-        (highlights.WEAK, "", {"high": 0.1}, "whether they are shorter relative"),
-        ("⟨F_crit⟩ over ⟨limit load⟩, intermediate μ", "", {"high": 1.1}, None),
-        (highlights.PEAK, "", {"verdict": "too few data"}, None),
-        (
-            "F_crit rises with η",
+            "critical-force-rises",
             "exact",
             {"verdict": "too few data"},
             "correlation is [^x]*with η2",
         ),
     ],
 )
-def test_findings_say_no_more_than_their_numbers(study, statement, sampler, numbers, told_then):
+def test_findings_say_no_more_than_their_numbers(study, id, case, numbers, told_then):
     table, told = study
     before = highlights.highlights(table, told["claims"], told["findings"])
-    after = highlights.highlights(table, *changed(told, statement, sampler, **numbers))
+    after = highlights.highlights(table, *changed(told, id, case, **numbers))
     if told_then is None:
         assert len(after) == len(before) - 1
     else:
@@ -307,7 +297,8 @@ def test_findings_say_no_more_than_their_numbers(study, statement, sampler, numb
 
 def test_the_readme_names_only_claims_that_are_contradicted(study):
     table, told = study
-    words = [name.replace(": ", ", ") for name in documents.NAMED]
+    statements = {claim["id"]: claim["statement"] for claim in told["claims"]}
+    words = [statements[name].replace(": ", ", ") for name in documents.NAMED]
     claims_and_findings = told["claims"], told["findings"]
     assert all(word in documents.headlines(table, *claims_and_findings) for word in words)
     fewer = changed(told, documents.NAMED[0], "gauss_seidel", verdict="undecided")
@@ -317,11 +308,11 @@ def test_the_readme_names_only_claims_that_are_contradicted(study):
 
 def test_the_claims_are_those_of_the_shipped_study(study):
     table, told = study
-    known = {(claim["statement"], claim["sampler"]): claim for claim in told["claims"]}
+    known = {(claim["id"], claim["sampler"]): claim for claim in told["claims"]}
     families = {claims.agreement: "nearest", claims.maximum: "exact", claims.coordination: ""}
     for family, sampler in families.items():
         for claim in family(table, sampler):
-            shipped = known[claim.statement, sampler]
+            shipped = known[claim.id, sampler]
             assert claim.verdict == shipped["verdict"]
             assert claim.value == pytest.approx(shipped["value"], rel=1e-6)
 

@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import outside
 from granforce.records import InputError
 
 DATA = Path(__file__).resolve().parents[2] / "data"
-PEAK = "(μ) is largest near μ = "  # in a claim, before the paper's value
+PEAKS = ("eta1-peak", "eta2-peak", "eta3-peak")  # claims
 
 _reading = threading.Lock()
 
@@ -53,9 +53,7 @@ def claims(figure: int | None = None) -> list[dict[str, Any]]:
 
 def maxima() -> list[dict[str, Any]]:
     """The claims about the μ at which each η is largest, as nearest-network walks have it."""
-    return [
-        claim for claim in claims(1) if PEAK in claim["statement"] and claim["sampler"] == "nearest"
-    ]
+    return [claim for claim in claims(1) if claim["id"] in PEAKS and claim["sampler"] == "nearest"]
 
 
 def rows(*parts: str) -> pd.DataFrame:

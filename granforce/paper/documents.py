@@ -24,7 +24,7 @@ from scipy import stats
 
 from granforce.measures import statistics
 from granforce.paper import plan as plans
-from granforce.paper.claims import OUTSIDE, TOPICS
+from granforce.paper.claims import TOPICS
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import (
     RANGES,
@@ -42,12 +42,11 @@ from granforce.paper.claims.outcomes import (
     counted,
     decided,
     decisive,
-    judged_number,
-    ranges,
     score,
 )
-from granforce.paper.claims.verdicts import FEW, LOWERED, MISSING, PRL, UNMEASURED
+from granforce.paper.claims.verdicts import FEW, MISSING, PRL, UNMEASURED
 from granforce.paper.drawings import CAPTIONS, paper_sampler
+from granforce.paper.findings import DEPARTURE
 from granforce.paper.formatting import (
     NOTHING,
     between,
@@ -70,17 +69,12 @@ FIGURES = "../../../data/figures"  # relative to the results page
 SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions, among claims
 TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
 HEADLINES = 5  # highlights in the README
-NAMED = (  # claims that the README names if they are contradicted
-    "η ∝ μ as μ → 0: packings made by contact dynamics",
-    "η3 does not depend on how networks are sampled",
-    "corr(f_n, ΔF_n) vanishes at large μ",
-)
+# Claims that the README names if they are contradicted.
+NAMED = ("small-friction-dynamic", "eta3-of-samples", "correlation-vanishes")
 _CLAIM_HEADS = ("claim, and the number judged", "verdict", "value", "range", "others")
 UNBROKEN = "\u00a0…\u00a0"  # of a range, in narrow columns
 _NOTHING = (MISSING, UNMEASURED)  # verdicts without a number
 _SCARCE = (FEW, *_NOTHING)  # verdicts for want of data
-# Findings too numerous for a table; `claims.json` contains them.
-_LONG = "departure of P("
 _HEADS = {
     "gauss_seidel": "paper's walk, to 10⁻³",
     "gauss_seidel_1e-4": "paper's walk, to 10⁻⁴",
@@ -464,13 +458,14 @@ def _apart(apart: Floats) -> _Apart | None:
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """The first highlights as a list, and those claims of NAMED that are contradicted."""
     chosen = [one.sentence for one in highlights(table, claims, findings)[:HEADLINES]]
-    verdicts = {claim["statement"]: claim["verdict"] for claim in decided(claims)}
-    named = [name for name in NAMED if verdicts.get(name) in OUTCOMES["contradicted"]]
-    if named:
-        sources = {claim["statement"]: claim["source"] for claim in decided(claims)}
-        words = "; ".join(
-            name.replace(": ", ", ") + " (the letter)" * (sources[name] == PRL) for name in named
-        )
+    known = {
+        claim["id"]: claim["statement"].replace(": ", ", ")
+        + " (the letter)" * (claim["source"] == PRL)
+        for claim in decided(claims)
+        if claim["verdict"] in OUTCOMES["contradicted"]
+    }
+    words = "; ".join(known[name] for name in NAMED if name in known)
+    if words:
         chosen.append(f"Among the claims that the study contradicts are (in our words): {words}.")
     return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
 
@@ -499,7 +494,7 @@ def finding_table(findings: Rows) -> str:
     """Findings, topic by topic: those at three ranges of μ in one row, all others below."""
     topics: dict[str, list[dict[str, Any]]] = {}
     for finding in findings:
-        if not finding["statement"].startswith(_LONG):
+        if finding["id"] != DEPARTURE:
             topics.setdefault(finding["source"], []).append(finding)
     return "\n".join(f"**{topic}**\n\n{_topic(rows)}" for topic, rows in topics.items())
 
@@ -509,12 +504,10 @@ def _topic(findings: Rows) -> str:
     ranged: dict[str, dict[str, str]] = {}
     others = []
     for finding in findings:
-        statement, number = finding["statement"], _number(finding)
+        statement, word, number = finding["statement"], finding["span"], _number(finding)
         number += f": {FEW}" if number and finding["verdict"] == FEW else ""
-        for word, _ in RANGES:
-            if statement.endswith(f", {word} μ"):
-                ranged.setdefault(statement.removesuffix(f", {word} μ"), {})[word] = number
-                break
+        if word:
+            ranged.setdefault(statement.removesuffix(f", {word} μ"), {})[word] = number
         else:
             others.append([statement, number])
     words = [word for word, _ in RANGES]
@@ -633,7 +626,7 @@ def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
     for by_sampler in by_claim(of_figure).values():
         claim = decisive(by_sampler)
         lines.append(_claim_line(claim, by_sampler, above))
-        above = _main(claim), judged_number(claim)
+        above = _main(claim), claim["number"]
     name, made = f"figure{figure}", markdown.table(_CLAIM_HEADS, lines)
     if name not in SHOWN:
         return made
@@ -650,28 +643,22 @@ def _claim_line(
     claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]], above: tuple[str, str]
 ) -> list[str]:
     """A claim in the columns of _CLAIM_HEADS, without what repeats the line above it."""
-    statement, number = _main(claim), judged_number(claim)
+    statement, number = _main(claim), claim["number"]
     letter = f" ({PRL})" if claim["source"] == PRL else ""
     words = claim["statement"] + letter
     if statement == above[0]:
         words = f"↳ {claim['variant'].lstrip(',: ')}"
     place = f"μ = {claim['mu']:g}, " if claim["mu"] is not None else ""
     size = f"{place}n = {claim['packings']}" if claim["packings"] else ""
-    good, fair = ranges(claim)
+    lowered = f" ({SYMBOLS[claim['before']]}†)" if claim["before"] else ""
     cells = [
         words if (statement, number) == above else f"{words}<br><small>{number}</small>",
-        f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}{_lowered(claim)}",
+        f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}{lowered}",
         f"{_number(claim)}<br><small>{size}</small>",
-        good + (f"<br><small>({fair})</small>" if fair else ""),
+        claim["good"] + (f"<br><small>({claim['fair']})</small>" if claim["fair"] else ""),
         "<br>".join(_by_others(claim, by_sampler)),
     ]
     return [cell.replace(" … ", UNBROKEN) for cell in cells]
-
-
-def _lowered(claim: dict[str, Any]) -> str:
-    """The verdict that the interval alone would give, if it was lowered, as " (symbol†)"."""
-    before, lowered, _ = claim["why"].partition(LOWERED)
-    return f" ({SYMBOLS[before]}†)" if lowered else ""
 
 
 def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
@@ -685,9 +672,9 @@ def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> 
 
 def _beyond_notes(claims: Rows) -> list[str]:
     """Where the networks of each sampler leave S, in sentences."""
-    beyond = {claim["sampler"]: claim["why"].partition(OUTSIDE)[2] for claim in claims}
+    beyond = {c["sampler"]: [f"{mu:g}" for mu in c["outside"]] for c in claims}
     return [
-        f"At μ = {listed(beyond[name].split(', '))}, networks ({_HEADS[name]}) are not judged: "
+        f"At μ = {listed(beyond[name])}, networks ({_HEADS[name]}) are not judged: "
         "they leave S by more than the length of the exact intervals.\n"
         for name in _used(claims)
         if beyond.get(name)

@@ -6,6 +6,7 @@ Student's interval of their mean; for other numbers see `_trend` and `_finding`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ WORDS = {
     "exact": "exact",
 }
 WALKS = ("nearest", "gauss_seidel")
-SHEARED = "as a fraction of the largest possible"
+DEPARTURE = "departure"  # the id of findings that are too numerous for a table
 
 
 def measured(table: StudyTable) -> list[Claim]:
@@ -69,7 +70,7 @@ def sampled_part(table: StudyTable) -> Iterator[Claim]:
     """The fraction of the exact extent that sampled states see."""
     for sampler in (*WALKS, "uniform"):
         ratios = _ratios(drawn(table, sampler), table.part("exact"), "eta3")
-        yield from _by_range(ratios, f"η3 of {WORDS[sampler]} over exact η3")
+        yield from _by_range(f"coverage-{sampler}", ratios, f"η3 of {WORDS[sampler]} over exact η3")
 
 
 def measure(table: StudyTable) -> Iterator[Claim]:
@@ -78,26 +79,26 @@ def measure(table: StudyTable) -> Iterator[Claim]:
         for sampler in WALKS:
             ratios = _ratios(drawn(table, sampler), table.part("uniform"), name)
             statement = f"{label} of {WORDS[sampler]} over {label} of {WORDS['uniform']}"
-            yield from _by_range(ratios, statement)
+            yield from _by_range(f"{name}-{sampler}", ratios, statement)
     rows = table.part("uniform").dropna(subset=["walk_ratio"])
     for name, label in (
         ("original_ratio", "the original network"),
         ("walk_ratio", WORDS["nearest"]),
     ):
         statement = f"distance of {label} from the centre over that of {WORDS['uniform']}"
-        yield from _by_range(statistics.grouped(rows, name), statement)
+        yield from _by_range(name, statistics.grouped(rows, name), statement)
 
 
 def correlations(table: StudyTable) -> Iterator[Claim]:
     """Whether strong contacts have long intervals: in absolute terms, and relative to f_n."""
     lengths = items(drawn(table, "exact"), "correlation")
     _, ranks = relative_extents(table, "exact")
-    for groups, statement in (
-        (lengths, "correlation of f_n with the exact ΔF_n"),
-        (ranks, "rank correlation of f_n with the exact ΔF_n/f_n"),
+    for id, groups, statement in (
+        ("extent-correlation", lengths, "correlation of f_n with the exact ΔF_n"),
+        ("relative-correlation", ranks, "rank correlation of f_n with the exact ΔF_n/f_n"),
     ):
         values = {mu: [v for _, v in group] for mu, group in groups.items()}
-        yield from _by_range(values, statement, CORRELATION)
+        yield from _by_range(id, values, statement, CORRELATION)
 
 
 def exact_shape(table: StudyTable) -> Iterator[Claim]:
@@ -105,8 +106,8 @@ def exact_shape(table: StudyTable) -> Iterator[Claim]:
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in statistics.grouped(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
-            yield _trend(f"μ where {label} is largest", peak, groups, POSITIVE)
-        yield from _growth(groups, label)
+            yield _trend(f"{part}-peak", f"μ where {label} is largest", peak, groups, POSITIVE)
+        yield from _growth(f"{part}-slope", groups, label)
 
 
 def distribution(table: StudyTable) -> Iterator[Claim]:
@@ -118,7 +119,8 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
                 statement = (
                     f"departure of P(ΔF_n/⟨ΔF_n⟩) from a falling density, {sampler}, μ = {mu:g}"
                 )
-                yield _measured(statement, *departure([v for _, v in values], statistics.LEVEL))
+                interval = departure([v for _, v in values], statistics.LEVEL)
+                yield _measured(DEPARTURE, statement, *interval)
         for word, span in RANGES:
             moments = {
                 mu: [(v.mean(), np.mean(v**2)) for _, v in group]
@@ -126,22 +128,24 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
             }
             if moments:
                 statement = f"standard deviation of ΔF_n in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
-                yield _trend(statement, _mean_width, moments, POSITIVE)
+                id = f"width-{sampler}"
+                yield _trend(id, statement, _mean_width, moments, POSITIVE)._replace(span=word)
 
 
 def opened(table: StudyTable) -> Iterator[Claim]:
     """Growth of η with the friction of the cones alone, in frictionless packings."""
     groups = statistics.grouped(table.part("opened_exact"), "eta3")
-    yield from _growth(groups, "exact η3, packings made at μ = 0,")
+    yield from _growth("opened-slope", groups, "exact η3, packings made at μ = 0,")
 
 
-def _growth(groups: Values, label: str) -> Iterator[Claim]:
+def _growth(id: str, groups: Values, label: str) -> Iterator[Claim]:
     """Slopes on both sides of the crossover at 0.001."""
-    for low, high in ((0, LEAST_DYNAMIC), (LEAST_DYNAMIC, SMALL[1])):
+    for side, low, high in (("below", 0, LEAST_DYNAMIC), ("above", LEAST_DYNAMIC, SMALL[1])):
         few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
         if len(few) > 1:
             ends = f"μ = {min(few):g} … {max(few):g}"
-            yield _trend(f"slope of log {label} against log μ, {ends}", slope, few)
+            statement = f"slope of log {label} against log μ, {ends}"
+            yield _trend(f"{id}-{side}", statement, slope, few)
 
 
 def size(table: StudyTable) -> Iterator[Claim]:
@@ -150,7 +154,8 @@ def size(table: StudyTable) -> Iterator[Claim]:
     for mu in sorted(table.part("size_exact")["mu"].unique()):
         groups = statistics.grouped(rows[rows["mu"] == mu], "eta3", "n")
         if len(groups) > 1:
-            yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
+            statement = f"slope of log exact η3 against log N, μ = {mu:g}"
+            yield _trend(f"exact-size-{mu:g}", statement, slope, groups)
 
 
 def strength(table: StudyTable) -> Iterator[Claim]:
@@ -159,19 +164,20 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     rows = positive(usual, "limit_load")
     part_of_load = rows["critical_force"] / rows["limit_load"]
     values = statistics.grouped(rows.assign(part_of_load=part_of_load), "part_of_load")
-    yield from _by_range(values, "⟨F_crit⟩ over ⟨limit load⟩")
+    yield from _by_range("part-of-load", values, "⟨F_crit⟩ over ⟨limit load⟩")
     for part, word in (
         ("response_long", "with 600 implicit steps over that with 150"),
         ("response_fine", "with load steps a quarter as long over that with the usual ones"),
     ):
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
             ratios = _ratios(table.part(part), usual, name)
-            yield from _by_range(ratios, f"{label} {word}")
+            yield from _by_range(f"{name}-{part}", ratios, f"{label} {word}")
     # Loads inside and outside the pressure differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
     pairs = positive(statistics.paired(rows, table.part("walk")), "contacts_other")
     factor = 1 / (1 - pairs["critical_force"] / pairs["contacts_other"])
     statement = "⟨F_crit⟩ with the pair excluded from the pressure over that with it included"
-    yield from _by_range(statistics.grouped(pairs.assign(factor=factor), "factor"), statement)
+    values = statistics.grouped(pairs.assign(factor=factor), "factor")
+    yield from _by_range("excluded-pair", values, statement)
 
 
 def shear(table: StudyTable) -> Iterator[Claim]:
@@ -179,19 +185,20 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = statistics.grouped(rows, "friction")
     if len(groups) > 2:
-        yield _trend("μ where the largest shear stress is largest", peak, groups, POSITIVE)
+        statement = "μ where the largest shear stress is largest"
+        yield _trend("shear-peak", statement, peak, groups, POSITIVE)
     statement = "shear stress over pressure"
-    yield from _by_range(groups, f"largest {statement}")
-    yield from _by_range(
-        statistics.grouped(rows, "own_shear"), f"{statement} of the original network"
-    )
+    yield from _by_range("largest-shear", groups, f"largest {statement}")
+    own = statistics.grouped(rows, "own_shear")
+    yield from _by_range("own-shear", own, f"{statement} of the original network")
     for some, name, word in (
         (rows, "own_shear", "shear stress of the original network"),
         (uniform, "mean_shear", "mean shear stress of uniform networks"),
         (uniform, "largest_shear", "largest shear stress in uniform networks"),
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction_other")
-        yield from _by_range(parts, f"{word}, {SHEARED}", FRACTION)
+        statement = f"{word}, as a fraction of the largest possible"
+        yield from _by_range(f"{name}-part", parts, statement, FRACTION)
 
 
 def volume(table: StudyTable) -> Iterator[Claim]:
@@ -199,15 +206,16 @@ def volume(table: StudyTable) -> Iterator[Claim]:
     rows = table.part("volume")
     groups = statistics.grouped(rows, "extent")
     if len(groups) > 2:
-        yield _trend("μ where S is widest", peak, groups, POSITIVE)
-    yield from _by_range(groups, "width of S, in ⟨f_n⟩")
+        yield _trend("volume-peak", "μ where S is widest", peak, groups, POSITIVE)
+    yield from _by_range("volume-width", groups, "width of S, in ⟨f_n⟩")
     walked = statistics.paired(positive(rows, "extent"), table.part("walk"))
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         parts = _quotients(walked, "extent", f"{name}_other")
-        yield from _by_range(parts, f"width of S over {label}")
+        yield from _by_range(f"volume-{name}", parts, f"width of S over {label}")
     pairs = walked[["extent", "eta2_other"]].dropna().to_numpy()
     if len(pairs) > 2:
         yield _finding(
+            "volume-rank",
             "rank correlation of the width of S with η2, over packings of all μ",
             lambda some: statistics.rank_correlation(*np.transpose(some)),
             [pairs],
@@ -224,7 +232,8 @@ def volume(table: StudyTable) -> Iterator[Claim]:
             statement = (
                 f"ln V per grain of {largest} disks minus that of smaller packings, μ = {mu:g}"
             )
-            yield _measured(statement, *statistics.difference_interval(large, small))
+            interval = statistics.difference_interval(large, small)
+            yield _measured(f"volume-size-{mu:g}", statement, *interval)
 
 
 def forces(table: StudyTable) -> Iterator[Claim]:
@@ -244,7 +253,8 @@ def forces(table: StudyTable) -> Iterator[Claim]:
                 ("off_gaussian", "rms deviation of ln of uniform P(f_n > f) from a Gaussian"),
             ):
                 statement = f"{what}, {case}"
-                yield _finding(statement, lambda some, name=name: _part(some, name), [packings])
+                number = partial(_part, name=name)
+                yield _finding(f"tail-{name}", statement, number, [packings])
 
 
 def _part(packings: Any, name: str) -> float:
@@ -281,17 +291,20 @@ def _mean_width(_: Floats, moments: Floats) -> float:
     return float(np.mean(np.sqrt(moments[:, 1] - moments[:, 0] ** 2)))
 
 
-def _by_range(groups: Values, statement: str, possible: Ends = POSITIVE) -> Iterator[Claim]:
+def _by_range(
+    id: str, groups: Values, statement: str, possible: Ends = POSITIVE
+) -> Iterator[Claim]:
     """The mean over all packings of a range of μ, one sample, with Student's interval."""
     for word, (low, high) in RANGES:
         values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
         if values:
             interval = statistics.mean_interval(values)
-            yield _measured(f"{statement}, {word} μ", *interval, possible)
+            finding = _measured(id, f"{statement}, {word} μ", *interval, possible)
+            yield finding._replace(span=word)
 
 
 def _trend(
-    statement: str, statistic: Callable[..., float], groups: Values, possible: Ends = ANY
+    id: str, statement: str, statistic: Callable[..., float], groups: Values, possible: Ends = ANY
 ) -> Claim:
     """A number of all means over packings: statistic(keys, means).
 
@@ -300,22 +313,27 @@ def _trend(
     keys, values = np.array(list(groups), dtype=float), list(map(np.array, groups.values()))
     value = float(statistic(keys, np.array([group.mean(axis=0) for group in values])))
     if min(map(len, values)) < 2:
-        return _measured(statement, value, np.nan, np.nan)
+        return _measured(id, statement, value, np.nan, np.nan)
     with np.errstate(invalid="ignore"):
         numbers = np.array([statistic(keys, means) for means in statistics.drawn_means(values)])
     ends, _ = statistics.percentile_ends(numbers[np.isfinite(numbers)])
-    return _measured(statement, value, *ends, possible)
+    return _measured(id, statement, value, *ends, possible)
 
 
-def _finding(statement: str, statistic: Callable[..., float], groups: Sequence[Any]) -> Claim:
+def _finding(
+    id: str, statement: str, statistic: Callable[..., float], groups: Sequence[Any]
+) -> Claim:
     """A number of single packings, which are resampled for its interval (bootstrap)."""
-    return _measured(statement, *statistics.bootstrap(statistic, list(groups)))
+    return _measured(id, statement, *statistics.bootstrap(statistic, list(groups)))
 
 
-def _measured(statement: str, value: float, low: float, high: float, possible: Ends = ANY) -> Claim:
+def _measured(
+    id: str, statement: str, value: float, low: float, high: float, possible: Ends = ANY
+) -> Claim:
     """The finding, with too few data if its interval spans orders of magnitude."""
     low, high = np.clip([low, high], *possible).tolist()
     return Claim(
+        id=id.replace("_", "-"),
         statement=statement,
         sampler="",
         source="",

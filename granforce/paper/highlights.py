@@ -11,27 +11,24 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.packing.compaction import LONGEST, LONGEST_SETTLED, SETTLED_FROM
-from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, SAMPLERS, SMALL
+from granforce.paper.claims.figure1 import PAPERS_PEAK
+from granforce.paper.claims.groups import LEAST_DYNAMIC, MIDDLE, RANGES, SAMPLERS, SMALL
 from granforce.paper.claims.verdicts import CONTRADICTED, FEW, REPRODUCED, STRONGLY
-from granforce.paper.findings import SHEARED, WORDS
+from granforce.paper.findings import WORDS
 from granforce.paper.formatting import between, listed, with_error
 from granforce.paper.tables import StudyTable, packings_at_each
 from granforce.perturb.critical_force import REACHED, Protocol
 from granforce.study import kinds
 from granforce.types import Floats, Rows
 
-PEAK = "μ where exact η3 is largest"
-STRONG = "correlation of f_n with the exact ΔF_n, intermediate μ"
-WEAK = "rank correlation of f_n with the exact ΔF_n/f_n, intermediate μ"
 # Friction at which packings are compared with those of the largest friction.
 USUAL = 0.1
-PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 LATE_DRAG = "prepared_late_drag"
 LATER = "drag replaces inertia only when the forces are a hundred times closer to balance"
 FEWEST = 5  # packings of such a mean
 PREPARATION = "results-in-detail.md#dependence-on-the-preparation"
-LENGTHS = "ΔF_n is not monotonic: largest at intermediate μ"
 STATES = ("nearest", "gauss_seidel", "uniform")
+MID = "intermediate"
 
 
 class Highlight(NamedTuple):
@@ -48,37 +45,34 @@ class _Numbers:
 
     def __init__(self, table: StudyTable, claims: Rows, findings: Rows) -> None:
         self.table = table
-        self._judged = {(row["statement"], row["sampler"]): row for row in (*claims, *findings)}
+        rows = (*claims, *findings)
+        self._judged = {(row["id"], row["sampler"] or row["span"]): row for row in rows}
 
-    def row(self, statement: str, sampler: str = "") -> dict[str, Any]:
-        """A claim or finding with a number and an interval that is not too wide to be quoted."""
-        row = self._judged[statement, sampler]
+    def row(self, id: str, case: str = "") -> dict[str, Any]:
+        """A claim by a sampler or a finding in a range of μ; its interval can be quoted."""
+        row = self._judged[id, case]
         if not np.isfinite([row["value"], row["low"], row["high"]]).all() or row["verdict"] == FEW:
-            raise KeyError(statement)
+            raise KeyError(id)
         return row
 
-    def known(self, statements: dict[str, str]) -> dict[str, dict[str, Any]]:
-        """{word: finding} of {word: statement}, without those that cannot be quoted."""
-        return {word: row for word, text in statements.items() for row in self._quotable(text, "")}
+    def ranges(self, id: str) -> list[dict[str, Any]]:
+        """A finding at small, intermediate and large μ."""
+        return [self.row(id, word) for word, _ in RANGES]
 
-    def claims(self, statement: str, samplers: Sequence[str]) -> dict[str, dict[str, Any]]:
-        """{sampler: claim} of one statement, without those that cannot be quoted."""
-        return {name: row for name in samplers for row in self._quotable(statement, name)}
+    def claims(self, id: str, samplers: Sequence[str]) -> dict[str, dict[str, Any]]:
+        """{sampler: claim}, without those that cannot be quoted."""
+        return {name: row for name in samplers for row in self.quotable(id, name)}
 
-    def _quotable(self, statement: str, sampler: str) -> list[dict[str, Any]]:
+    def quotable(self, id: str, case: str) -> list[dict[str, Any]]:
         """The claim or finding in a list, which is empty if it cannot be quoted."""
         try:
-            return [self.row(statement, sampler)]
+            return [self.row(id, case)]
         except KeyError:
             return []
 
-    def judged(self, statement: str, sampler: str = "") -> str:
-        """The value of a claim or finding with its interval."""
-        return _quoted(self.row(statement, sampler))
-
-    def verdicts(self, statement: str, samplers: Sequence[str]) -> dict[str, str]:
+    def verdicts(self, id: str, samplers: Sequence[str]) -> dict[str, str]:
         """{sampler: verdict} of a claim, for samplers of the study."""
-        keys = [(statement, sampler) for sampler in samplers]
+        keys = [(id, sampler) for sampler in samplers]
         return {key[1]: self._judged[key]["verdict"] for key in keys if key in self._judged}
 
     def packings(self, part: str) -> str:
@@ -101,8 +95,8 @@ def _quoted(row: dict[str, Any]) -> str:
 
 
 def _maximum(of: _Numbers) -> Highlight:
-    place = of.row(PEAK)
-    turns = of.row("η3(μ) is not monotonic", "exact")["verdict"] == REPRODUCED
+    place = of.row("exact-peak")
+    turns = of.row("eta3-turns", "exact")["verdict"] == REPRODUCED
     within = MIDDLE[0] <= place["low"] and place["high"] <= MIDDLE[1]
     middle = "at intermediate friction"
     if not turns:
@@ -118,7 +112,7 @@ def _maximum(of: _Numbers) -> Highlight:
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
     )
-    lengths = of.claims(LENGTHS, ["exact"]).values()
+    lengths = of.claims("extent-peak", ["exact"]).values()
     also = "".join(f" and ⟨ΔF_n⟩/⟨f_n⟩ at {_quoted(row)}" for row in lengths)
     return Highlight(
         f"{first}: exact η3 is largest at μ = {_quoted(place)}{also}; the paper finds η1, "
@@ -131,7 +125,7 @@ def _maximum(of: _Numbers) -> Highlight:
 
 def _rising_eta2(of: _Numbers) -> Highlight:
     """Whether η2 of sampled networks has a maximum, too."""
-    verdicts = of.verdicts("η2(μ) is not monotonic", STATES)
+    verdicts = of.verdicts("eta2-turns", STATES)
     names = {
         word: listed([WORDS[name] for name in verdicts if chosen(verdicts[name])])
         for word, chosen in (
@@ -214,13 +208,11 @@ def _later(of: _Numbers, sampler: str, part: str, name: str) -> dict[float, Floa
 
 
 def _coverage(of: _Numbers) -> Highlight:
-    ratios = of.known(
-        {WORDS[name]: f"η3 of {WORDS[name]} over exact η3, intermediate μ" for name in STATES}
-    )
-    covered = {word: row for word, row in ratios.items() if row["high"] < 1}
+    ratios = {name: of.quotable(f"coverage-{name}".replace("_", "-"), MID) for name in STATES}
+    covered = [(name, row) for name, rows in ratios.items() for row in rows if row["high"] < 1]
     if not covered:
         raise KeyError("coverage")
-    quoted = listed([f"{_quoted(row)} for {word}" for word, row in covered.items()])
+    quoted = listed([f"{_quoted(row)} for {WORDS[name]}" for name, row in covered])
     return Highlight(
         f"At intermediate friction, {of.table.plan['states']} networks show only part of the "
         f"intervals: their η3 divided by the exact η3 is, averaged over these μ, {quoted}.",
@@ -230,7 +222,7 @@ def _coverage(of: _Numbers) -> Highlight:
 
 
 def _strong(of: _Numbers) -> Highlight:
-    absolute, relative = of.row(STRONG), of.row(WEAK)
+    absolute, relative = of.row("extent-correlation", MID), of.row("relative-correlation", MID)
     first = (
         "Strong contacts have longer intervals than weak ones"
         if absolute["low"] > 0
@@ -251,10 +243,9 @@ def _strong(of: _Numbers) -> Highlight:
 
 
 def _wider(of: _Numbers) -> Highlight:
-    base = f"distance of {WORDS['nearest']} from the centre over that of {WORDS['uniform']}"
-    middle, small = of.row(f"{base}, intermediate μ"), of.row(f"{base}, small μ")
+    middle, small = of.row("walk-ratio", MID), of.row("walk-ratio", "small")
     if min(middle["low"], small["low"]) <= 1:
-        raise KeyError(base)
+        raise KeyError("walk-ratio")
     return Highlight(
         f"{_sentence(WORDS['nearest'])} does not sample S uniformly: its networks are "
         f"{_quoted(middle)} times as far from the centre of S as {WORDS['uniform']} at "
@@ -264,15 +255,12 @@ def _wider(of: _Numbers) -> Highlight:
     )
 
 
-MID = "intermediate μ"
-
-
 def _sentence(words: str) -> str:
     return words[0].upper() + words[1:]
 
 
 def _alike(of: _Numbers) -> Highlight:
-    constant = {name: of.row(f"{name}/η3 is nearly constant", "nearest") for name in ("η1", "η2")}
+    constant = {f"η{k}": of.row(f"eta{k}-eta3-constant", "nearest") for k in (1, 2)}
     does = [name for name, row in constant.items() if row["verdict"] == REPRODUCED]
     does_not = [
         name for name, row in constant.items() if row["verdict"] in (CONTRADICTED, STRONGLY)
@@ -296,10 +284,9 @@ def _alike(of: _Numbers) -> Highlight:
 
 
 def _critical(of: _Numbers) -> Highlight:
-    claim = "⟨F_crit⟩ over ⟨limit load⟩, {} μ"
-    small, middle, large = (of.row(claim.format(w)) for w in ("small", "intermediate", "large"))
+    small, middle, large = of.ranges("part-of-load")
     if middle["high"] >= 1:
-        raise KeyError(claim)
+        raise KeyError("part-of-load")
     far = middle["high"] < small["low"] and large["high"] < small["low"]
     first = (
         "At intermediate and large friction, a packing moves before the push reaches its limit load"
@@ -347,19 +334,18 @@ def _error(of: _Numbers) -> str:
 
 
 def _stability(of: _Numbers) -> Highlight:
-    claim = "F_crit rises with η"
     words = {"exact": "the exact η3", **{name: f"η2 of {WORDS[name]}" for name in STATES}}
-    rows = of.claims(claim, list(words))
+    rows = of.claims("critical-force-rises", list(words))
     rising = {name: row for name, row in rows.items() if row["low"] > 0}
     falling = {name: row for name, row in rows.items() if row["high"] < 0}
     others = [words[name] for name, row in rows.items() if row["low"] <= 0 <= row["high"]]
     if not rising:
-        raise KeyError(claim)
+        raise KeyError("critical-force-rises")
     named = listed([f"with {words[name]}" for name in rising])
     significant = (rising | falling).items()
     texts = listed([f"{_quoted(row)} with {words[name]}" for name, row in significant])
     rest = f"; with {listed(others)}, it is not significant" if others else ""
-    judged = next(iter(rising.values()))["criterion"].partition(" [")[0].replace("…", "to")
+    judged = next(iter(rising.values()))["good"].replace("…", "to")
     closely = all(row["verdict"] == REPRODUCED for row in rising.values())
     first = (
         f"The critical force rises {named}"
@@ -376,25 +362,22 @@ def _stability(of: _Numbers) -> Highlight:
 
 
 def _shear(of: _Numbers) -> Highlight:
-    base = "shear stress over pressure"
-    part = of.row(f"shear stress of the original network, {SHEARED}, {MID}")
-    if part["high"] >= 1:
-        raise KeyError(base)
+    if of.row("own-shear-part", MID)["high"] >= 1:
+        raise KeyError("own-shear-part")
     return Highlight(
         "A packing can carry more shear stress than compaction leaves in it: at intermediate μ "
         f"({of.packings('stress')} packings at each), the ratio of shear stress to pressure is "
-        f"{of.judged(f'{base} of the original network, {MID}')} after compaction, and can reach "
-        f"{of.judged(f'largest {base}, {MID}')}.",
+        f"{_quoted(of.row('own-shear', MID))} after compaction, and can reach "
+        f"{_quoted(of.row('largest-shear', MID))}.",
         "stresses",
         "stresses",
     )
 
 
 def _volume(of: _Numbers) -> Highlight:
-    name = "width of S, in ⟨f_n⟩, {} μ"
-    small, middle, large = (of.row(name.format(w)) for w in ("small", "intermediate", "large"))
+    small, middle, large = of.ranges("volume-width")
     if small["high"] >= middle["low"] or middle["high"] >= large["low"]:
-        raise KeyError(name)
+        raise KeyError("volume-width")
     return Highlight(
         "S is narrower at smaller friction, although it has more dimensions: in "
         f"{of.packings('volume')} packings at each μ, its width is {_quoted(small)} ⟨f_n⟩ at "
@@ -405,7 +388,7 @@ def _volume(of: _Numbers) -> Highlight:
 
 
 def _size(of: _Numbers) -> Highlight:
-    slope = of.row(f"slope of log exact η3 against log N, μ = {USUAL:g}")
+    slope = of.row(f"exact-size-{USUAL:g}")
     words = "rises" if slope["low"] > 0 else "falls" if slope["high"] < 0 else ""
     first = (
         f"Exact η3 {words} with the number of disks N"

@@ -453,10 +453,10 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     assert set(more.values()) >= {"outside S"}
     assert line["paper's walk η2 (n = 1)"] == "outside S"
     assert set(groups.drawn(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
-    told = {(c.statement, c.sampler): c for c in claims.judged(table)}
-    vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
+    told = {(c.id, c.sampler): c for c in claims.judged(table)}
+    vanishing = told["vanishing", "gauss_seidel"]
     assert vanishing.verdict == verdicts.UNMEASURED
-    assert "outside S, and not judged, at 0" in vanishing.why
+    assert "outside S, and not judged, at 0" in vanishing.why and 0 in vanishing.outside
 
 
 def test_sweeps_tell_how_far_outside_of_s_they_end(table):
@@ -533,11 +533,12 @@ def table_of(text):
 
 
 def test_a_variant_of_a_claim_shows_only_what_differs():
-    one = {"source": "PRE", "criterion": "≥ 1 [≥ 0.5]", "sampler": "", "figure": 4, "packings": 3}
-    one |= {"value": 2.0, "low": 1.5, "high": 2.5, "mu": 0.1, "why": "", "measured": "b"}
-    first = {"statement": "it falls, beyond the median", "variant": ", beyond the median"}
-    second = {"statement": "it falls, beyond the decile", "variant": ", beyond the decile"}
-    second |= {"why": "reproduced, but undecided without μ = 0.1"}
+    one = {"source": "PRE", "good": "≥ 1", "fair": "≥ 0.5", "sampler": "", "figure": 4}
+    one |= {"value": 2.0, "low": 1.5, "high": 2.5, "mu": 0.1, "packings": 3, "number": "b"}
+    first = {"id": "median", "statement": "it falls, beyond the median", "before": ""}
+    first |= {"variant": ", beyond the median"}
+    second = {"id": "decile", "statement": "it falls, beyond the decile", "before": "reproduced"}
+    second |= {"variant": ", beyond the decile"}
     judged = [
         one | first | {"verdict": verdicts.REPRODUCED},
         one | second | {"verdict": verdicts.UNDECIDED},
@@ -551,10 +552,10 @@ def test_a_variant_of_a_claim_shows_only_what_differs():
 
 def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
     def claim(statement, sampler, verdict, value=1.0):
-        words = {"statement": statement, "source": "PRE", "criterion": "≥ 0"}
-        words |= {"sampler": sampler, "verdict": verdict, "measured": "x", "why": ""}
+        words = {"id": statement, "statement": statement, "source": "PRE", "good": "≥ 0"}
+        words |= {"sampler": sampler, "verdict": verdict, "number": "x", "fair": "", "before": ""}
         numbers = {"value": value, "low": value, "high": value, "mu": None, "packings": 3}
-        return words | numbers | {"figure": 3, "variant": ""}
+        return words | numbers | {"figure": 3, "variant": "", "outside": []}
 
     judged = [
         claim("a", "gauss_seidel", verdicts.REPRODUCED),

@@ -39,7 +39,6 @@ from granforce.paper.claims.groups import SAMPLERS, outside
 from granforce.paper.claims.verdicts import FEW, MISSING, Claim
 from granforce.paper.tables import StudyTable
 
-OUTSIDE = "outside S, and not judged, at "  # begins the list of μ where a walk is not judged
 BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
 BY_WALKS = (*BY_SWEEPS, "nearest")
 BY_STATES = (*BY_WALKS, "uniform")  # these have η1 and η2
@@ -104,5 +103,5 @@ def without(claim: Claim, beyond: Sequence[float]) -> Claim:
     """The claim, with the μ at which it is not judged because states are outside S."""
     if not beyond:
         return claim
-    where = f"{OUTSIDE}{', '.join(f'{mu:g}' for mu in beyond)}"
-    return claim._replace(why=f"{claim.why}; {where}" if claim.why else where)
+    where = f"outside S, and not judged, at {', '.join(f'{mu:g}' for mu in beyond)}"
+    return claim._replace(why=f"{claim.why}; {where}" if claim.why else where, outside=beyond)

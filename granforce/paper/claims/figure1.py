@@ -36,6 +36,7 @@ from granforce.paper.claims.verdicts import (
 from granforce.paper.tables import StudyTable
 
 PEAK = "μ at the top of a parabola in log μ"
+PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
 # How close z must come to its limits; its whole fall is 1.
 NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
@@ -52,6 +53,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
         known = positive(rows, above, below)
         groups = items(known.assign(log_ratio=np.log(known[above] / known[below])), "log_ratio")
         yield over_all(
+            f"{above}-{below}-constant",
             f"{word} is nearly constant",
             f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.ptp(logs)),
@@ -62,6 +64,7 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
             possible=(1, np.inf),
         )
         yield over_all(
+            f"{above}-{below}-ratio",
             equal,
             f"geometric mean of {word} over μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.mean(logs)),
@@ -73,10 +76,12 @@ def agreement(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 
 def peaked(
-    claim: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2), fair: Ends = (0.02, 0.5)
+    id: str, statement: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2)
 ) -> Claim:
     """A claim of the paper that a quantity grouped by μ is largest near 0.1."""
-    return over_all(claim, what, peak, groups, good=good, fair=fair, least=3, possible=POSITIVE)
+    return over_all(
+        id, statement, what, peak, groups, good=good, fair=(0.02, 0.5), least=3, possible=POSITIVE
+    )
 
 
 def maximum(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -85,8 +90,8 @@ def maximum(table: StudyTable, sampler: str) -> Iterator[Claim]:
     names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
     for name, label in names:
         groups = positive_friction(items(positive(rows, name), name))
-        yield turns(f"{label}(μ) is not monotonic", groups)
-        yield peaked(f"{label}(μ) is largest near μ = 0.1", groups)
+        yield turns(f"{name}-turns", f"{label}(μ) is not monotonic", groups)
+        yield peaked(f"{name}-peak", f"{label}(μ) is largest near μ = {PAPERS_PEAK:g}", groups)
 
 
 def _measure_of(sampler: str) -> tuple[str, str]:
@@ -98,24 +103,25 @@ def small_friction(table: StudyTable, sampler: str) -> Iterator[Claim]:
     name, label = _measure_of(sampler)
     beyond = [mu for mu in outside(table, SAMPLERS[sampler]) if mu > 0]
     groups = positive_friction(items(positive(drawn(table, sampler), name), name))
-    for low, high, word in (
-        (LEAST_DYNAMIC, SMALL[1], "packings made by contact dynamics"),
-        (0, LEAST_DYNAMIC / 10, "packings finished by linear programs"),
-        (0, SMALL[1], "all packings"),
+    for low, high, key, word in (
+        (LEAST_DYNAMIC, SMALL[1], "dynamic", "packings made by contact dynamics"),
+        (0, LEAST_DYNAMIC / 10, "finished", "packings finished by linear programs"),
+        (0, SMALL[1], "all", "all packings"),
     ):
         left = any(low <= mu <= high for mu in beyond)
         few = {} if left else {mu: groups[mu] for mu in groups if low <= mu <= high}
         span = f", μ = {min(few):g} … {max(few):g}" if few else ""
         claim = over_all(
-            f"η ∝ μ as μ → 0: {word}",
+            f"small-friction-{key}",
+            "η ∝ μ as μ → 0",
             f"slope of log {label} against log μ{span}",
             slope,
             few,
             good=(0.9, 1.1),
             fair=(0.7, 1.3),
             source=PRL,
+            variant=f": {word}",
         )
-        claim = claim._replace(variant=f": {word}")
         yield claim._replace(verdict=UNMEASURED) if left else claim
 
 
@@ -126,6 +132,7 @@ def vanishing(table: StudyTable, sampler: str) -> list[Claim]:
     at_rest = rows[enough(rows) & (rows["mu"] == 0)]
     measured = at_rest if sampler == "exact" else at_rest[~skipped(at_rest)]
     claim = at_each(
+        "vanishing",
         "η vanishes at μ = 0 within 10⁻⁷",
         f"mean {label} at μ = 0",
         items(measured.assign(size=measured[name].abs()), "size"),
@@ -152,6 +159,7 @@ def measure(table: StudyTable, sampler: str) -> Iterator[Claim]:
     pairs = statistics.paired(dynamic(drawn(table, sampler)), table.part("exact"))
     pairs = positive(pairs, "eta3", "eta3_other")
     yield at_each(
+        "eta3-of-samples",
         "η3 does not depend on how networks are sampled",
         f"η3 of the networks over that of the exact intervals, μ ≥ {LEAST_DYNAMIC:g}",
         items(pairs.assign(part_seen=pairs["eta3"] / pairs["eta3_other"]), "part_seen"),
@@ -175,6 +183,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
     packings = pd.concat([known, again]).groupby(["mu", "seed"], as_index=False)
     scatter = packings.agg(n=("n", "first"), part=("eta2", _scatter))
     yield at_each(
+        "repeated-walks",
         "η is reproducible: other walks in the same packing give the same value",
         "standard deviation of η2 over walks, relative to its mean",
         items(scatter, "part"),
@@ -186,6 +195,7 @@ def reproducible(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for name, label in (("eta2", "η2"), ("eta3", "η3")):
         ratios = pairs.assign(ratio=pairs[name] / pairs[f"{name}_other"])
         yield at_each(
+            f"{name}-longer-walk",
             f"{label} does not depend on the length of the walk",
             f"{label} of a walk several times as long over that of the shorter one",
             items(ratios, "ratio"),
@@ -208,8 +218,9 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ends = pd.concat([opened, table.part("exact")])
         wide = pd.concat([wide, ends[ends["mu"] == widest]])
         wide = wide.assign(made=wide["packing_mu"].fillna(wide["mu"]))
-    for statement, what, rows, by, good, fair in (
+    for name, statement, what, rows, by, good, fair in (
         (
+            "opened-cones",
             "η rises with the μ of the Coulomb condition, in the same packings",
             "the μ of the Coulomb condition, packings made without friction",
             opened,
@@ -218,6 +229,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
             (0.8, 1),
         ),
         (
+            "fewer-contacts",
             "η is smaller in packings with fewer contacts, at the same μ in the Coulomb condition",
             f"the μ of preparation, μ = {widest:g} in the Coulomb condition",
             wide,
@@ -227,6 +239,7 @@ def causes(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ),
     ):
         yield over_all(
+            name,
             statement,
             f"rank correlation of mean exact η3 with {what}",
             statistics.rank_correlation,
@@ -248,8 +261,9 @@ def coordination(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for group, word, limit in zip(ends, ("smallest", "largest"), (4, 3), strict=True):
         statement = f"z → {limit} at the {word} μ"
         good, fair = ((limit - near, limit + near) for near in (NEAR, FAIR))
-        yield at_each(statement, "mean z at that μ", group, good=good, fair=fair)
+        yield at_each(f"z-{word}", statement, "mean z at that μ", group, good=good, fair=fair)
     yield over_all(
+        "z-falls",
         "z falls with μ",
         "rank correlation of mean z with μ",
         statistics.rank_correlation,
@@ -271,10 +285,12 @@ def size(table: StudyTable, sampler: str) -> Iterator[Claim]:
         groups = items(positive(rows[rows["mu"] == mu], name), name, by="n")
         span = f", N = {min(groups)} … {max(groups)}" if groups else ""
         yield over_all(
-            f"η hardly depends on N (μ = {mu:g})",
+            f"size-{mu:g}",
+            "η hardly depends on N",
             f"slope of log {label} against log N{span}",
             slope,
             groups,
             good=(-0.1, 0.1),
             fair=(-0.3, 0.3),
-        )._replace(variant=f" (μ = {mu:g})")
+            variant=f" (μ = {mu:g})",
+        )

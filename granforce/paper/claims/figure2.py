@@ -20,7 +20,7 @@ def perturbation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """F_crit and α are largest near μ = 0.1."""
     for name, label in _ANSWERS:
         groups = positive_friction(items(table.part("response"), name))
-        yield peaked(f"{label} is largest near μ = 0.1", groups)
+        yield peaked(f"{name}-peak", f"{label} is largest near μ = 0.1", groups)
 
 
 def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -30,6 +30,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for name, label in _ANSWERS:
         groups = positive_friction(items(positive(rows, eta), eta, name))
         yield over_all(
+            f"{name}-rises",
             f"{label} rises with η",
             f"rank correlation of mean {label} with mean {word} over μ > 0",
             lambda _, means: statistics.rank_correlation(*means.T),
@@ -40,6 +41,7 @@ def response(table: StudyTable, sampler: str) -> Iterator[Claim]:
             possible=CORRELATION,
         )
         yield over_all(
+            f"{name}-branches",
             f"{label} is similar at equal η on both sides of the maximum",
             f"{label} beyond the maximum of {word}(μ) over that below it at the same {word}, "
             "mean of the ratios",
@@ -60,6 +62,7 @@ def law(table: StudyTable, sampler: str) -> Iterator[Claim]:
         if len(decay) >= FEWEST_SHELLS:
             groups.setdefault(row.mu, []).append((row.n, decay))
     yield at_each(
+        "power-law",
         "the first motion |u|(r) decays as a power law, not exponentially",
         "misfit of the best power law over that of the best exponential, rms of ln |u|",
         {mu: groups[mu] for mu in sorted(groups)},

@@ -27,6 +27,7 @@ from granforce.paper.tables import StudyTable
 def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
+        "pair-distances",
         "distances between pairs of networks are sharply peaked",
         f"standard deviation of the distances over their mean, μ ≥ {LEAST_DYNAMIC:g}",
         items(dynamic(drawn(table, sampler)), "pair_spread"),
@@ -39,8 +40,10 @@ def pairs(table: StudyTable, sampler: str) -> Iterator[Claim]:
 def relative(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Weak contacts can change most relative to their force, and most at intermediate μ."""
     ratios, ranks = relative_extents(table, sampler)
-    yield turns("ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ", ratios)
+    statement = "ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ"
+    yield turns("relative-turns", statement, ratios)
     yield at_each(
+        "relative-weak",
         "weak contacts have the largest relative extents ΔF_n/F_orig",
         f"rank correlation of ΔF_n/F_orig with F_orig over contacts, μ ≥ {LEAST_DYNAMIC:g}",
         within(ranks, (LEAST_DYNAMIC, np.inf)),
@@ -72,6 +75,7 @@ def centre(table: StudyTable, sampler: str) -> Iterator[Claim]:
     ratio = rows["original_distance"] / rows["mean_distance"]
     rows = rows.assign(ratio=rows["original_ratio"] if sampler == "uniform" else ratio)
     yield at_each(
+        "centre",
         "the original network lies closer to the centre than sampled ones",
         "distance of the original network from the centre over the mean of the others",
         positive_friction(items(rows, "ratio")),

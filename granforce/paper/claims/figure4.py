@@ -37,17 +37,21 @@ def shape(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ("large", LARGE, False),
     ):
         shape_of = "has a peak" if has_peak else "falls monotonically"
-        for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "its mean in each packing")):
-            variant = f" (ΔF_n in units of {unit})"
+        for key, groups, unit in (
+            ("shape", everywhere, "⟨f_n⟩"),
+            ("scaled-shape", scaled, "its mean in each packing"),
+        ):
             yield at_each(
-                f"P(ΔF_n) at {word} μ {shape_of}{variant}",
+                f"{key}-{word}",
+                f"P(ΔF_n) at {word} μ {shape_of}",
                 "departure from a falling density",
                 within(groups, span),
                 good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
                 fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
                 interval=departure,
                 possible=FRACTION,
-            )._replace(variant=variant)
+                variant=f" (ΔF_n in units of {unit})",
+            )
 
 
 def departure(values: Sequence[Floats], level: float) -> tuple[float, float, float]:
@@ -72,16 +76,17 @@ def tails(table: StudyTable, sampler: str) -> Iterator[Claim]:
         ("large", LARGE, "falls more slowly than an exponential", (-np.inf, 1), None),
     ):
         for quantile, beyond in TAILS:
-            variant = f", beyond the {beyond}"
             yield at_each(
-                f"the tail of P(ΔF_n) at {word} μ {how}{variant}",
+                f"tail-{word}-{quantile}",
+                f"the tail of P(ΔF_n) at {word} μ {how}",
                 "b of exp(−(λ ΔF_n)^b)",
                 within(everywhere, span),
                 good=good,
                 fair=fair,
                 interval=_exponents(quantile),
                 possible=POSITIVE,
-            )._replace(variant=variant)
+                variant=f", beyond the {beyond}",
+            )
 
 
 def _exponents(quantile: float) -> Callable[[Any, float], Any]:
@@ -96,12 +101,17 @@ def _exponents(quantile: float) -> Callable[[Any, float], Any]:
 def widths(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """ΔF_n and the width of its distribution are largest at intermediate μ."""
     everywhere = positive_friction(sampled(table, sampler))
-    for measure, statement, what in (
-        (np.mean, "ΔF_n is not monotonic: largest at intermediate μ", "⟨ΔF_n⟩/⟨f_n⟩"),
-        (np.std, "P(ΔF_n) is broadest at intermediate μ", "the standard deviation of ΔF_n/⟨f_n⟩"),
+    for name, measure, statement, what in (
+        ("extent", np.mean, "ΔF_n is not monotonic: largest at intermediate μ", "⟨ΔF_n⟩/⟨f_n⟩"),
+        (
+            "width",
+            np.std,
+            "P(ΔF_n) is broadest at intermediate μ",
+            "the standard deviation of ΔF_n/⟨f_n⟩",
+        ),
     ):
         groups = each(everywhere, measure)
-        yield peaked(statement, groups, f"{PEAK}, for {what}", good=(0.05, 0.3))
+        yield peaked(f"{name}-peak", statement, groups, f"{PEAK}, for {what}", good=(0.05, 0.3))
 
 
 def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
@@ -111,6 +121,7 @@ def elongation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     for word, span in (("small", SMALL), ("large", LARGE)):
         groups = middle | within(ratio, span)
         yield over_all(
+            f"elongation-{word}",
             f"S is more elongated at {word} than at intermediate μ",
             f"mean of std/mean of ΔF_n at {span_text(span)} over that at {span_text(MIDDLE)}",
             lambda keys, means, span=span: _over_middle(keys, means, span),

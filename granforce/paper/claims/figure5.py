@@ -40,6 +40,7 @@ def counts(table: StudyTable, sampler: str) -> Iterator[Claim]:
         table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
     )
     yield at_each(
+        "equal-counts",
         "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about equally many contacts (μ = 0.1)",
         "number of contacts with f_n > 2⟨f_n⟩ over that with ΔF_n > ⟨ΔF_n⟩",
         within(groups, (0.1, 0.1)),
@@ -53,6 +54,7 @@ def enrichment(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Strong contacts are less determined than others at intermediate μ."""
     groups = _marked(table, sampler, _enriched)
     yield at_each(
+        "enrichment",
         "strong contacts are less determined at intermediate μ",
         f"{ENRICHMENT}, {span_text(MIDDLE)}",
         within(groups, MIDDLE),
@@ -65,6 +67,7 @@ def patterns(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Strong and undetermined contacts form different patterns at large μ."""
     groups = _marked(table, sampler, _enriched)
     yield at_each(
+        "patterns",
         "strong contacts and those with long intervals form unrelated patterns at μ = 10",
         ENRICHMENT,
         within(groups, (10, 10)),
@@ -83,6 +86,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """Indeterminacy is everywhere in a periodic packing."""
     rows = positive(table.part("exact"), "mu", "contacts")
     yield at_each(
+        "everywhere",
         "with only the pressure prescribed, indeterminacy is everywhere",
         "undetermined fraction of the force-carrying contacts",
         items(rows, "undetermined_part"),
@@ -91,6 +95,7 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
         possible=FRACTION,
     )
     yield at_each(
+        "one-cluster",
         "with only the pressure prescribed, undetermined contacts form one cluster",
         "number of clusters of undetermined contacts",
         items(positive(rows, "undetermined"), "clusters"),
@@ -102,8 +107,9 @@ def place(table: StudyTable, sampler: str) -> Iterator[Claim]:
 
 def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """In a frozen boundary indeterminacy is everywhere at small μ, and in clusters at large μ."""
-    for claim, measured, what, span, good, fair in (
+    for key, claim, measured, what, span, good, fair in (
         (
+            "everywhere",
             f"at μ ≤ {FROZEN_SMALL:g} contacts are undetermined everywhere",
             "undetermined fraction of the contacts inside",
             "undetermined_part",
@@ -112,6 +118,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
             (0.5, np.inf),
         ),
         (
+            "determined",
             f"at μ ≥ {BARELY_RIGID:g} most contacts are determined",
             "determined fraction of the contacts inside",
             "determined_part",
@@ -120,6 +127,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
             (0.25, np.inf),
         ),
         (
+            "clusters",
             f"at μ ≥ {BARELY_RIGID:g} undetermined contacts form small clusters",
             "fraction of the contacts inside that are in the largest cluster",
             "cluster_part",
@@ -134,13 +142,14 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Claim]:
                 determined_part=1 - rows["undetermined_part"],
                 cluster_part=rows["largest_cluster"] / rows["contacts"],
             )
-            variant = f" (N = {rows['n'].iloc[0] if len(rows) else usual})"
             yield at_each(
-                f"with frozen boundary forces, {claim}{variant}",
+                f"{part}-{key}",
+                f"with frozen boundary forces, {claim}",
                 f"{measured}, {span_text(span)}",
                 within(items(rows, what), span),
                 good=good,
                 fair=fair,
                 source=PRL,
                 possible=FRACTION,
-            )._replace(variant=variant)
+                variant=f" (N = {rows['n'].iloc[0] if len(rows) else usual})",
+            )

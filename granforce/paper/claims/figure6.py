@@ -36,11 +36,12 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
     scores = items(rows.assign(score=score), "score")
     strong, none = ((0.1, np.inf), (0, np.inf)), ((-0.1, 0.1), (-0.2, 0.2))
     significant, chance = ((3, np.inf), (2, np.inf)), ((-2, 2), (-3, 3))
-    for word, span, (good, fair), (limits, wider) in (
-        ("is significant at intermediate", MIDDLE, strong, significant),
-        ("vanishes at large", LARGE, none, chance),
+    for key, word, span, (good, fair), (limits, wider) in (
+        ("significant", "is significant at intermediate", MIDDLE, strong, significant),
+        ("vanishes", "vanishes at large", LARGE, none, chance),
     ):
         yield at_each(
+            f"correlation-{key}",
             f"corr(f_n, ΔF_n) {word} μ",
             f"mean correlation, {span_text(span)}",
             within(everywhere, span),
@@ -49,14 +50,17 @@ def correlation(table: StudyTable, sampler: str) -> Iterator[Claim]:
             possible=CORRELATION,
         )
         yield at_each(
-            f"corr(f_n, ΔF_n) {word} μ, against chance",
+            f"correlation-{key}-chance",
+            f"corr(f_n, ΔF_n) {word} μ",
             "mean correlation in units of 1/√(N_c − 1), the standard deviation for shuffled f_n",
             within(scores, span),
             good=limits,
             fair=wider,
-        )._replace(variant=", against chance")
+            variant=", against chance",
+        )
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
+            f"correlation-weaker-{word}",
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
             f"mean over {span_text(span)} minus that over {span_text(MIDDLE)}",
             lambda keys, means, span=span: _mean_difference(keys, means, span),
@@ -69,6 +73,7 @@ def origin(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The correlation comes from intervals alone: the position of f_n in them does not matter."""
     groups = over_contacts(table, sampler, beyond_place)
     yield at_each(
+        "origin",
         "corr(f_n, ΔF_n) at intermediate μ is of statistical origin: unchanged if the relative "
         "positions of f_n in its interval are shuffled among contacts",
         "the correlation minus its mean for shuffled positions",
@@ -107,15 +112,12 @@ def error_bars(table: StudyTable, sampler: str) -> Iterator[Claim]:
     """The paper's error bars: the range over all other networks of the walk."""
     rows = drawn(table, sampler).dropna(subset=["correlation"])
     low, high = rows["correlation_low"], rows["correlation_high"]
-    for word, span, test in (
-        ("excludes 0 at intermediate", MIDDLE, low > 0),
-        (
-            "includes 0 at large",
-            LARGE,
-            (low <= 0) & (high >= 0),
-        ),
+    for key, word, span, test in (
+        ("intermediate", "excludes 0 at intermediate", MIDDLE, low > 0),
+        ("large", "includes 0 at large", LARGE, (low <= 0) & (high >= 0)),
     ):
         yield at_each(
+            f"error-bar-{key}",
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
             "fraction of packings whose error bar does",
             within(items(rows.assign(does=test.astype(float)), "does"), span),

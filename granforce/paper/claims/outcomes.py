@@ -4,7 +4,6 @@ from typing import Any
 
 from granforce.paper.claims.verdicts import (
     CONTRADICTED,
-    DECIDING,
     FEW,
     MISSING,
     REPRODUCED,
@@ -36,12 +35,11 @@ OUTCOMES = {
 }
 
 
-def by_claim(claims: Rows) -> dict[tuple[str, str, str], dict[str, dict[str, Any]]]:
-    """The claims of each (statement, source, criterion), by sampler."""
-    grouped: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
+def by_claim(claims: Rows) -> dict[str, dict[str, dict[str, Any]]]:
+    """The claims of each id, by sampler."""
+    grouped: dict[str, dict[str, dict[str, Any]]] = {}
     for claim in claims:
-        key = claim["statement"], claim["source"], claim["criterion"]
-        grouped.setdefault(key, {})[claim["sampler"]] = claim
+        grouped.setdefault(claim["id"], {})[claim["sampler"]] = claim
     return grouped
 
 
@@ -52,19 +50,8 @@ def decisive(by_sampler: dict[str, dict[str, Any]]) -> dict[str, Any]:
     return (measured or candidates)[0]
 
 
-def judged_number(claim: dict[str, Any]) -> str:
-    """The number by which a claim is judged, in words, without the μ that decides."""
-    return str(claim["measured"].partition(DECIDING)[0])
-
-
-def ranges(claim: dict[str, Any]) -> tuple[str, str]:
-    """The range that supports a claim, and the wider one; empty if there is none."""
-    good, _, fair = claim["criterion"].removesuffix("]").partition(" [")
-    return good, fair
-
-
 def decided(claims: Rows) -> list[dict[str, Any]]:
-    """The decisive claim of each statement."""
+    """The decisive claim of each id."""
     return [decisive(by_sampler) for by_sampler in by_claim(claims).values()]
 
 

@@ -27,8 +27,6 @@ UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
 NEAR_PEAK = 2.0  # in μ: means within this factor of the largest determine the maximum
-LOWERED = ", but "  # in a reason, between the verdict of the interval and why it was lowered
-DECIDING = ", at the deciding μ"  # ends the number of a claim that is judged at each μ
 MOST_NAMED = 3  # μ that are listed singly if omitting any of them changes a verdict
 # Intervals of positive numbers that span more than this factor, and of bounded ones that span more
 # than this part of the possible values, are too few data.
@@ -39,6 +37,7 @@ ANY, POSITIVE, FRACTION, CORRELATION = (-np.inf, np.inf), (0.0, np.inf), (0.0, 1
 class Claim(NamedTuple):
     """A claim, the measured number, and the verdict."""
 
+    id: str  # the same for all samplers, and for a finding at all ranges of μ
     statement: str
     sampler: str  # of SAMPLERS; "" if no states are needed
     source: str  # origin of the claim: PRE or PRL; topic of a finding
@@ -53,6 +52,12 @@ class Claim(NamedTuple):
     packings: int = 0  # at that μ, or the fewest at any
     figure: int = 0  # of the paper, to which the claim belongs; 0 for findings
     variant: str = ""  # end of the statement that distinguishes it from others of the same claim
+    number: str = ""  # what is judged: `measured` without the μ that decides
+    good: str = ""  # the ranges of the criterion, in words; `fair` only if it is wider
+    fair: str = ""
+    before: str = ""  # verdict of the interval alone, if the claim's is another
+    outside: Sequence[float] = ()  # μ that are not judged because states are outside S
+    span: str = ""  # word of RANGES of a finding that has one value for each
 
 
 PRE, PRL = "PRE", "PRL"
@@ -77,9 +82,9 @@ class Ranges(NamedTuple):
         wide = self.fair != self.good
         return STRONGLY if wide and (high < self.fair[0] or low > self.fair[1]) else CONTRADICTED
 
-    def __str__(self) -> str:
-        good, fair = _range(self.good), _range(self.fair)
-        return good if self.fair == self.good else f"{good} [{fair}]"
+    def words(self) -> tuple[str, str]:
+        """Both ranges in words, the wider one empty if it is the same."""
+        return _range(self.good), "" if self.fair == self.good else _range(self.fair)
 
 
 def _range(ends: Ends) -> str:
@@ -92,6 +97,7 @@ def _range(ends: Ends) -> str:
 
 
 def over_all(
+    id: str,
     statement: str,
     measured: str,
     statistic: Callable[..., float],
@@ -103,14 +109,15 @@ def over_all(
     least: int = 2,
     seed: int = 0,
     possible: Ends = ANY,
+    variant: str = "",
 ) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
 
     groups: {μ: [(disks, value)]}, with values of any shape; least: minimum number of groups. seed:
-    of the drawn means. possible: values that the number can have.
+    of the drawn means. possible: values that the number can have. variant: end of the statement.
     """
     ranges = Ranges(good, good if fair is None else fair)
-    claim = _missing(statement, source, measured, ranges)
+    claim = _missing(id, statement, source, measured, ranges, variant)
     if len(groups) < least:
         return claim
     keys = np.array(list(groups), dtype=float)
@@ -145,7 +152,8 @@ def over_all(
         # A number that is certainly outside the good range does not become undecided.
         outside = {verdict, *turned.values()} <= {CONTRADICTED, STRONGLY}
         before, verdict = verdict, CONTRADICTED if outside else UNDECIDED
-        why = why if verdict == before else f"{before}{LOWERED}{why}"
+        if verdict != before:
+            claim, why = claim._replace(before=before), f"{before}, but {why}"
     return claim._replace(verdict=verdict, why=why)
 
 
@@ -172,18 +180,26 @@ def too_wide(low: float, high: float, possible: Ends) -> bool:
     return possible[0] >= 0 and high > WIDE * low
 
 
-def _missing(statement: str, source: str, measured: str, ranges: Ranges) -> Claim:
+def _missing(
+    id: str, statement: str, source: str, measured: str, ranges: Ranges, variant: str = ""
+) -> Claim:
     """The Claim before any result; `judged` adds its sampler."""
+    good, fair = ranges.words()
     return Claim(
-        statement=statement,
+        id=id.replace("_", "-"),
+        statement=statement + variant,
         sampler="",
         source=source,
         measured=measured,
         value=np.nan,
         low=np.nan,
         high=np.nan,
-        criterion=str(ranges),
+        criterion=f"{good} [{fair}]" if fair else good,
         verdict=MISSING,
+        variant=variant,
+        number=measured,
+        good=good,
+        fair=fair,
     )
 
 
@@ -204,6 +220,7 @@ def _turns(turned: Any, verdict: str) -> str:
 
 
 def at_each(
+    id: str,
     statement: str,
     measured: str,
     groups: Groups,
@@ -213,16 +230,18 @@ def at_each(
     source: str = PRE,
     interval: Callable[[Any, float], tuple[float, float, float]] | None = None,
     possible: Ends = ANY,
+    variant: str = "",
 ) -> Claim:
     """The Claim about a number at each μ, reporting one that decides the verdict.
 
     Of the μ whose numbers have the verdict of the claim, it is the one farthest from the good
     range. groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default
-    the mean and Student's interval. possible: values that the number can have.
+    the mean and Student's interval. possible: values that the number can have. variant: end of the
+    statement.
     """
     ranges = Ranges(good, good if fair is None else fair)
     interval = interval or statistics.mean_interval
-    claim = _missing(statement, source, measured, ranges)
+    claim = _missing(id, statement, source, measured, ranges, variant)
     if not groups:
         return claim
     level = 1 - (1 - statistics.LEVEL) / len(groups)
@@ -236,7 +255,7 @@ def at_each(
     verdict, why = _together(verdicts)
     deciding = [mu for mu in verdicts if verdicts[mu] == verdict] or list(verdicts)
     place = max(deciding, key=lambda mu: _beyond(estimates[mu][0], ranges.good))
-    where = f"{measured}{DECIDING} ({place:g})" if len(estimates) > 1 else measured
+    where = f"{measured}, at the deciding μ ({place:g})" if len(estimates) > 1 else measured
     value, low, high = estimates[place]
     return claim._replace(
         measured=where,
@@ -250,7 +269,7 @@ def at_each(
     )
 
 
-def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
+def turns(id: str, statement: str, groups: Groups, *, source: str = PRE) -> Claim:
     """The Claim that a number first rises and then falls, both significantly, from end to end.
 
     groups: {μ: [(disks, value)]}. For every μ between the ends, take the smaller of the rise from
@@ -263,7 +282,7 @@ def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
     measured = (
         f"the smaller of the rise to the maximum and the fall from it, over the maximum{span}"
     )
-    claim = _missing(statement, source, measured, ranges)
+    claim = _missing(id, statement, source, measured, ranges)
     if len(groups) < 3:
         return claim
     values = [np.array([value for _, value in group]) for group in groups.values()]

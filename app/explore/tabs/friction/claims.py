@@ -35,13 +35,14 @@ def claims(figure: int, opened: bool = False) -> str:
     grouped = outcomes.by_claim(chosen)
     used = [name for name in SAMPLERS if any(name in one for one in grouped.values())]
     rows = [HEAD.format("".join(f"<th>{SAMPLERS[name]}</th>" for name in used))]
-    for (statement, *_), one in grouped.items():
+    for one in grouped.values():
         cells = "".join(
             CELL.format(SAMPLERS[name], _cell(one[name])) if name in one else "<td></td>"
             for name in used
         )
         judged = f"<small>{typeset(_judged(one))}</small>"
-        rows.append(f"<tr><td>{typeset(statement)}{judged}</td>{cells}</tr>")
+        statement = typeset(next(iter(one.values()))["statement"])
+        rows.append(f"<tr><td>{statement}{judged}</td>{cells}</tr>")
     return (
         f"<details{' open' if opened else ''}><summary>Figure {figure}, "
         f"{TOPICS[figure].lower()}: {_counted(chosen)}</summary>"
@@ -67,19 +68,17 @@ def _counted(claims: Rows) -> str:
 
 def _judged(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number that a claim is judged by, and its ranges, in words."""
-    good, fair = outcomes.ranges(next(iter(by_sampler.values())))
-    words = f"{outcomes.SYMBOLS[REPRODUCED]} if {good}"
-    if fair:
-        words += f", {outcomes.SYMBOLS[STRONGLY]} unless {fair}"
+    claim = next(iter(by_sampler.values()))
+    words = f"{outcomes.SYMBOLS[REPRODUCED]} if {claim['good']}"
+    if claim["fair"]:
+        words += f", {outcomes.SYMBOLS[STRONGLY]} unless {claim['fair']}"
     return f"{_measured(by_sampler)}; {words.replace(' … ', UNBROKEN)}"
 
 
 def _measured(by_sampler: dict[str, dict[str, Any]]) -> str:
     """The number of a claim in words, with what is different about it for some samplers."""
     words = {
-        name: outcomes.judged_number(claim)
-        for name, claim in by_sampler.items()
-        if np.isfinite(claim["value"])
+        name: claim["number"] for name, claim in by_sampler.items() if np.isfinite(claim["value"])
     } or {"": next(iter(by_sampler.values()))["measured"]}
     usual, *_ = words.values()
     others: dict[str, list[str]] = {}

@@ -8,6 +8,7 @@ from bokeh.models import DataRange1d
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
+from granforce.paper.claims.figure1 import PAPERS_PEAK
 from granforce.paper.tables import packings_at_each
 
 from ....results import distributions, study_data
@@ -80,14 +81,11 @@ def _in_the_paper() -> str:
     peaks = study_data.maxima()
     if not peaks:
         return ""
-    ours, paper = (
-        [peak["value"] for peak in peaks],
-        peaks[0]["statement"].partition(study_data.PEAK)[2],
-    )
+    ours = [peak["value"] for peak in peaks]
     least, most = min(peak["low"] for peak in peaks), max(peak["high"] for peak in peaks)
     return (
         "In the paper's Figure 1 η also rises and falls, with its maxima near "
-        f"μ = {paper}; parabolas fitted to these points have them at {min(ours):.2f} to "
+        f"μ = {PAPERS_PEAK:g}; parabolas fitted to these points have them at {min(ours):.2f} to "
         f"{max(ours):.2f} (95 %: {least:.2f} to {most:.2f}). "
     )
 
