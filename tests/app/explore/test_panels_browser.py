@@ -259,7 +259,8 @@ def test_everything_can_be_taken_along(visit, tmp_path):
     head = [row for row in text if row.startswith("# ")]
     rows = text[len(head) :]
     assert any(row.startswith("# f_n_seen_low [mean]: smallest normal force") for row in head)
-    assert rows[0].startswith("contact,i,j,f_n_original") and len(rows) > DISKS
+    assert rows[0].startswith("contact,i,j,x,y,n_x,n_y,wall,f_n_original")
+    assert len(rows) > DISKS
     packing = gf.load_packing(io.BytesIO(take("Packing (NPZ)").read_bytes()))
     assert len(packing.r) == DISKS
     assert take("Networks (NetCDF)").read_bytes()[:3] == b"CDF"
