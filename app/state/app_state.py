@@ -405,10 +405,16 @@ class AppState(param.Parameterized):
         }
 
     def _bring_back(self, event: Any) -> None:
-        """Return to the view before a request that was cancelled or failed."""
-        if event.new and self.missing and self.cell is not None:
+        """Return to the view before a request that was cancelled or failed.
+
+        If there was none, a cancelled request opens what the page opens with.
+        """
+        cell = self.cell
+        if cell is None and event.name == "dismissed":
+            cell = best_cell(self.catalogue)
+        if event.new and self.missing and cell is not None:
             message = self.work.message
-            self.show(self.cell)
+            self.show(cell)
             self.work.message = message
 
     def grow(self, replay: Replay) -> None:
