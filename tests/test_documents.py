@@ -20,8 +20,8 @@ from packings import packed
 import granforce
 from granforce.bench import PARTS, solvers, states
 from granforce.bench import documents as benchmarks
-from granforce.cli.parser import main
-from granforce.cli.words import make_parser
+from granforce.cli.entry_point import main
+from granforce.cli.parser import make_parser
 from granforce.paper import claims, documents, highlights, tables
 from granforce.system import markdown
 

@@ -22,9 +22,9 @@ from packings import packed, reference
 import granforce as gf
 from granforce import tolerances
 from granforce.cli import report_lines
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
+from granforce.cli.parser import make_parser
 from granforce.cli.results import with_units
-from granforce.cli.words import make_parser
 from granforce.explore import uniform
 from granforce.figures import picture
 from granforce.glossary import TERMS

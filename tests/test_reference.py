@@ -13,7 +13,7 @@ import pytest
 
 import granforce
 from granforce.cli.commands import service
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.study.store import open_store
 
 HOUSE = granforce.__path__[0]

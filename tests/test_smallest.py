@@ -6,7 +6,7 @@ from packings import packed, two_disks
 
 import granforce as gf
 from granforce import measures
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.records import InputError, NotJammedError, make_contacts, make_packing
 from granforce.study import slices
 

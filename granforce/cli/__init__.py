@@ -1,5 +1,5 @@
 """The command line."""
 
-from granforce.cli.parser import command, main
+from granforce.cli.entry_point import command, main
 
 __all__ = ["command", "main"]

@@ -1,5 +1,5 @@
 """`python -m granforce.cli` is the command `granforce`."""
 
-from granforce.cli.parser import command
+from granforce.cli.entry_point import command
 
 command()

@@ -1,135 +1,315 @@
-"""The command line; `granforce COMMAND --help` explains each command with an example."""
+"""The parser of command lines: every option is used or rejected, every path has a role.
+
+Standard library only, like everything that `--help` needs.
+"""
 
 from __future__ import annotations
 
 import argparse
-import errno
+import difflib
 import os
+import re
+import stat
 import sys
-import warnings
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NoReturn
 
-from granforce.cli.parsing import Input, Output, Parser, StorePath, Workplace, refused
-from granforce.cli.words import make_parser
-from granforce.system import interrupts, streams
+from granforce import __version__
+from granforce.cli.command_table import COMMANDS, Command, Group, Hidden, Rule
+from granforce.cli.option_table import OPTIONS, as_typed
+from granforce.cli.path_roles import ROLES, Output, TableOrStore
+from granforce.cli.report_lines import FEW, explained
+from granforce.system.wording import integer, number
 
-# Standard library only: --help must not wait for numba, xarray and HiGHS.
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code.
-
-    0; 1 if some cells failed, or a result could not be printed or stored; 2 for invalid input; 130
-    after Ctrl-C.
-    """
-    with streams.guarded():
-        try:
-            try:
-                return _main(argv)
-            finally:
-                sys.stdout.flush()
-        except (streams.ReaderGone, BrokenPipeError):  # BrokenPipeError: a file that is a pipe
-            return 0
-        except streams.OutputError as error:
-            print(f"granforce: cannot write to standard output: {error}", file=sys.stderr)
-            return 1
+LONGEST = 600  # characters of a message
+# A word that begins so is a negative number, or a list of numbers: no option does.
+_NEGATIVE = re.compile(r"-\.?\d")
 
 
-def _main(argv: Sequence[str] | None) -> int:
-    parser = make_parser()
-    arguments = parser.parse_args(argv)
-    usual = warnings.formatwarning
-    with interrupts.noted():
-        try:
-            return _run(arguments, parser)
-        except KeyboardInterrupt as error:
-            return _report_interrupt(str(error))
-        except streams.OutputError:
-            raise
-        except Exception:
-            if interrupts.interrupted():  # raised by a library because of Ctrl-C
-                return _report_interrupt()
-            raise
-        finally:
-            warnings.formatwarning = usual
-
-
-def command() -> NoReturn:
-    """The process `granforce`: runs main and exits without waiting for remaining threads."""
-    streams.prepare()
-    code = main()
-    cancelling = sys.modules.get("granforce.system.cancelling")
-    if cancelling is not None and cancelling.left_behind():
-        os._exit(code)  # main has flushed all output
-    sys.exit(code)
-
-
-def _run(arguments: argparse.Namespace, parser: Parser) -> int:
-    command = parser.chosen(arguments)
-    for _, path in command.paths(arguments):
-        # Before the imports, which take seconds.
-        if isinstance(path, Input) and not os.path.lexists(os.path.expanduser(path)):
-            return refused(f"{path}: cannot be read (No such file or directory); check the path")
-    threads = os.environ.get("NUMBA_NUM_THREADS", "").strip()
-    if threads.lstrip("-").isdecimal() and threads.lstrip("0")[:1] in ("", "-"):
-        # numba's import would fail.
-        return refused(
-            f"NUMBA_NUM_THREADS must be at least 1, got {threads[:20]}; change or unset it"
-        )
-    from granforce.records import Cancelled, InputError
-    from granforce.system.terminal import one_line
-
-    warnings.formatwarning = one_line
+def _no_file(path: str) -> bool:
+    """Whether a path is a device, a pipe or an open file, none of which has a suffix."""
     try:
-        from granforce.cli import commands
-        from granforce.system.compiled import tell_when_compiling
-        from granforce.system.terminal import Bar
-
-        interrupts.check()  # an import may have swallowed Ctrl-C
-        tell_when_compiling(_say_compiling, Bar.restart)
-        _check_paths(arguments, command)
-        code: int = getattr(commands, arguments.run)(arguments) or 0
-        store = getattr(arguments, "store", None)
-        return max(code, 1) if store is not None and store.incomplete else code
-    except InputError as error:
-        option = command.option_of(error.argument, error.value, arguments)
-        return refused(option + str(error).removeprefix(error.argument) if option else str(error))
-    except OSError as error:
-        if error.errno not in (errno.EMFILE, errno.ENFILE):
-            raise
-        return refused("too many open files; use fewer --workers, or raise the limit (ulimit -n)")
-    except MemoryError as error:
-        return refused(f"not enough memory: {str(error) or 'ask for less'}")
-    except Cancelled:
-        return _report_interrupt()
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
 
 
-def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
-    """InputError if an input file would be overwritten, or two results have one name."""
-    from granforce.records import InputError
-    from granforce.study.store import default_path
-    from granforce.system.files import check_apart
+def refused(reason: str) -> int:
+    """Print why a command is rejected, as one line on stderr; returns the exit code 2."""
+    line = " ".join(str(reason).split())
+    if len(line) > LONGEST:  # for example a name of thousands of characters
+        line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
+    print(f"granforce: {line}", file=sys.stderr)
+    return 2
 
-    named = list(command.paths(arguments))
-    if "cache" in command.options and not any(isinstance(path, StorePath) for _, path in named):
-        named.append(("the store", StorePath(default_path())))
-    check_apart(
-        replaced=[(typed, path) for typed, path in named if isinstance(path, Output)],
-        folders=[(typed, path) for typed, path in named if isinstance(path, Workplace)],
-        stores=[(typed, path) for typed, path in named if isinstance(path, StorePath)],
-        read=[(typed, path) for typed, path in named if isinstance(path, Input)],
+
+def _closest(word: str, names: Iterable[str]) -> str:
+    """A question for the name that resembles a mistyped word; empty if none does."""
+    names = list(names)
+    called = _CALLED.get(word, "")
+    if called.partition(" ")[0] in names:
+        return f"; did you mean {called}?"
+    near = difflib.get_close_matches(word, [str(name) for name in names], n=1, cutoff=0.7)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _unrecognized(words: Sequence[str]) -> str:
+    return f"unrecognized arguments: {' '.join(words)}"
+
+
+# Names of other programs, or of the library, and what they are called here.
+_CALLED = {
+    "--friction": "--mu",
+    "--disks": "-n",
+    "critical-load": "load-factor --critical",
+    "critical-force": "perturb",
+    "critical-forces": "perturb",
+    "sample": "uniform",
+    "bounds": "intervals",
+}
+# Arguments of the library as its messages call them, and the attributes of their options.
+_ARGUMENTS = {
+    "friction coefficient": "mu",
+    "the number of disks": "n",
+    "the number of random contacts": "random",
+    "the number of states kept": "keep",
+    "effective sample size": "effective",
+    "k": "best",  # of `informative`
+}
+# Options that a useless one may be mistaken for, as attributes.
+_INSTEAD = {"mu": "ensemble_mu"}
+
+
+# Commands whose names are reserved in Python or used by a package: their functions end in "_".
+_TAKEN = ("import", "study")
+
+
+class _Once(argparse.Action):
+    """Stores the value of an option, which may be given once: another value would replace it.
+
+    suffixes: of a file, of which one selects the format; listed: several values, between commas.
+    """
+
+    def __init__(
+        self, *words: Any, suffixes: Sequence[str] = (), listed: bool = False, **options: Any
+    ) -> None:
+        self.suffixes, self.listed = suffixes, listed
+        if suffixes:
+            several = ",".join(suffixes)
+            options["metavar"] = f"FILE.{{{several}}}" if len(suffixes) > 1 else f"FILE.{several}"
+        super().__init__(*words, **options)
+
+    def __call__(
+        self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
+    ) -> None:
+        if option_string is not None and self.dest in parser.seen:
+            parser.error(f"{option_string} is given twice; give it once")
+        parser.seen.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that reports errors in one line and rejects options without effect."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.unused: tuple[Rule, ...] = ()  # forms of the command that exclude options
+        self.seen: set[str] = set()  # attributes given so far in a command line
+        self._negative_number_matcher = _NEGATIVE
+        for name in (None, "store"):
+            self.register("action", name, _Once)
+        for kind, read in ((float, number), (int, integer)):
+            self.register("type", kind, read)
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(refused(f"{message}; see {self.prog} --help"))
+
+    @property
+    def options(self) -> dict[str, str]:
+        """{attribute: as typed} of all options and positional arguments except --help."""
+        return {
+            action.dest: action.option_strings[-1] if action.option_strings else action.dest
+            for action in self._actions
+            if action.dest != "help"
+        }
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        self.seen.clear()
+        arguments, unknown = super().parse_known_args(args, namespace)
+        if unknown:  # reported here: argparse would pass those of a subcommand to its parent
+            self.error(self._unknown(unknown, sys.argv[1:] if args is None else args))
+        ways = [way for way in self.unused if way.holds(arguments)]
+        if ways:
+            given = self._given(args)
+            for way in ways:
+                if useless := [typed for name, typed in given.items() if name in way.names]:
+                    have, them = ("has", "it") if len(useless) == 1 else ("have", "them")
+                    other = self._instead(given.keys() & way.names)
+                    self.error(
+                        f"{' and '.join(useless)} {have} no effect {way.words}; leave {them} out"
+                        + (f", or use {other} for other Coulomb cones" if other else "")
+                    )
+        return arguments, unknown
+
+    def _instead(self, useless: Iterable[str]) -> str | None:
+        """The option that was meant by a useless one, as typed, or None."""
+        others = [_INSTEAD[name] for name in useless if name in _INSTEAD]
+        return self.options.get(others[0]) if others else None
+
+    def _unknown(self, unknown: Sequence[str], args: Sequence[str]) -> str:
+        """Why words are not understood: mistyped options, or a second value of an option."""
+        first, words = unknown[0], list(args)
+        if first.startswith("-"):
+            name = first.partition("=")[0]
+            hint = _closest(name, self._option_string_actions)
+            return f"there is no option {name}{hint}" if hint else _unrecognized(unknown)
+        at = words.index(first) if first in words else 0
+        action = self._option_string_actions.get(words[at - 2]) if at >= 2 else None
+        if action is None or action.nargs is not None:
+            return _unrecognized(unknown)
+        option, value = words[at - 2 : at]
+        if getattr(action, "listed", False):
+            return f"{option}: separate values by commas, as in {option} {value},{first}"
+        return f"{option} takes one value, not {value} and {first}"
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Reject a value that is not among the choices of an option, or no command."""
+        if action.choices is None or value in action.choices:
+            return
+        name = "/".join(action.option_strings) or str(action.metavar or action.dest).lower()
+        hint = (
+            _closest(str(value), action.choices)
+            or f"; choose from {', '.join(map(str, action.choices))}"
+        )
+        raise argparse.ArgumentError(None, f"{name} {str(value)[:40]!r} is unknown{hint}")
+
+    def _given(self, args: Sequence[str] | None) -> dict[str, str]:
+        """The options given in a command line, whatever their values."""
+        defaults = [(action, action.default) for action in self._actions]
+        self.seen.clear()
+        try:
+            for action, _ in defaults:
+                action.default = argparse.SUPPRESS
+            values = vars(super().parse_known_args(args)[0])
+        finally:
+            for action, default in defaults:
+                action.default = default
+        # A missing positional argument may get its default anyway.
+        given = {name for name, value in values.items() if value != argparse.SUPPRESS}
+        return {name: typed for name, typed in self.options.items() if name in given}
+
+    def every_action(self) -> Iterator[argparse.Action]:
+        """The options and arguments of this parser and of the commands below it."""
+        for action in self._actions:
+            yield action
+            if isinstance(action, argparse._SubParsersAction):
+                for parser in dict.fromkeys(action.choices.values()):
+                    yield from parser.every_action()
+
+    def chosen(self, arguments: argparse.Namespace) -> Parser:
+        """The parser of the command in a command line."""
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                chosen: Parser = action.choices[getattr(arguments, action.dest)]
+                return chosen.chosen(arguments)
+        return self
+
+    def strange_suffix(self, arguments: argparse.Namespace) -> str | None:
+        """The error in the suffix of an output file, which selects its format, or None."""
+        for action in self._actions:
+            path, suffixes = getattr(arguments, action.dest, None), getattr(action, "suffixes", ())
+            if isinstance(path, (Output, TableOrStore)) and suffixes and not _no_file(path):
+                endings = [f".{suffix}" for suffix in suffixes]
+                if not path.endswith(tuple(endings)):
+                    *others, last = endings
+                    words = f"{', '.join(others)} or {last}" if others else last
+                    return f"{action.option_strings[-1]} {path}: the name must end with {words}"
+        return None
+
+    def option_of(self, argument: str, value: Any, arguments: argparse.Namespace) -> str | None:
+        """The option, as typed, that gave an argument of the library its value, or None.
+
+        Of several, such as --seed and --walk-seed for a seed, it is the one with that value.
+        """
+        word = _ARGUMENTS.get(argument, argument.removeprefix("the number of "))
+        found = [
+            (typed, given)
+            for name, typed in self.options.items()
+            if f"_{name}".endswith(f"_{word}")
+            and (given := getattr(arguments, name, None)) is not None
+        ]
+        if len(found) > 1:
+            plain = isinstance(value, (int, float, str))
+            found = [one for one in found if one[1] is value or (plain and one[1] == value)]
+        return found[0][0] if found else None
+
+    def paths(self, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
+        """(as typed, path with its role) of every path in a command line."""
+        for name, typed in self.options.items():
+            value = getattr(arguments, name, None)
+            for word in value if isinstance(value, list) else [value]:
+                for path in getattr(word, "files", [word]):
+                    if isinstance(path, ROLES):
+                        yield typed, path
+
+
+def make_parser() -> Parser:
+    """The parser of the whole command line."""
+    parser = Parser(
+        prog="granforce",
+        description="Quantify how undetermined the contact forces in packings of rigid disks are.",
+        epilog="Example:\n  granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    if strange := command.strange_suffix(arguments):
-        raise InputError(strange)
+    parser.add_argument("--version", action="version", version=f"granforce {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for command in COMMANDS:
+        function = command.name.replace("-", "_")
+        function += "_" if command.name in _TAKEN else ""
+        added = _add_command(commands, command, command.example, function)
+        if command.formats:
+            formats = added.add_subparsers(dest="format", metavar="FORMAT", required=True)
+            for form in command.formats:
+                example = f"{added.prog} {form.name} {form.example} --mu 0.3 --out packing.npz"
+                _add_command(formats, form, example, function)
+    return parser
 
 
-def _report_interrupt(saved: str = "") -> int:
-    saved = saved and f"; {saved}; run the same command again to continue"
-    print(f"granforce: interrupted{saved}", file=sys.stderr)
-    return 130
+def _add_command(
+    commands: argparse._SubParsersAction[Parser], command: Command, example: str, function: str
+) -> Parser:
+    """Add a command, which runs this function of `granforce.cli.commands`."""
+    report = f"Lines of the report:\n{explained(command.lines)}\n\n" if command.lines else ""
+    if command.columns:
+        columns = explained(command.columns)
+        report += f"At most {FEW} contacts are listed, with columns\n{columns}\n\n"
+    parser = commands.add_parser(
+        command.name,
+        help=command.summary,
+        description=command.summary[0].upper() + command.summary[1:] + ".",
+        epilog=f"{report}Example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.set_defaults(run=function)
+    for part in command.parts:
+        if isinstance(part, Group):
+            group = parser.add_argument_group(part.title, part.description)
+            if part.one_of:
+                _add_options(group.add_mutually_exclusive_group(), part.one_of)
+            _add_options(group, part.options)
+        else:
+            _add_options(parser, part)
+    parser.unused = command.rules
+    return parser
 
 
-def _say_compiling() -> None:
-    # Like a progress line, which later ones may overwrite.
-    print("\rgranforce: compiling what this command needs, once per machine …", file=sys.stderr)
+def _add_options(group: argparse._ActionsContainer, keys: str) -> None:
+    for key in keys.split():
+        keywords = OPTIONS[key].keywords
+        if isinstance(keys, Hidden):
+            keywords["help"] = argparse.SUPPRESS
+        group.add_argument(as_typed(key), **keywords)

@@ -16,7 +16,7 @@ from mkdocs.structure.pages import Page
 
 import granforce
 from granforce import glossary
-from granforce.cli.words import make_parser
+from granforce.cli.parser import make_parser
 from granforce.fields import fields
 from granforce.quantities import Field
 from granforce.system.markdown import table

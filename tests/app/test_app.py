@@ -56,7 +56,7 @@ from app.state.pulls import Hand
 from app.state.view_settings import SORTS, Looks
 from app.state.visit import turns
 from granforce import measures
-from granforce.cli import parser
+from granforce.cli import entry_point
 from granforce.experiment.measurements import Measurement
 from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
@@ -413,7 +413,7 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
 
     monkeypatch.setattr(kinds, "get_packing", lambda *given, **options: (None, True))
     monkeypatch.setattr(study, "get", note)
-    assert parser.main(command(wanted).split()[1:]) == 130
+    assert entry_point.main(command(wanted).split()[1:]) == 130
     expected = wanted.parameters()
     assert found[0] | {"keep": None} == expected | {"keep": None}
 

@@ -20,7 +20,7 @@ from packings import packed
 import granforce as gf
 from granforce.cli import commands
 from granforce.cli.commands import service
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.packing.importers import save_packing
 from granforce.study.store import open_store
 from granforce.system import compiled, interrupts

@@ -12,8 +12,8 @@ import pytest
 import random_lines
 from packings import packed
 
-from granforce.cli.parser import main
-from granforce.cli.parsing import LONGEST
+from granforce.cli.entry_point import main
+from granforce.cli.parser import LONGEST
 from granforce.packing.importers import save_packing
 
 PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"

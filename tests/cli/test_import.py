@@ -6,8 +6,8 @@ import itertools
 import pytest
 
 from granforce.cli.commands.packings import READERS
-from granforce.cli.parser import main
-from granforce.cli.words import make_parser
+from granforce.cli.entry_point import main
+from granforce.cli.parser import make_parser
 from granforce.experiment.pegs import read_pegs
 
 FILES = {"help", "json", "out", "measured", "grains", "contacts"}

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.packing.importers import load_packing
 
 pytestmark = pytest.mark.fast

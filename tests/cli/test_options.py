@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.cli import commands, parser, parsing
+from granforce.cli import command_table, commands, entry_point, option_table, parser
 from granforce.cli import frames as series_of_frames
+from granforce.cli.path_roles import ROLES, Input, Output, StorePath, Workplace
 from granforce.forces.build import ensemble
 from granforce.packing.exporters import save_lammps
 from granforce.packing.importers import load_packing, read_table, save_packing
@@ -194,6 +195,17 @@ def test_every_command_and_every_way_has_a_line():
         for way in one.unused:
             held = {bool(way.holds(arguments)) for arguments in given}
             assert held == {True, False}, (command, way.words)
+            assert way.names <= one.options.keys(), (command, way.words)
+
+
+def test_every_option_of_the_table_belongs_to_a_command():
+    commands_and_formats = [*command_table.COMMANDS, *command_table.FORMATS]
+    parts = [part for command in commands_and_formats for part in command.parts]
+    texts = [
+        f"{part.one_of} {part.options}" if isinstance(part, command_table.Group) else part
+        for part in parts
+    ]
+    assert set(" ".join(texts).split()) == option_table.OPTIONS.keys()
 
 
 @pytest.mark.parametrize("command, line", CASES)
@@ -229,7 +241,7 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
         if action.dest in way.names and action.option_strings:
             words = [*command.split(), *shlex.split(line), *_typed(action)]
             with pytest.raises(SystemExit) as stop:
-                parser.main(words)
+                entry_point.main(words)
             told = capsys.readouterr()
             assert stop.value.code == 2 and told.out == "" and told.err.count("\n") == 1
             # Another way may come first: two options of which only one may be given, say.
@@ -237,7 +249,7 @@ def test_what_is_not_used_is_refused(command, line, said, capsys):
 
 
 def test_a_second_packing_is_refused(here, capsys):
-    assert parser.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
+    assert entry_point.main(["infer", "p.npz", "blocks.npz", "--measured", "m.csv"]) == 2
     assert "give one packing file" in capsys.readouterr().err
 
 
@@ -284,7 +296,7 @@ def test_values_that_begin_with_a_minus_need_no_equals_sign(command):
     ],
 )
 def test_a_case_given_twice_is_refused(line, here, capsys):
-    assert parser.main(line.split()) == 2
+    assert entry_point.main(line.split()) == 2
     assert "is given twice; give it once" in capsys.readouterr().err
 
 
@@ -299,7 +311,7 @@ def test_a_sign_that_changes_nothing_is_refused(tmp_path, capsys, monkeypatch):
     Path("two.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     Path("pair.csv").write_text("i,j,f_n,f_t\n0,1,1,0\n")
     line = "import table two.csv pair.csv --mu 0.3 --reverse --out new.npz"
-    assert parser.main(line.split()) == 2
+    assert entry_point.main(line.split()) == 2
     assert "every tangential force is 0" in capsys.readouterr().err
     assert not (tmp_path / "new.npz").exists()
     with pytest.raises(InputError, match="leave it out"):
@@ -307,7 +319,7 @@ def test_a_sign_that_changes_nothing_is_refused(tmp_path, capsys, monkeypatch):
     save_lammps(packed(20, 0.0), "grains.dump", "contacts.dump")
     for many in ("", " --frames all --cache store --out all.zarr"):
         line = f"import lammps grains.dump contacts.dump --mu 0 --reverse{many}"
-        assert parser.main(line.split()) == 2
+        assert entry_point.main(line.split()) == 2
         assert "every tangential force is 0" in capsys.readouterr().err
     assert not (tmp_path / "all.zarr").exists()
 
@@ -324,22 +336,22 @@ def test_the_suffix_of_a_scan_decides_between_table_and_store(here, capsys, monk
 
     monkeypatch.setattr(commands.states.scans, "scan", scan)
     line = "scan --mu 0.3 -n 8 --cache done/cells.zarr --out"
-    assert parser.main([*line.split(), "table.csv"]) == 0
+    assert entry_point.main([*line.split(), "table.csv"]) == 0
     head, line_of_table = Path("table.csv").read_text().splitlines()
     assert head == ",".join(name for name in rows[0] if name != "cached")
     assert line_of_table == "0.5,1,0.25,0.25,0.25,0.25,0.25,1,3,3,3,3"
     assert paths == [here / "done" / "cells.zarr"]
     with pytest.raises(SystemExit):
-        parser.main([*line.split(), "other.zarr"])
+        entry_point.main([*line.split(), "other.zarr"])
     assert "--cache has no effect with --out FOLDER.zarr" in capsys.readouterr().err
-    assert parser.main("scan --mu 0.3 --out table.txt".split()) == 2
+    assert entry_point.main("scan --mu 0.3 --out table.txt".split()) == 2
     assert "the name must end with .csv or .zarr" in capsys.readouterr().err
     assert not Path("table.txt").exists()
 
 
 def test_a_default_that_is_typed_counts_as_given(capsys):
     with pytest.raises(SystemExit):
-        parser.main(["walk", "p.npz", "--seed", "1"])
+        entry_point.main(["walk", "p.npz", "--seed", "1"])
     assert "--seed has no effect with the file of a packing" in capsys.readouterr().err
 
 
@@ -352,7 +364,7 @@ def test_every_option_says_what_its_words_are():
             names_path = any(
                 word in str(action.metavar) for word in ("FILE", "FOLDER", "STORE")
             ) or action.dest in ("grains", "files", "out", "csv", "cache")
-            assert action.type in parsing.ROLES or not names_path, (command, action.dest)
+            assert action.type in ROLES or not names_path, (command, action.dest)
 
 
 def _of_role(one, *roles):
@@ -362,8 +374,8 @@ def _of_role(one, *roles):
 def _clashes():
     """(command, words) in which an output is an input, another output, or inside the store."""
     for command, one in PARSERS.items():
-        outputs = _of_role(one, parsing.Output, parsing.Workplace)
-        others = [*outputs, *_of_role(one, parsing.Input, parsing.StorePath)]
+        outputs = _of_role(one, Output, Workplace)
+        others = [*outputs, *_of_role(one, Input, StorePath)]
         for out in outputs:
             for other in others:
                 if other is not out:
@@ -379,7 +391,7 @@ def test_no_output_is_an_input_or_another_output(alias, tmp_path, monkeypatch, c
     Path("nowhere").touch()  # an input that is there
     for command, out, other in _clashes():
         name, file = "data", Path("data")
-        folder = parsing.Workplace in (out.type, other.type) or other.type is parsing.StorePath
+        folder = Workplace in (out.type, other.type) or other.type is StorePath
         if folder and alias == "hard":
             continue
         file.mkdir() if folder else file.write_text("precious")
@@ -391,7 +403,7 @@ def test_no_output_is_an_input_or_another_output(alias, tmp_path, monkeypatch, c
         words = [*command.split(), *_clash_line(command, {out.dest: twin, other.dest: name})]
         before = sorted(Path().iterdir())
         try:
-            code = parser.main(words)
+            code = entry_point.main(words)
         except SystemExit as stop:
             code = stop.code
         told = capsys.readouterr()
@@ -442,12 +454,12 @@ def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkey
         "pack -n 8 --mu 0.3 --radii r.txt --out r.txt",
         "import pegs positions.txt adjacency.txt --mu 0.3 --out new --measured ./new",
     ):
-        assert parser.main(words.split()) == 2, words
+        assert entry_point.main(words.split()) == 2, words
         assert "would overwrite" in capsys.readouterr().err
     assert sorted(tmp_path.rglob("*")) == before
     # Devices may be named more than once, and nothing there can be lost.
     words = "import table /dev/null --mu 0.3 --out /dev/null"
-    assert parser.main(words.split()) == 2
+    assert entry_point.main(words.split()) == 2
     assert "overwrite" not in capsys.readouterr().err
 
 
@@ -462,8 +474,8 @@ def test_outputs_have_a_name_and_series_that_of_a_folder(here, capsys):
             "--frames the name must end with .zarr",
         ),
     ):
-        assert parser.main(["export", "p.npz", "g.dump", "c.dump"]) == 0
-        assert parser.main(words) == 2
+        assert entry_point.main(["export", "p.npz", "g.dump", "c.dump"]) == 0
+        assert entry_point.main(words) == 2
         assert said in capsys.readouterr().err
     assert {*here.rglob("*")} - {*before} == {here / "g.dump", here / "c.dump"}
 
@@ -471,7 +483,7 @@ def test_outputs_have_a_name_and_series_that_of_a_folder(here, capsys):
 def test_frames_replace_no_store(here, capsys):
     kept = sorted((here / "done").rglob("*"))
     words = f"infer {FRAMES} --frames all --mu 0.3 --out done/cells.zarr"
-    assert parser.main(words.split()) == 2
+    assert entry_point.main(words.split()) == 2
     assert "is a store of results" in capsys.readouterr().err
     assert sorted((here / "done").rglob("*")) == kept
 
@@ -488,7 +500,7 @@ def test_frames_replace_no_store(here, capsys):
 )
 def test_an_option_given_twice_is_refused(line, capsys):
     with pytest.raises(SystemExit) as stop:
-        parser.main(line.split())
+        entry_point.main(line.split())
     told = capsys.readouterr()
     assert stop.value.code == 2 and told.out == "" and told.err.count("\n") == 1
     assert "is given twice; give it once" in told.err
@@ -497,7 +509,7 @@ def test_an_option_given_twice_is_refused(line, capsys):
 @pytest.mark.parametrize("threads", ["0", "-1", "00"])
 def test_a_number_of_threads_that_numba_refuses_is_one_line(threads, here, monkeypatch, capsys):
     monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
-    assert parser.main(["cache", "list"]) == 2
+    assert entry_point.main(["cache", "list"]) == 2
     assert "NUMBA_NUM_THREADS must be at least 1" in capsys.readouterr().err
 
 
@@ -506,14 +518,14 @@ def test_a_working_folder_that_was_removed_is_one_line(here, monkeypatch, capsys
     monkeypatch.chdir(here / "gone")
     (here / "gone").rmdir()
     words = ["intervals", str(here / "p.npz"), "--out", "x.csv"]
-    assert parser.main(words) == 2
+    assert entry_point.main(words) == 2
     assert "x.csv: the working folder was removed" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command, shown", [("pack", True), ("scan", True), ("walk", False)])
 def test_only_commands_about_packings_explain_the_compaction(command, shown, capsys):
     with pytest.raises(SystemExit):
-        parser.main([command, "--help"])
+        entry_point.main([command, "--help"])
     said = capsys.readouterr().out
     for option in ("--dt", "--box-mass", "--sweeps", "--step-accuracy"):
         assert (f"  {option} " in said) == shown
@@ -544,7 +556,7 @@ def test_options_with_a_number_take_no_underscores(command):
 def test_lists_of_numbers_take_no_underscores(line, here, capsys):
     (here / "underscores.txt").write_text("1\n1\n1\n1_5\n")
     try:
-        assert parser.main(line.split()) == 2
+        assert entry_point.main(line.split()) == 2
     except SystemExit as ended:
         assert ended.code == 2
     said = capsys.readouterr().err

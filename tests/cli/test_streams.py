@@ -10,7 +10,7 @@ import warnings
 
 import pytest
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.study import entries
 from granforce.study.store import open_store
 

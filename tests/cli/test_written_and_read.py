@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from granforce.cli import input_tables
-from granforce.cli.parser import main
-from granforce.cli.parsing import Edited, Input, Output, TableOrStore, Workplace
-from granforce.cli.words import make_parser
+from granforce.cli.entry_point import main
+from granforce.cli.parser import make_parser
+from granforce.cli.path_roles import Edited, Input, Output, TableOrStore, Workplace
 from granforce.packing import importers
 
 # {(command, option): (kind, command line)} of every option that writes a file, in the order in

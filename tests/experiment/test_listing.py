@@ -10,7 +10,7 @@ import pytest
 from frames import file, frame
 
 from app.results.photoelastic_frames import account
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.experiment.boundary import boundary
 from granforce.experiment.frames import frames_of
 from granforce.experiment.pegs import read_pegs

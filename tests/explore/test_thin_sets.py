@@ -14,7 +14,7 @@ from packings import packed
 from scipy import linalg, stats
 
 import granforce as gf
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 
 # In ⟨f_n⟩, and for f_t in μ ⟨f_n⟩.
 WIDTHS = 1e-3, 1e-7, 9e-9, 1e-10, 3e-12

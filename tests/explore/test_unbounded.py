@@ -8,7 +8,7 @@ from packings import REFERENCE
 from scipy import optimize
 
 import granforce as gf
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.contact_problem import make_system
 from granforce.numerics import certificates

@@ -24,7 +24,7 @@ from packings import REFERENCE, lattice, packed, reference, two_disks
 from scipy import linalg, sparse
 
 from granforce import bench, measures
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore import billiard, uniform
 from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import linprog
 
 import granforce as gf
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.packing.assemblies import with_network
 from granforce.packing.masonry import rectangle
 from granforce.study.kinds import imported_parameters

@@ -8,7 +8,7 @@ import pytest
 from packings import packed, skewed
 from simulators import MU, N, mercury, vectors, yade
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.forces.build import ensemble
 from granforce.packing.importers import read_columns, read_mercury, read_table, read_yade
 from granforce.records import InputError

@@ -9,7 +9,7 @@ from packing.test_importers import PARTICLES, SMALL, cluster
 from packing.test_simulations import INNER, OUTER, boxed
 from packings import packed, skewed
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore.random_walk import walk
 from granforce.forces.build import ensemble
 from granforce.packing.exporters import save_lammps, save_vtk

@@ -18,7 +18,7 @@ import pytest
 from packing.test_importers import tables
 from packings import packed
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.packing.importers import (

@@ -15,7 +15,7 @@ import pytest
 from heeding import heeding, interrupted, until_it_left
 
 from granforce import measures
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
 from granforce.measures import statistics

@@ -4,8 +4,8 @@ import argparse
 
 import numpy as np
 
-from granforce.cli import parsing
-from granforce.cli.words import make_parser
+from granforce.cli import path_roles
+from granforce.cli.parser import make_parser
 
 LONG = "9" * 30
 WHOLE = ["-1", "0", "1", "2", "1.5", "nan", "", "three", "1e3", LONG]
@@ -60,7 +60,7 @@ def words_for(action):
         return WHOLE
     if action.type is float:
         return REAL
-    return PATHS if action.type in parsing.ROLES else [*TEXT, *PATHS]
+    return PATHS if action.type in path_roles.ROLES else [*TEXT, *PATHS]
 
 
 def line(command, parser, rng):

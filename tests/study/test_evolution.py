@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from packing.test_simulations import MU, contacts, given, mercury_in_a_box, particles
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.packing.importers import open_lammps

@@ -10,7 +10,7 @@ from frames import write
 from full_disk import files_of
 from packings import packed
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.experiment.frames import frames_of
 from granforce.experiment.synthetic import synthetic_frame
 from granforce.records import InputError

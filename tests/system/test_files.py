@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from granforce.cli.parser import main
+from granforce.cli.entry_point import main
 from granforce.cli.results import radii
 from granforce.experiment.pegs import read_pegs
 from granforce.packing.importers import load_packing

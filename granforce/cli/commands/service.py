@@ -20,7 +20,8 @@ from typing import Any
 
 import platformdirs
 
-from granforce.cli.parsing import LONGEST, ROLES, Input, Output
+from granforce.cli.parser import LONGEST, make_parser
+from granforce.cli.path_roles import ROLES, Input, Output
 from granforce.records import InputError, whole
 from granforce.study import kinds
 from granforce.study.keys import Parameters
@@ -134,8 +135,6 @@ class _QuietHandler(http.server.SimpleHTTPRequestHandler):
 def completion(arguments: argparse.Namespace) -> None:
     """Print the script for completion in a shell."""
     import shtab
-
-    from granforce.cli.words import make_parser
 
     parser = make_parser()
     for action in parser.every_action():
