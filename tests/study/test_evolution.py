@@ -85,7 +85,7 @@ def test_by_the_command_line(away, capsys):
     with xr.open_zarr("s.zarr", consolidated=False) as dataset:
         assert dataset["dimension"].values.tolist() == [row["dimension"] for row in rows]
     assert main([*words, "--frames", "200"]) == 0
-    for frames, said in (("7", "no frame 7; the frames are 100"), ("x", "all, or numbers")):
+    for frames, said in (("7", "no timestep 7: there is 100 … 300"), ("x", "all, or numbers")):
         assert main([*words, "--frames", frames]) == 2
         assert said in capsys.readouterr().err
 

@@ -29,10 +29,10 @@ NAMES = {
     "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-2130d78dc07681ab080e"),
     "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-348a39809923bad22be4"),
     "stress": ((MADE,), {"angles": 16}, "stress-eff83621cfee69021951"),
-    "perturbation": ((MADE,), {"random": 4}, "perturbation-7bcd9d365caf0baace2d"),
+    "perturbation": ((MADE,), {"random": 4}, "perturbation-94e3d80e285b8690875e"),
     "informative": ((MADE,), {"k": 5}, "informative-7f42aaf5fdab74dc1f88"),
     "volume": ((MADE, 0.1), {}, "volume-aca5da65c0a840eb75ab"),
-    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-e9c08d0cf7690a3f087c"),
+    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-6bd9faef7813cda5c390"),
 }
 
 

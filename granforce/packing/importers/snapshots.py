@@ -47,7 +47,7 @@ class Snapshots(NamedTuple):
         if number in self.empty:
             missing = self.empty[int(number)]
             return InputError(f"{self.word} {number:g} has no {missing}: {available}")
-        return InputError(f"no {self.word} {number}: {available}")
+        return InputError(f"no {self.word} {number:g}: {available}")
 
     @noted(lambda snapshot: snapshot.packing.info)
     def snapshot(self, number: int | None = None) -> Snapshot:
