@@ -46,6 +46,12 @@ def test_no_room_has_many_files():
         assert len(files) <= MOST_FILES, room
 
 
+def test_files_of_tests_have_names_of_their_own():
+    """Folders of tests are no packages: two files of one name could not be collected together."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_every_room_says_what_it_is_for():
     assert len(rooms()) > 8
     for room in rooms():
