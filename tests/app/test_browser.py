@@ -468,13 +468,13 @@ def test_states_computed_while_the_page_is_on_its_way_are_shown(opening, served)
     """The browser has fetched the page, and says so only when the states have been computed."""
     query, cache = "?mu=0.1&n=30&states=5&walkseed=77", served[1] / "cache"
     page = opening(query, 1280, 900, prepare=lambda page: page.add_init_script(SLOW_TO_ANSWER))
-    painted(page)
-    for _ in range(600):
+    for _ in range(1800):
         if cache.is_dir() and open_store(cache).find("walk", seed=77):
             break
         page.wait_for_timeout(100)
     page.wait_for_timeout(500)  # until the page's thread knows
     page.evaluate("answer()")
+    painted(page)  # nothing before: no other packing is shown in place of the requested one
     until(page, "scene.geometry.states === 5")
     expect(page.locator(".source")).to_contain_text("5 networks")
 
