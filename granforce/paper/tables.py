@@ -279,16 +279,18 @@ def packings_at_each(rows: pd.DataFrame) -> str:
 def merged(new: StudyTable, old: StudyTable) -> StudyTable:
     """The StudyTable `new`, followed by rows of its plan that only `old` has.
 
+    A part of which `old` has other versions than the plan comes from `new` alone, as a whole.
     Numbers of a row that depend on other cells (distances from the uniform centre) keep their old
-    values if those cells no longer exist. Raises InputError if rows have other versions than those
-    that the plan has now.
+    values if those cells no longer exist. Raises InputError if `new` lacks a part of which `old`
+    has other versions.
     """
     planned = _tasks_named(plans.tasks(plans.Plan(**new.plan))).set_index(_KEYS)
     ours, theirs = _names(new.rows), _names(old.rows)
-    _check_same_versions(old.rows, planned.reindex(theirs))
-    lacked = theirs.isin(planned.index) & ~theirs.isin(ours)
+    outdated = _outdated_parts(old.rows, planned.reindex(theirs), new.rows["part"])
+    kept = ~old.rows["part"].isin(outdated).to_numpy()
+    lacked = theirs.isin(planned.index) & ~theirs.isin(ours) & kept
     place = {k: len(new.rows) + at for at, k in enumerate(np.flatnonzero(lacked).tolist())}
-    known = old.rows.set_axis(theirs).reindex(ours).set_axis(new.rows.index)
+    known = old.rows.set_axis(theirs)[kept].reindex(ours).set_axis(new.rows.index)
     added = old.samples[old.samples["row"].isin(place)]
     added = added.assign(row=added["row"].map(place))
     return new._replace(
@@ -326,18 +328,19 @@ def _names(rows: pd.DataFrame) -> pd.MultiIndex:
     return pd.MultiIndex.from_frame(full[_KEYS])
 
 
-def _check_same_versions(rows: pd.DataFrame, planned: pd.DataFrame) -> None:
-    """InputError if a row has another version than the row of the plan, if there is one, below it.
+def _outdated_parts(rows: pd.DataFrame, planned: pd.DataFrame, replaced: pd.Series) -> set[str]:
+    """Parts with a row of another version than the row of the plan below it, if there is one.
 
-    planned: as many rows, NaN where the plan has none.
+    planned: as many rows, NaN where the plan has none. InputError unless all are in `replaced`.
     """
     wanted = planned[_VERSIONS].set_axis(rows.index)
-    differ = wanted["version"].notna() & (rows[_VERSIONS] != wanted).any(axis=1)
-    for k in rows.index[differ][:1]:
+    differ = rows[wanted["version"].notna() & (rows[_VERSIONS] != wanted).any(axis=1)]
+    for k, row in differ[~differ["part"].isin(replaced)][:1].iterrows():
         raise InputError(
-            f"the older table has {rows.loc[k, 'part']} {_version_words(rows.loc[k])}, which "
-            f"cannot be combined with {_version_words(wanted.loc[k])}: leave --table out"
+            f"the older table has {row['part']} {_version_words(row)}, which cannot be combined "
+            f"with {_version_words(wanted.loc[k])}: compute that part, or leave --table out"
         )
+    return set(differ["part"])
 
 
 _VERSIONS = ["version", "packing_version"]

@@ -616,14 +616,22 @@ def test_versions_are_not_mixed(done, table, tmp_path, capsys):
         assert row["version"] == task.cell.kind.version
         assert row["packing_version"] == task.cell.parameters["packing"]["version"]
     old = table._replace(rows=table.rows.assign(packing_version=1.0))
+    walks = table._replace(rows=table.rows[table.rows["part"] == "walk"])
     with pytest.raises(InputError, match="packings of version 1, which cannot be combined with"):
-        tables.merged(table, old)
+        tables.merged(walks, old)
     unknown = table.rows.assign(version=np.nan, packing_version=np.nan)
     with pytest.raises(InputError, match="version unknown"):
-        tables.merged(table, table._replace(rows=unknown))
+        tables.merged(walks, table._replace(rows=unknown))
     kind = table._replace(rows=table.rows.assign(version=0.0))
     with pytest.raises(InputError, match="exact of version 0"):
-        tables.merged(table, kind)
+        tables.merged(walks, kind)
+    # A part that was computed anew, if only in part, has no rows of the older version.
+    is_walk = table.rows["part"] == "walk"
+    risen = table._replace(rows=table.rows.assign(version=table.rows["version"] - is_walk))
+    first = table._replace(rows=table.rows[is_walk][:1], samples=table.samples[:0])
+    joined = tables.merged(first, risen)
+    assert len(joined.part("walk")) == 1
+    assert len(joined.rows) == len(table.rows) - is_walk.sum() + 1
     # A table that mixes them, however it came about, is not read.
     mixed = pd.concat([table.rows[:-1], old.rows[-1:]])
     tables.save(table._replace(rows=mixed), tmp_path / "mixed.zarr")
