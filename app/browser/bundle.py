@@ -5,13 +5,13 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import panel as pn
 from bokeh.document import Document
 from panel.custom import JSComponent
 
-from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
+from .messages import Message, fits
 from .panel_patches import once_loaded
 
 APP = Path(__file__).resolve().parents[1]
@@ -82,13 +82,19 @@ class Scripted(JSComponent):
     before its first picture.
     """
 
-    _heard: Callable[[Message], object]  # called with the messages in FROM_BROWSER
+    to_browser: ClassVar[tuple[Message, ...]] = ()  # shapes of the messages to the script
+    _handlers: ClassVar[list[tuple[Message, Callable[..., object]]]] = []
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         path = Path(str(sys.modules[cls.__module__].__file__)).with_suffix(".js")
         cls._esm = module(path)
         cls._stylesheets = [SHARED, path.with_suffix(".css").read_text()]
+        cls._handlers = [
+            (shape, method)
+            for method in vars(cls).values()
+            for shape in getattr(method, "from_browser", ())
+        ]
 
     def __init__(self, **params: Any) -> None:
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param has no type hints
@@ -100,15 +106,16 @@ class Scripted(JSComponent):
         return properties
 
     def tell(self, message: Message) -> None:
-        """Send a message to the script; ValueError if it is not in TO_BROWSER."""
-        if not listed(TO_BROWSER, type(self).__name__, message):
+        """Send a message to the script; ValueError if it is not in `to_browser`."""
+        if not any(fits(message, shape) for shape in self.to_browser):
             raise ValueError(f"no message of {type(self).__name__}: {', '.join(message)}")
         self._send_msg(message)
 
     def hear(self, message: Any) -> None:
-        """Receive a message from the script if FROM_BROWSER lists it: a page may be altered."""
-        if listed(FROM_BROWSER, type(self).__name__, message):
-            self._heard(message)
+        """Handle a message from the script, unless it has no handler: a page may be altered."""
+        for shape, handle in self._handlers:
+            if fits(message, shape):
+                handle(self, **{name: message[name] for name in shape if shape[name] is not True})
 
     def _handle_msg(self, data: Any) -> None:
         # The answer may change parameters, and those changes are lost while the page is in transit.

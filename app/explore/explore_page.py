@@ -9,8 +9,6 @@ import panel as pn
 from bokeh.document import Document
 
 from ..browser.panel_patches import send_what_waits
-from ..packing.player import Player
-from ..packing.replay.stream import Stream
 from ..packing.view import PackingView
 from ..state import visit
 from ..state.app_state import AppState
@@ -121,18 +119,12 @@ def explore_page(document: Document, query: str) -> Any:
     looks, work = state.looks, state.work
     looks.dark = visit.dark(query)
     work.message = work.message or " ".join(state.library.notes)
-    packing = PackingView(state)
-    Stream(state, packing.player, document)
-    hears, state.hand.tell = packing.player.hears, packing.player.tell
-    hears["wide"] = lambda wide: looks.param.update(wide=wide)
-    hears["keep"] = lambda number: state.keep_all(number)
-    hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
-    side = pn.Column(packing.player, css_classes=["side"], **WIDE)
+    side = pn.Column(PackingView(state, document).player, css_classes=["side"], **WIDE)
     if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":
         whole = framed(None, [side], dark=looks.dark)
     else:
         around = _Around(state, side)
-        pn.state.onload(partial(work.piecewise, around.parts(packing.player)))
+        pn.state.onload(partial(work.piecewise, around.parts()))
         whole = framed(around.header, around.columns, dark=looks.dark, styles=GRID)
     visit.poll_while_running(work, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
@@ -160,13 +152,12 @@ class _Around:
             self.controls, side, self.panels, self.space, self.results, self.status
         ]  # fmt: skip
 
-    def parts(self, player: Player) -> Iterator[None]:
+    def parts(self) -> Iterator[None]:
         """Create everything that follows the packing, in steps."""
         state, controls = self.state, Controls(self.state)
         self.controls[:] = [controls.line, controls.options]
         yield
         tabs = Tabs(state, self.space)
-        player.hears["tab"] = tabs.choose
         pale_when_old([*tabs.pages.items(), ("results", self.results)])
         self.panels[:] = [tabs.tabs]
         tabs.drawn()

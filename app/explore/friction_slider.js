@@ -1,6 +1,7 @@
 // Slider for μ on a logarithmic scale, with a position for 0 and a tick for every stored value.
 
 import { button } from "../browser/dom.js"
+import { ask } from "../browser/send.js"
 
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
@@ -94,7 +95,7 @@ export function render({ model, view }) {
   typed.addEventListener("change", () => {
     const mu = Number(typed.value.replace(",", "."))
     if (Number.isFinite(mu)) view.model.data.wish = mu
-    model.send_msg({ typed: typed.value })
+    ask(model, view, { typed: typed.value })
   })
 
   for (const name of ["least", "most", "stored", "fixed"]) model.on(name, draw)

@@ -6,7 +6,7 @@ from typing import Any
 import param
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..results.library import LEAST_PLACE
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
@@ -14,6 +14,8 @@ MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be ty
 
 class FrictionSlider(Scripted):
     """μ on a logarithmic scale that snaps to the values in `stored`; see friction_slider.js."""
+
+    to_browser = ({"settled": True},)  # the typed value was accepted or refused
 
     mu = param.Number(default=0.1)
     hill = param.List(default=[], doc="[(μ, η2)] to be drawn along it")
@@ -27,6 +29,7 @@ class FrictionSlider(Scripted):
         super().__init__(**params)
         self._on_typed = on_typed
 
-    def _heard(self, message: Message) -> None:
-        self._on_typed(message["typed"])
+    @from_browser(typed=str)
+    def _take(self, typed: str) -> None:
+        self._on_typed(typed)
         self.tell({"settled": True})

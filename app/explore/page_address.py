@@ -5,7 +5,7 @@ from typing import Any
 import param
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..state.app_state import PASSING, AppState
 from ..state.links import VIEW, key
 
@@ -43,8 +43,9 @@ class Address(Scripted):
         if not self._state.work.reader.running:
             self.settled = self._requests
 
-    def _heard(self, message: Message) -> None:
-        """The visitor went back or forward to another view."""
+    @from_browser(query=str)
+    def _return(self, query: str) -> None:
+        """Open the view to which the visitor went back or forward."""
         self._requests += 1
-        self._state.open(message["query"])
+        self._state.open(query)
         self._settle()

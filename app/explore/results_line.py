@@ -8,7 +8,7 @@ import param
 import xarray as xr
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..results import compute
 from ..results.library import Cell, Shown
 from ..results.progress_feed import Summary
@@ -60,7 +60,9 @@ class Results(Scripted):
             free = replay.summary["dimension"] > 0 and not self._work.measuring.running
             self.html = tables(self._state, self._volume, free)
 
-    def _heard(self, message: Message) -> None:
+    @from_browser(measure=True)
+    def _measure(self) -> None:
+        """Compute the volume of S."""
         if self._state.cell is not None:
             work = compute.volume(self._state.library, self._state.cell)
             self._work.measuring.start(work, self._take)

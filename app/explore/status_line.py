@@ -8,7 +8,7 @@ import param
 
 from ..background.jobs import Job, reading
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..results.library import Cell
 from ..state.app_state import AppState
 from ..widgets.hints import term
@@ -66,14 +66,19 @@ class StatusLine(Scripted):
         work = self._state.work
         self.param.update(failed=work.message, progress=work.progress)
 
-    def _heard(self, message: Message) -> None:
-        work = self._state.work
-        if "read" in message:
-            work.message = ""
-        elif work.foremost is not None and "stop" in message:
-            work.foremost.stop()
-        elif work.foremost is not None and "cancel" in message:
-            work.foremost.dismiss()
+    @from_browser(read=True)
+    def _forget(self) -> None:
+        self._state.work.message = ""
+
+    @from_browser(stop=True)
+    def _stop(self) -> None:
+        if (task := self._state.work.foremost) is not None:
+            task.stop()
+
+    @from_browser(cancel=True)
+    def _cancel(self) -> None:
+        if (task := self._state.work.foremost) is not None:
+            task.dismiss()
 
 
 def facts(state: AppState) -> Iterator[str]:

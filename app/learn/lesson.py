@@ -10,7 +10,7 @@ from granforce.packing.scenes import SCENES
 
 from ..background.jobs import Task, Visitor, computing, reading
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..widgets.plot_style import palettes
 from .model import lesson_data
 from .model.lesson_data import Packings
@@ -24,6 +24,11 @@ STARTS = {str(start): start for start in range(lesson_data.STARTS)}
 
 class Lesson(Scripted):
     """The lesson; the data of a chapter are sent when the chapter requests them."""
+
+    to_browser = (
+        {"what": str, "name": str, "given": dict},  # the requested data
+        {"what": str, "name": str, "error": str},
+    )
 
     dark = param.Boolean()
     alone = param.Boolean(doc="whether one chapter is shown in a frame of another page")
@@ -52,11 +57,13 @@ class Lesson(Scripted):
     def _dress(self, event: Any) -> None:
         self.palettes = palettes(event.new)
 
-    def _heard(self, message: Message) -> None:
-        """Handle a chapter's request for data."""
-        packings, name = self._packings, message["name"]
+    @from_browser(want=str, name=str)
+    @from_browser(want=str, name=str, network=[float, ...])
+    def _provide(self, want: str, name: str, network: list[float] | None = None) -> None:
+        """Send the data of a chapter, or of a contact in a network."""
+        packings = self._packings
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
-        match message["want"]:
+        match want:
             case "scene" if name in PLANES:
                 pool = computing if SCENES[name].packed else reading
                 self._send("scene", name, lambda: lesson_data.scene(name), pool)
@@ -65,8 +72,7 @@ class Lesson(Scripted):
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))
-            case "rail" if "network" in message:
-                network = message["network"]
+            case "rail" if network is not None:
                 self._send("rail", name, lambda: packings.rail_from(name, network), computing)
             case "rail":
                 self._send("rail", "", packings.rail, computing)

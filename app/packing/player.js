@@ -28,6 +28,7 @@ const WIDE = 1800 // px; from there on force space has its own column, see explo
 class Player {
   constructor(model, page, tell) {
     this.model = model
+    this.tell = tell
     this.scene = new Scene((contact) => { model.contact = contact })
     this.actions = actions(this)
     this.buttons = new Buttons(this.scene, this.actions, {
@@ -51,10 +52,9 @@ class Player {
     })
     this.replay = this.look = this.loaded = null
     this.playback = new Playback(this)
-    this.live = new Live(this, (live) => tell({ live }))
+    this.live = new Live(this, tell)
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(this)
-    this.tell = tell
     this.listeners = new Set() // functions called when other numbers are on screen
     this.thrust = plain(model.thrust)
     this.scene.onMarks = (context, scene) => {
@@ -351,7 +351,7 @@ class Player {
       this.buttons.part("force").focus()
       return this.hand.refuse()
     }
-    this.tell({ known: known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] } })
+    this.tell(known ? { release: contact } : { hold: [contact, this.hand.wanted(contact) ?? mixed.normal[contact], error] })
   }
 
   /** Begin or end the motion to and fro between the pinned state and this one. */

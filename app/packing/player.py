@@ -1,16 +1,32 @@
 """The player: draws the packing and replays states in the browser, without the server."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import param
+from bokeh.document import Document
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import Array, from_browser
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.replays import Replay, worded
+from ..state.app_state import AppState
 from ..state.view_settings import Appearance
+from .replay.stream import Stream
+
+# Messages to the script: forces in ⟨f_n⟩, arrays flat.
+NETWORK = {"normal": Array, "tangential": Array, "residual": float}
+NETWORKS = NETWORK | {"residual": Array}  # several, one after the other
+# The networks through which f_n of a contact can be pulled, and what stops it at both ends.
+RAIL = NETWORKS | {"contact": int, "lower": float, "upper": float, "values": Array}
+RAIL |= {"opened": Array, "sliding": Array, "whole": bool}
+# A packing under compression: its box, disks, and contacts with their branch vectors.
+PICTURE = {"mu": float, "box": [float, ...], "tilt": float, "fraction": float, "unbalance": float}
+PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
+PICTURE |= {"normal": Array, "tangential": Array}
+# States of a walk in progress, one after the other, each with the numbers shown next to it.
+STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
+STATES |= {"eta1": Array, "eta2": Array, "eta3": Array}
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
@@ -24,7 +40,23 @@ class Player(Scripted, Appearance):
     The frames are sent once, in `walk`. Plots next to it are found in the page by name; any
     ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the columns
     of the source called NAME, which have one row per frame, while TAB is visible.
+
+    A drag of a force (hand/drag_force.js): `grab` is answered with the rail or fan of networks
+    along which the script then moves, and `pull` with the network `held` after release (see
+    state/pulls.py).
     """
+
+    to_browser = (
+        {"rail": RAIL},  # in answer to `grab`
+        {"rail": None},  # the contact cannot be pulled
+        {"fan": NETWORKS | {"x": Array, "y": Array}},  # in answer to `grab_point`
+        {"rail": None, "fan": None},
+        {"held": NETWORK | {"pull": list}},  # the network after all pulls
+        {"held": None},  # there are none: the states are on screen again
+        {"picture": PICTURE, "number": int},  # of a computation; `painted` answers with the number
+        {"states": STATES, "number": int},
+        {"bounds": {"low": Array, "high": Array}, "number": int},
+    )
 
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
@@ -50,15 +82,71 @@ class Player(Scripted, Appearance):
     between = param.List(default=None, allow_None=True)
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    def __init__(self, **params: Any) -> None:
+    def __init__(self, state: AppState, document: Document | None = None, **params: Any) -> None:
+        """document: provides the timer of `stream`; without one, call its `tick` yourself."""
         super().__init__(**params)
-        # Handlers of "tab", "hand", "known", "wide" and "live", called with the message.
-        self.hears: dict[str, Callable[[Any], object]] = {}
+        self._state, self.stream = state, Stream(state, self, document)
+        state.hand.tell = self.tell
 
-    def _heard(self, message: Message) -> None:
-        for name, part in message.items():
-            if name in self.hears:
-                self.hears[name](part)
+    @from_browser(drawn=True, visible=bool)
+    def _start(self, visible: bool) -> None:
+        """The page was drawn anew: it shows neither pulls nor a walk in progress."""
+        self.stream.start(visible)
+        self._state.hand.show()
+
+    @from_browser(visible=bool)
+    def _see(self, visible: bool) -> None:
+        self.stream.visible = visible
+
+    @from_browser(painted=int)
+    def _paint(self, painted: int) -> None:
+        self.stream.painted = painted
+
+    @from_browser(grab=int)
+    def _grab(self, grab: int) -> None:
+        self._state.hand.grab(grab)
+
+    @from_browser(pull=[int, float])
+    def _pull(self, pull: tuple[int, float]) -> None:
+        self._state.hand.pull(*pull)
+
+    @from_browser(grab_point=True)
+    def _grab_point(self) -> None:
+        self._state.hand.grab_point()
+
+    @from_browser(pull_point=[float, float])
+    def _pull_point(self, pull_point: tuple[float, float]) -> None:
+        self._state.hand.pull_point(*pull_point)
+
+    @from_browser(undo=True)
+    def _undo(self) -> None:
+        self._state.hand.undo()
+
+    @from_browser(free=True)
+    def _free(self) -> None:
+        self._state.hand.pulls = []
+
+    @from_browser(hold=[int, float, float])
+    def _hold(self, hold: tuple[int, float, float]) -> None:
+        """Declare f_n of a contact known, with ± its error bar."""
+        self._state.knowledge.hold(*hold)
+
+    @from_browser(release=int)
+    def _release(self, release: int) -> None:
+        self._state.knowledge.release(release)
+
+    @from_browser(tab=int)
+    def _choose_tab(self, tab: int) -> None:
+        self._state.looks.choose_tab(tab)
+
+    @from_browser(wide=bool)
+    def _fit(self, wide: bool) -> None:
+        self._state.looks.wide = wide
+
+    @from_browser(keep=int)
+    def _keep(self, keep: int) -> None:
+        """Store all networks of the walk, then show the one with this number."""
+        self._state.keep_all(keep)
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from bokeh.document import Document
 
 from granforce.types import Floats
 
@@ -67,10 +68,13 @@ BAR = (
 class PackingView:
     """Disks, chains, their legend, and the player's buttons: the view `player`."""
 
-    def __init__(self, state: AppState) -> None:
+    def __init__(self, state: AppState, document: Document | None = None) -> None:
+        """document: as for Player."""
         self.state = state
         self.looks = looks = state.looks
         self.player = Player(
+            state,
+            document,
             name="player",  # its name for other components of the page
             sizing_mode="stretch_width",
             palettes=palettes(looks.dark),

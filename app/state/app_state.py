@@ -122,6 +122,11 @@ class AppState(param.Parameterized):
             part.param.update(**{name: view[name] for name in view if name in part.param})
 
     @property
+    def contacts(self) -> range:
+        """Positions of the contacts of the states on screen."""
+        return range(0 if self.replay is None else len(self.replay.backbone))
+
+    @property
     def growing(self) -> bool:
         """Whether the Replay on screen is that of a walk in progress."""
         return self.shown is not self.replay

@@ -160,7 +160,7 @@ class Knowledge(param.Parameterized):
         """Declare f_n of a contact known, in ⟨f_n⟩; shows a message if that is impossible."""
         state = self.state
         others = [one for one in self.known if one.contact != contact]
-        if state.replay is None or state.growing:
+        if contact not in state.contacts or state.growing:
             return
         try:
             if len(others) >= MOST_KNOWN:
@@ -173,16 +173,6 @@ class Knowledge(param.Parameterized):
     def release(self, contact: int) -> None:
         """Declare f_n of a contact unknown again."""
         self.known = [one for one in self.known if one.contact != contact]
-
-    def heard(self, message: dict[str, Any]) -> None:
-        """Handle a browser message about the selected contact."""
-        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
-        match message:
-            case {"hold": [int(contact), int() | float() as value, int() | float() as error]}:
-                if 0 <= contact < count:
-                    self.hold(int(contact), value, error)
-            case {"release": int(contact)}:
-                self.release(contact)
 
     def compute(self) -> None:
         """Compute the exact intervals given the known forces, in the background."""

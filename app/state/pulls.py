@@ -57,8 +57,8 @@ def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
 class Hand(param.Parameterized):
     """The pulls of one page, as a stack; networks are computed in the background.
 
-    Known forces are kept in all of them. `tell(message)`, once set, is called with messages for the
-    player: {"held": …}, {"rail": …} for a contact and {"fan": …} for a plane.
+    Known forces are kept in all of them. `tell(message)`, once set, sends a message of
+    Player.to_browser: {"held": …}, {"rail": …} for a contact and {"fan": …} for a plane.
     """
 
     pulls = param.List(doc="the pulls, in order, starting from the state on screen")
@@ -80,7 +80,7 @@ class Hand(param.Parameterized):
     def grab(self, contact: int) -> None:
         """Select a contact and compute its rail, from the network on screen."""
         state = self.state
-        if state.replay is None or state.growing:
+        if contact not in state.contacts or state.growing:
             return
         state.looks.contact = contact
         if contact in _held(state.knowledge.known):
@@ -96,8 +96,17 @@ class Hand(param.Parameterized):
         if self.state.plane is not None and not self.state.growing:
             self._work(self.state.plane)
 
-    def hold(self, pull: Pull) -> None:
-        """Release: the pull stays."""
+    def pull(self, contact: int, value: float) -> None:
+        """Pull f_n of a contact to a value, where it stays."""
+        if contact in self.state.contacts and np.isfinite(value):
+            self._add((contact, float(value)))
+
+    def pull_point(self, x: float, y: float) -> None:
+        """Pull the point in the plane on screen, where it stays."""
+        if self.state.plane is not None and np.isfinite([x, y]).all():
+            self._add((planes.name(self.state.plane), float(x), float(y)))
+
+    def _add(self, pull: Pull) -> None:
         if len(self.pulls) >= MOST_PULLS:
             self.work.message = f"{MOST_PULLS} pulls are the maximum; undo some (Z)"
             return
@@ -106,27 +115,6 @@ class Hand(param.Parameterized):
     def undo(self) -> None:
         """Undo the last pull."""
         self.pulls = self.pulls[:-1]
-
-    def heard(self, message: Message) -> None:
-        """Handle a message from the browser."""
-        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
-        match message:
-            case {"grab": int(contact)} if 0 <= contact < count:
-                self.grab(int(contact))  # it may be a flag
-            case {"hold": [int(contact), int() | float() as value]}:
-                if 0 <= contact < count and np.isfinite(value):
-                    self.hold((int(contact), float(value)))
-            case {"point": True}:
-                self.grab_point()
-            case {"hold_point": [int() | float() as x, int() | float() as y]}:
-                if self.state.plane is not None and np.isfinite([x, y]).all():
-                    self.hold((planes.name(self.state.plane), float(x), float(y)))
-            case {"undo": True}:
-                self.undo()
-            case {"free": True}:
-                self.pulls = []
-            case {"anew": True} if self._steps:
-                self._show(self._steps)
 
     @property
     def _all(self) -> tuple[Any, ...]:
@@ -188,12 +176,14 @@ class Hand(param.Parameterized):
             if "rail" in ready and not ready["rail"]["whole"]:
                 self._task.start(lambda job: next(more), self.tell)
         elif networks:
-            self._show(networks)
+            self.show()
 
-    def _show(self, networks: list[tuple[Pull, Held]]) -> None:
-        pull, held = networks[-1]
-        network = flat(held.forces) | {"residual": held.residual}
-        self.tell({"held": network | {"pull": list(pull)}})
+    def show(self) -> None:
+        """Show the network after all pulls, if there are any."""
+        if self._steps:
+            pull, held = self._steps[-1]
+            network = flat(held.forces) | {"residual": held.residual}
+            self.tell({"held": network | {"pull": list(pull)}})
 
     def _failed(self, event: Any) -> None:
         if event.new:

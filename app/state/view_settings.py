@@ -4,6 +4,15 @@ from typing import Any
 
 import param
 
+# Name of a tab in links → title.
+TABS = {
+    "intervals": "Intervals",
+    "plane": "Force space",
+    "statistics": "Friction",
+    "perturb": "Push",
+    "upload": "Your packing",
+    "export": "Export",
+}
 # Quantities for colour, width and order: name in links → words on screen.
 COLOURS = {
     "change": "change since packed",
@@ -103,6 +112,12 @@ class Looks(Appearance):
     )
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
+
+    def choose_tab(self, number: int) -> None:
+        """Show tab 1, 2, …; other numbers, and force space where it has no tab, have no effect."""
+        name = dict(enumerate(TABS, 1)).get(number)
+        if name is not None and not (self.wide and name == "plane"):
+            self.tab = name
 
     def sync_opened(self, panel: Any, *names: str) -> None:
         """Keep `opened` in sync with a panel: its `active` parts, or whether it is `open`."""

@@ -6,7 +6,7 @@ from typing import Any
 import param
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 from ..results.saved_file import File
 
 
@@ -16,6 +16,11 @@ class Handover(Scripted):
     Not Panel's FileDownload, which makes files on the page's thread: seven take 107 ms, here 5 ms.
     """
 
+    to_browser = (
+        {"name": str, "mime": str, "content": object},  # a file
+        {"name": str, "caption": dict},  # a picture or movie made by the browser
+        {"name": str, "caption": dict, "width": int},  # with the plots, in mm
+    )
     files = param.Dict(default={}, doc="{heading: {key: words}}")
 
     def __init__(self, on_ask: Callable[[str], object], **params: Any) -> None:
@@ -36,7 +41,7 @@ class Handover(Scripted):
         """
         self.tell({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
-    def _heard(self, message: Message) -> None:
-        key = message["key"]
+    @from_browser(key=str)
+    def _request(self, key: str) -> None:
         if any(key in group for group in self.files.values()):
             self._on_ask(key)

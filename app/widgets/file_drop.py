@@ -6,7 +6,7 @@ from typing import Any
 import param
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 
 NAME_LENGTH = 120  # characters of a file name in messages
 MOST_FILES = 16  # per drop; a packing has at most two
@@ -34,19 +34,22 @@ class Dropper(Scripted):
         self._on_files, self._on_refusal = on_files, on_refusal
         self._files, self._size = {}, 0
 
-    def _heard(self, message: Message) -> None:
-        """Handle a message from the page: a beginning, a piece of a file, or the end."""
-        # A page may have been altered, so the limits are enforced here.
-        if "begin" in message:
-            self._files, self._size = {}, 0
-        elif "end" in message:
-            files, self._files = self._files, {}
-            if files:
-                self._on_files([(name, bytes(content)) for name, content in files.items()])
-        elif self._files is not None:
-            self._take(message["name"][:NAME_LENGTH], message["data"])
+    @from_browser(begin=True)
+    def _begin(self) -> None:
+        self._files, self._size = {}, 0
 
+    @from_browser(end=True)
+    def _end(self) -> None:
+        files, self._files = self._files, {}
+        if files:
+            self._on_files([(name, bytes(content)) for name, content in files.items()])
+
+    @from_browser(name=str, data=object)
     def _take(self, name: str, data: Any) -> None:
+        """Add a piece of a file; a page may have been altered, so the limits are enforced here."""
+        if self._files is None:
+            return None
+        name = name[:NAME_LENGTH]
         if not isinstance(data, (bytes, bytearray, memoryview)):
             return self._refuse("the upload is not a file")
         self._size += memoryview(data).nbytes

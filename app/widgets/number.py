@@ -6,7 +6,7 @@ from typing import Any
 import param
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Message
+from ..browser.messages import from_browser
 
 
 class NumberField(Scripted):
@@ -28,7 +28,8 @@ class NumberField(Scripted):
         super().__init__(**params)
         self._on_wrong = on_wrong
 
-    def _heard(self, message: Message) -> None:
-        """Handle input that is not a whole number."""
-        typed, within = message["typed"][:30], f"{self.start} to {self.end}"
-        self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")
+    @from_browser(typed=str)
+    def _refuse(self, typed: str) -> None:
+        """Refuse input that is not a whole number."""
+        within = f"{self.start} to {self.end}"
+        self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed[:30]!r}")

@@ -29,7 +29,6 @@ from app.explore.results_line import left_out
 from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
-from app.explore.tabs.tabs import TABS
 from app.packing.player import frames
 from app.packing.view import COMING, PackingView, exact_intervals
 from app.page import learns
@@ -53,7 +52,7 @@ from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, read_view, spelled
 from app.state.pulls import Hand
-from app.state.view_settings import SORTS, Looks
+from app.state.view_settings import SORTS, TABS, Looks
 from app.state.visit import turns
 from granforce import measures
 from granforce.cli import entry_point
@@ -268,7 +267,7 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
 
 def test_older_links_to_a_renamed_tab_open_it():
     (tab,) = read_view({"tab": "projection"}, Looks.param).values()
-    assert TABS[tab][0] == "Force space"
+    assert TABS[tab] == "Force space"
 
 
 def test_a_button_names_all_that_is_to_be_computed_anew():

@@ -240,14 +240,11 @@ def test_garbage_ends_nothing_but_itself(served):
 HUGE, NAN = 10**400, {"type": "number", "value": "nan"}
 # What an altered page may say of the hand, of what is known and of its tab.
 SAID = [
-    {"known": {"hold": [0, HUGE, 0]}}, {"known": {"hold": [0, 1.0, HUGE]}},
-    {"known": {"hold": [HUGE, 1.0, 0]}}, {"known": {"hold": [-1, 1.0, 0]}},
-    {"known": {"hold": [0, -1.0, 0]}}, {"known": {"hold": [0, NAN, 0]}},
-    {"known": {"release": HUGE}}, {"known": {"hold": []}}, {"known": {"hold": "all"}},
-    {"hand": {"grab": HUGE}}, {"hand": {"hold": [0, HUGE]}}, {"hand": {"hold": [0, -HUGE]}},
-    {"hand": {"hold": [0, NAN]}}, {"hand": {"hold_point": [HUGE, 1]}},
-    {"hand": {"grab": True}}, {"hand": {"undo": True}}, {"tab": HUGE}, {"tab": -1},
-    {"live": {}}, {"live": {"painted": HUGE}}, {"wide": True}, [], "all", None,
+    {"hold": [0, HUGE, 0]}, {"hold": [0, 1.0, HUGE]}, {"hold": [HUGE, 1.0, 0]},
+    {"hold": [-1, 1.0, 0]}, {"hold": [0, -1.0, 0]}, {"hold": [0, NAN, 0]}, {"hold": []},
+    {"hold": "all"}, {"release": HUGE}, {"grab": HUGE}, {"grab": True}, {"pull": [0, HUGE]},
+    {"pull": [0, -HUGE]}, {"pull": [0, NAN]}, {"pull_point": [HUGE, 1]}, {"undo": True},
+    {"tab": HUGE}, {"tab": -1}, {"painted": HUGE}, {"wide": True}, {}, [], "all", None,
 ]  # fmt: skip
 
 
@@ -271,7 +268,7 @@ def test_limits_hold_whatever_is_said(shared):
         for said in SAID:
             await client.tell("Player", said)
         for _ in range(40):
-            await client.tell("Player", {"hand": {"hold": [0, 1.0]}})
+            await client.tell("Player", {"pull": [0, 1.0]})
         await Protocol().create("PULL-DOC-REQ").send(client.socket)
         document = (await client.answer("PULL-DOC-REPLY")).content["doc"]
         client.close()

@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from ...state.app_state import AppState
+from ...state.view_settings import TABS
 from ...widgets.parts import PLAIN, note
 from .export import export, figure
 from .force_space import force_space
@@ -15,16 +16,14 @@ from .intervals import intervals
 from .push import push
 from .your_packing import upload
 
-# Name in links → title, and view. Components must be defined before any page opens: if defined
-# later, only the first page learns of them.
-TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
-    "intervals": ("Intervals", intervals.View),
-    "plane": ("Force space", force_space.View),  # the second: see LOOK
-    "statistics": ("Friction", friction.View),
-    "perturb": ("Push", push.View),
-    "upload": ("Your packing", upload.View),
-    "export": ("Export", export.View),
-}
+# Components must be defined before any page opens: if defined later, only the first page learns of
+# them.
+VIEWS: dict[str, Callable[[AppState], Any]] = {
+    kind.name: kind
+    for kind in (
+        intervals.View, force_space.View, friction.View, push.View, upload.View, export.View,
+    )
+}  # fmt: skip
 LOOK = {
     "& .MuiTabs-root": {
         "minHeight": "36px", "padding": "0 clamp(0px, 3vw - 12px, 10px)",
@@ -47,7 +46,7 @@ LOOK = {
     "@media (min-width: 1800px)": {"& .MuiTab-root:nth-of-type(2)": {"display": "none"}},
 }  # fmt: skip
 OPENING = "Opening …"  # until the view exists
-SPACE = f"<h2>{TABS['plane'][0]}</h2>"
+SPACE = f"<h2>{TABS['plane']}</h2>"
 HEADING = """
 h2 {
   margin: 0; padding: 6px 2px; border-bottom: 1px solid var(--line);
@@ -80,7 +79,7 @@ class Tabs:
         if self.looks.tab not in self.names:
             self.looks.tab = self.names[0]
         self.tabs = pmui.Tabs(
-            *((TABS[name][0], self.pages[name]) for name in self.names),
+            *((TABS[name], self.pages[name]) for name in self.names),
             active=self.names.index(self.looks.tab),
             sx=LOOK,
             sizing_mode="stretch_width",
@@ -90,7 +89,6 @@ class Tabs:
         for page in self.pages.values():
             page[:] = [note(OPENING)]
         self.tabs.param.watch(lambda event: state.work.piecewise(self._showing()), "active")
-        self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
         self.looks.param.watch(self._place, ["tab", "wide"])
         self._place()
 
@@ -98,14 +96,12 @@ class Tabs:
         """Let go of what the browser has: Panel keeps callbacks, and pages with them, for ever."""
         self._shown.unwatch()
 
-    def choose(self, number: int) -> None:
-        """Show tab 1, 2, …; other numbers, and force space where it has no tab, have no effect."""
-        if 1 <= number <= len(self.names) and not (self.looks.wide and number == PLANE + 1):
-            self.tabs.active = number - 1
-
     def _place(self, *events: Any) -> None:
         self.space.visible = self.looks.shows("plane")
-        if self.looks.wide and self.tabs.active == PLANE:
+        active = self.names.index(self.looks.tab)
+        if not (self.looks.wide and active == PLANE):
+            self.tabs.active = active
+        elif self.tabs.active == PLANE:  # beside the tabs, force space has none
             self.tabs.active = 0
         if events and self.looks.wide:
             self.state.work.piecewise(self.fill("plane"))
@@ -121,13 +117,13 @@ class Tabs:
         if name not in self._begun:
             self._begun.add(name)
             yield
-            view = TABS[name][1](self.state)
+            view = VIEWS[name](self.state)
             yield
             pieces = list(view.panel())
             if name == "plane":
                 pieces.insert(0, pn.pane.HTML(SPACE, stylesheets=[HEADING], margin=0))
             if name in PLOTTED and not (name == "plane" and self.looks.wide):  # there once
-                pieces.append(figure.panel(self.state, TABS[name][0].lower().replace(" ", "_")))
+                pieces.append(figure.panel(self.state, TABS[name].lower().replace(" ", "_")))
             # Choices first, then two at a time: Bokeh processes everything at each step.
             queued = []
             for k in range(-1, len(pieces), 2):

@@ -10,13 +10,25 @@ from granforce.records import InputError, NotJammedError, UndecidedError
 
 from ...background.jobs import Job, Task
 from ...browser.bundle import Scripted
-from ...browser.messages import Message
+from ...browser.messages import Message, from_browser
 from ...state import scene_links
 from ..model import small_scenes
+
+MEASURED = {"plane": [int, int], "S": int}  # S: the number in the request
 
 
 class Workbench(Scripted):
     """A small scene with all its tools."""
+
+    to_browser = (
+        {"error": str},
+        {"fall": [float, ...], "S": int},  # motion (3 N) of the disks; empty if nothing falls
+        {"file": str},  # base64
+        {"limit": float, "S": int},  # times the push that the disks can bear
+        {"limit": None, "S": int},  # however hard it is
+        {"measured": {"most": float, "outline": list}, **MEASURED},
+        {"measured": {"bounds": list, "outline": list}, **MEASURED},
+    )
 
     scene = param.Dict(default={}, doc="see small_scenes.drawn")
     titles = param.List(doc="[name, title, page] of every scene")
@@ -74,61 +86,55 @@ class Workbench(Scripted):
             self._ready = True
             self.tell({"error": event.new})
 
-    def _heard(self, message: Message) -> None:
-        """Handle a request for another scene, another μ, or results on the present one."""
+    def hear(self, message: Any) -> None:
+        """Handle a message, and send what was wrong with it."""
         try:
-            match message:
-                case {
-                    "find": what,
-                    "S": number,
-                    "scene": scene,
-                    "built": built,
-                    "mu": mu,
-                    "load": load,
-                    "plane": plane,
-                }:
-                    self._find(what, number, scene, built, mu, load, plane)
-                case {"scene": name} if name in (*scene_links.SMALL, scene_links.OWN):
-                    self._show(name, message.get("mu"))
-                case {"query": query}:
-                    request = scene_links.request_of(query)
-                    self._show(request.scene, request.mu, request.built)
-                case {"built": built, "mu": mu}:
-                    self._show(scene_links.OWN, mu, built[: scene_links.LONGEST])
+            super().hear(message)
         except (InputError, NotJammedError, UndecidedError) as error:
             self.tell({"error": str(error)})
 
-    def _find(
-        self,
-        what: str,
-        number: int,
-        scene: str,
-        built: str,
-        mu: float,
-        load: list[float],
-        plane: list[int],
-    ) -> None:
-        """Send results for a scene at this μ, under these loads; number: by which the page knows S.
+    @from_browser(scene=str)
+    @from_browser(scene=str, mu=float)
+    def _choose(self, scene: str, mu: float | None = None) -> None:
+        if scene in (*scene_links.SMALL, scene_links.OWN):
+            self._show(scene, mu)
 
-        Nothing for a scene that was replaced, or is about to be: the answer would stop the
-        computation of the next one.
+    @from_browser(query=str)
+    def _return(self, query: str) -> None:
+        """Show the scene to which the visitor went back or forward."""
+        request = scene_links.request_of(query)
+        self._show(request.scene, request.mu, request.built)
+
+    @from_browser(built=str, mu=float)
+    def _build(self, built: str, mu: float) -> None:
+        self._show(scene_links.OWN, mu, built[: scene_links.LONGEST])
+
+    @from_browser(
+        find=str, S=int, scene=str, built=str, mu=float, load=[float, ...], plane=[int, int]
+    )
+    def _find(self, find: str, S: int, scene: str, built: str, mu: float, **given: Any) -> None:
+        """Send "file", "fall", "limit" or "measured" for a scene with a load (3 N) on its disks.
+
+        S: by which the page knows it. Nothing for a scene that was replaced, or is about to be: the
+        answer would stop the computation of the next one.
         """
+        load, plane = given["load"], given["plane"]
         if not self._ready or (scene, built) != (self.scene["name"], self.scene["built"]):
             return
 
         def compute(job: Job) -> Message:
             packing = small_scenes.packing_of(scene, mu, built)
-            match what:
+            match find:
                 case "file":
                     file = base64.b64encode(small_scenes.file_of(packing, load))
                     return {"file": file.decode()}
                 case "limit":
-                    return {"limit": small_scenes.limit(packing, load), "S": number}
+                    return {"limit": small_scenes.limit(packing, load), "S": S}
                 case "fall":
-                    return {"fall": small_scenes.falling(packing, load).tolist(), "S": number}
+                    return {"fall": small_scenes.falling(packing, load).tolist(), "S": S}
                 case _:
                     found = small_scenes.measured(packing, load, plane)
-                    return {"measured": found, "plane": plane, "S": number}
+                    return {"measured": found, "plane": plane, "S": S}
 
         tasks = {"file": self._saving, "limit": self._pushing}
-        tasks.get(what, self._task).start(compute, self.tell)
+        tasks.get(find, self._task).start(compute, self.tell)

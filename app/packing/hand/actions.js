@@ -9,14 +9,14 @@ export function actions(player) {
     player.play(false)
     action(replay, given)
   })
-  const { model } = player
+  const { model, tell } = player
   const step = ({ swinging }) => (swinging ? 0.05 : 1)
   return {
     less: loaded(() => player.hand.nudge(-1)),
     more: loaded(() => player.hand.nudge(1)),
     hold: loaded((replay) => player.hold(replay)),
     pull: loaded(() => player.hand.pullTo(player.buttons.force)),
-    undo: loaded((replay) => { if (replay.held && !player.pushed.held) player.hand.tell({ undo: true }) }),
+    undo: loaded((replay) => { if (replay.held && !player.pushed.held) tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
     play: loaded(() => {
       player.hand.free()
@@ -38,7 +38,7 @@ export function actions(player) {
       player.between(replay)
     }),
     split: loaded(() => { model.split = !model.split }),
-    keep: (number) => model.send_msg({ keep: number }),
-    tab: (number) => model.send_msg({ tab: number }),
+    keep: (number) => tell({ keep: number }),
+    tab: (number) => tell({ tab: number }),
   }
 }

@@ -21,10 +21,9 @@ const ROUNDED = 1e-6 // in ⟨fₙ⟩, error of bounds in the page
 const FADE_MS = 1000 // ms for which its rail stays visible after release
 
 export class Grab {
-  /** tell(message): send to the server. */
+  /** tell(message): send to the server, see player.py. */
   constructor(player, tell) {
-    this.player = player
-    this.tell = (hand) => tell({ hand })
+    Object.assign(this, { player, tell })
     this.rail = this.contact = this.value = this.before = null
     this.moved = this.released = false // whether it moved, and whether it was released before its rail arrived
     this.pulled = null // the network after all pulls, as the server has it
@@ -32,7 +31,6 @@ export class Grab {
     this.fading = 0
     this.frames = 0
     this.spot = new PointHand(this)
-    this.tell({ anew: true })
   }
 
   get replay() { return this.player.replay }
@@ -87,7 +85,7 @@ export class Grab {
     if (this.released) return // applied when its rail arrives
     this.contact = null
     if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
-      this.tell({ hold: [contact, value] })
+      this.tell({ pull: [contact, value] })
     }
     if (rail) this.fadeLater()
     this.still()
@@ -138,7 +136,7 @@ export class Grab {
     this.before = this.replay.mixed.normal.slice()
     const [low, high] = player.look.boundsOf(contact) // of which `value` may have been rounded
     this.aim = { contact, value: Math.max(low + ROUNDED, Math.min(high - ROUNDED, value)) }
-    this.tell({ hold: [contact, this.aim.value] })
+    this.tell({ pull: [contact, this.aim.value] })
   }
 
   /** The force of the selected contact, on screen or typed, is outside its bounds. */

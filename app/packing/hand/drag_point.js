@@ -22,7 +22,7 @@ export class PointHand {
   take(x, y) {
     if (!this.hand.begin()) return
     this.target = [x, y]
-    this.hand.tell({ point: true })
+    this.hand.tell({ grab_point: true })
   }
 
   move(x, y) {
@@ -36,7 +36,7 @@ export class PointHand {
     if (!this.active) return
     if (!fan) return void (this.released = true)
     this.drop()
-    if (at) this.hand.tell({ hold_point: at })
+    if (at) this.hand.tell({ pull_point: at })
     this.hand.still()
   }
 

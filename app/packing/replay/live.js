@@ -87,7 +87,7 @@ export function extend(walk, states) {
 }
 
 export class Live {
-  /** tell(message): send to the server. */
+  /** tell(message): send to the server, see player.py. */
   constructor(player, tell) {
     this.player = player
     this.tell = tell
@@ -95,7 +95,7 @@ export class Live {
     this.pictures = 0
     this.onVisibility = () => this.tell({ visible: !document.hidden })
     document.addEventListener("visibilitychange", this.onVisibility)
-    this.tell({ anew: true, visible: !document.hidden })
+    this.tell({ drawn: true, visible: !document.hidden })
   }
 
   remove() { document.removeEventListener("visibilitychange", this.onVisibility) }

@@ -5,10 +5,8 @@ from typing import Any
 
 from bokeh.document import Document
 
-from ...browser.messages import Message
 from ...browser.panel_patches import together
 from ...state.app_state import AppState
-from ..player import Player
 
 TICK_MS = 40  # interval of polling
 AHEAD = 2  # messages that the browser may have received but not yet painted
@@ -17,26 +15,22 @@ AHEAD = 2  # messages that the browser may have received but not yet painted
 class Stream:
     """Sends results of a page's `state.follow()` to its player, but not to hidden tabs."""
 
-    def __init__(self, state: AppState, player: Player, document: Document | None = None) -> None:
+    def __init__(self, state: AppState, player: Any, document: Document | None = None) -> None:
         """document: provides the timer; without one, call `tick` yourself."""
         self.state, self.work, self.player = state, state.work, player
         self._document = document
-        self._sent = self._painted = 0
-        self._awake, self._ticking = False, None
-        player.hears["live"] = self.heard
+        self._sent = self.painted = 0  # numbers of the last messages sent, and painted
+        self.visible, self._ticking = False, None
         self.work.param.watch(self._follow, ["live", "arriving"])
         state.param.watch(self._show, ["missing", "selection", "cell"])
         self.work.param.watch(self._show, "busy")
         self._follow()
 
-    def heard(self, message: Message) -> None:
-        """The browser reports a redraw, painted messages, or whether it is visible."""
-        if "anew" in message:
-            self._sent = self._painted = 0
-            if self.work.live is not None:
-                self.work.live.rewind()
-        self._painted = message.get("painted", self._painted)
-        self._awake = message.get("visible", self._awake)
+    def start(self, visible: bool) -> None:
+        """Begin anew, for a page that has been redrawn."""
+        self._sent, self.painted, self.visible = 0, 0, visible
+        if self.work.live is not None:
+            self.work.live.rewind()
 
     def _show(self, *events: Any) -> None:
         self.player.requested = self.state.requested
@@ -57,7 +51,7 @@ class Stream:
     def tick(self) -> None:
         """Send new results if the browser is ready for them."""
         following = self.state.follow()
-        while following and self._awake and self._sent - self._painted < AHEAD:
+        while following and self.visible and self._sent - self.painted < AHEAD:
             news = following.next()
             if news is None:
                 return

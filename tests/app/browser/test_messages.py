@@ -1,4 +1,4 @@
-"""Every message between scripts and the server is in one list, which holds on both sides."""
+"""Every message between a component and its script is stated at the component."""
 
 import inspect
 import re
@@ -7,47 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.browser.bundle import APP, Scripted, module
-from app.browser.messages import FROM_BROWSER, TO_BROWSER, Array, fits, listed
-from app.explore import explore_page, friction_slider, page_address, results_line, status_line
-from app.explore.tabs.intervals import known_forces
-from app.explore.tabs.push import load_slider
-from app.explore.tabs.your_packing import my_computations
-from app.learn import lesson
-from app.learn.workbench import workbench
-from app.packing import player
-from app.packing.replay import stream
-from app.state.known import Knowledge
-from app.state.pulls import Hand
-from app.widgets import file_buttons, file_drop, number
+import app.page  # noqa: F401  # defines all components
+from app.browser.bundle import Scripted, module
+from app.browser.messages import Array, fits
+from app.widgets.number import NumberField
 
 pytestmark = pytest.mark.fast
 
-COMPONENTS = {
-    kind.__name__: kind
-    for kind in (
-        page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider,
-        file_buttons.Handover, known_forces.Known, lesson.Lesson, load_slider.LoadSlider,
-        my_computations.Mine, number.NumberField, player.Player,
-        results_line.Results, status_line.StatusLine, workbench.Workbench,
-    )
-}  # fmt: skip
-# What a player's message is handed on to.
-PARTS = {"hand": Hand.heard, "known": Knowledge.heard, "live": stream.Stream.heard}
+COMPONENTS = {kind.__name__: kind for kind in Scripted.__subclasses__()}
 # A call that tells the server something, up to the literal that it begins with.
 TELLING = re.compile(r"(?:\bask\(model, view, |\btell\(|\bsend_msg\()(?=\{|\w+ \? \{)")
 
 
 def script_of(kind):
-    """The path of a component's script."""
-    return Path(inspect.getfile(kind)).with_suffix(".js")
-
-
-def names(shape):
-    """A message's fields by name, those inside a field beside it: {"hand": {"undo": True}}."""
-    return frozenset(
-        (name, names(part) if isinstance(part, dict) else None) for name, part in shape.items()
-    )
+    """The script of a component, with all that it imports."""
+    return module(Path(inspect.getfile(kind)).with_suffix(".js"))
 
 
 def fields(shape):
@@ -59,7 +33,7 @@ def fields(shape):
 
 def literals(text):
     """The outermost {…} of a script up to the parenthesis that closes the call, without braces."""
-    found, depth, begin = [], 0, 0
+    depth = begin = 0
     for at, letter in enumerate(text):
         if letter in "([{":
             begin = at + 1 if letter == "{" and depth == 0 else begin
@@ -67,74 +41,37 @@ def literals(text):
         elif letter in ")]}":
             depth -= 1
             if depth < 0:
-                break
+                return
             if letter == "}" and depth == 0:
-                found.append(text[begin:at])
-    return found
+                yield text[begin:at]
 
 
-def said(literal):
-    """Messages that an object literal may be, as `names`."""
-    found, rest = [], literal
-    while "[" in rest:
-        rest = re.sub(r"\[[^][]*\]", "0", rest)
-    inner = literals(rest)
-    for part in inner:
-        rest = rest.replace(part, "")
-    for field in rest.split(","):
-        name, _, value = field.strip().partition(":")
-        found.append((name, "{" in value))
-    if not inner:
-        return {frozenset((name, None) for name, _ in found)}
-    ((outer, _),) = [field for field in found if field[1]]
-    return {frozenset({(outer, one)}) for part in inner for one in said(part)}
+def names(literal):
+    """Names of the fields of an object literal."""
+    while "[" in literal:
+        literal = re.sub(r"\[[^][]*\]", "0", literal)
+    return frozenset(field.strip().partition(":")[0] for field in literal.split(","))
 
 
 def sent(text):
-    """Messages that a script sends, as `names`."""
+    """Messages that a script sends, as names of their fields."""
     calls = [text[call.end() :] for call in TELLING.finditer(text)]
-    return {one for call in calls for literal in literals(call) for one in said(literal)}
+    return {names(literal) for call in calls for literal in literals(call)}
 
 
 @pytest.mark.parametrize("name", COMPONENTS)
-def test_a_script_sends_what_is_listed_and_nothing_else(name):
-    script = script_of(COMPONENTS[name])
-    expected = {names(shape) for shape in FROM_BROWSER[name]}
-    if name != "Player":
-        assert sent(module(script)) == expected
-        return
-    # Its hand and its live view tell the player, which says who it was.
-    parts = {"hand", "live"}
-    whole = {one for one in expected if parts.isdisjoint(name for name, _ in one)}
-    inside = {part for one in expected - whole for _, part in one}
-    handed = {frozenset({(name, None)}) for name in parts}
-    assert sent(module(APP / "packing/player.js")) == whole | inside | handed
-
-
-@pytest.mark.parametrize("name", COMPONENTS)
-def test_what_is_listed_is_handled(name):
-    """By name: on the server where it is heard, in the browser in the component's script."""
-    heard = inspect.getsource(COMPONENTS[name]._heard)
-    if name == "Player":  # which hands on what others hear
-        heard = inspect.getsource(explore_page) + inspect.getsource(stream)
-    for shape in FROM_BROWSER[name]:
-        for field, part in shape.items():
-            handed = (f'hears["{field}"]', f'"{field}": state.')
-            ways = handed if name == "Player" else (f'"{field}"',)
-            assert any(way in heard for way in ways) or len(FROM_BROWSER[name]) == 1, field
-            if name == "Player" and isinstance(part, dict):
-                (first, *_) = part
-                assert f'"{first}"' in inspect.getsource(PARTS[field]), first
-    script = module(script_of(COMPONENTS[name]))
-    told = {field for shape in TO_BROWSER.get(name, ()) for field in fields(shape)}
+def test_a_script_sends_what_its_component_handles_and_reads_what_it_is_sent(name):
+    kind = COMPONENTS[name]
+    script = script_of(kind)
+    assert sent(script) == {frozenset(shape) for shape, _ in kind._handlers}
+    told = {field for shape in kind.to_browser for field in fields(shape)}
     for field in told - {"settled"}:  # which says no more than that it came
         assert re.search(rf"\b{field}\b", script), field
 
 
-def test_every_component_that_sends_or_hears_is_listed():
-    mine = {kind.__name__ for kind in Scripted.__subclasses__() if "_heard" in vars(kind)}
-    assert mine == set(FROM_BROWSER) == set(COMPONENTS)
-    assert set(TO_BROWSER) <= set(COMPONENTS)
+def test_components_that_send_and_hear_are_known():
+    handled = {name for name, kind in COMPONENTS.items() if kind._handlers}
+    assert len(handled) == 13 and {"Player", "Workbench", "Lesson"} <= handled
 
 
 @pytest.mark.parametrize(
@@ -154,10 +91,9 @@ def test_a_field_fits_its_shape_only(shape, good, bad):
     assert not any(fits(value, shape) for value in bad)
 
 
-def test_what_no_list_has_is_neither_heard_nor_sent():
-    field = number.NumberField(on_wrong=pytest.fail)
+def test_what_is_not_stated_is_neither_heard_nor_sent():
+    field = NumberField(on_wrong=pytest.fail)
     for message in (None, 7, "typed", [], {"typed": 7}, {"typed": "x", "more": 1}, {"other": "x"}):
         field.hear(message)
-    assert not listed(FROM_BROWSER, "Nobody", {"typed": "x"})
     with pytest.raises(ValueError, match="no message of NumberField: rest"):
         field.tell({"rest": True})

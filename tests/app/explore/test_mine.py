@@ -28,7 +28,7 @@ def test_computations_are_listed_named_opened_and_deleted(computed):
         "3 networks" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
     )
     assert older["megabytes"] > 0
-    view.hear({"call": [older["entry"], "  the  short\none "]})
+    view.hear({"entry": older["entry"], "name": "  the  short\none "})
     wait_for(state)
     called = {row["entry"]: row["name"] for row in view.rows}
     assert called == {newest["entry"]: "", older["entry"]: "the short one"}
@@ -51,7 +51,7 @@ def test_what_is_not_in_the_list_is_left_alone(computed):
     packing = next(name for name in before if name.startswith("packing"))
     for entry in (packing, "../elsewhere", state.library.shipped.name("walk", {}, version=1)):
         view.hear({"delete": entry})
-        view.hear({"call": [entry, "mine"]})
+        view.hear({"entry": entry, "name": "mine"})
         wait_for(state)
     assert sorted(state.library.cache) == before and entry_labels.names(state.library.cache) == {}
     with pytest.raises(InputError, match="no longer"):

@@ -47,12 +47,12 @@ def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value)
     wait_for(state)
-    hand.heard({"point": True})
+    hand.grab_point()
     wait_for(state)
     fan = told[-1]["fan"]
     here = state.plane.path[0]
     there = (0.5 * (here[0] + fan["x"].mean()), 0.5 * (here[1] + fan["y"].mean()))
-    hand.heard({"hold_point": [float(there[0]), float(there[1])]})
+    hand.pull_point(float(there[0]), float(there[1]))
     wait_for(state)
     held = told[-1]["held"]
     network = np.stack([held["normal"], held["tangential"]], axis=1)

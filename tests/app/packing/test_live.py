@@ -8,11 +8,10 @@ import pytest
 from small_store import DISKS
 from visitor import wait_for
 
-from app.browser.messages import TO_BROWSER, listed
+from app.browser.messages import fits
 from app.explore.controls import Controls
 from app.explore.tabs.force_space import force_space
 from app.explore.tabs.intervals.intervals import View
-from app.packing.replay.stream import Stream
 from app.packing.view import PackingView
 from app.results import planes, progress_feed
 from app.results.selection import select
@@ -25,19 +24,19 @@ class Browser:
     def __init__(self, state, awake=True):
         self.state, self.awake, self.got = state, awake, []
         self.player = PackingView(state).player
-        self.stream = Stream(state, self.player)
+        self.stream = self.player.stream
         self.player.tell = self._take
-        self.player.hear({"live": {"anew": True, "visible": awake}})
+        self.player.hear({"drawn": True, "visible": awake})
 
     def _take(self, news):
-        assert listed(TO_BROWSER, "Player", news), sorted(news)
+        assert any(fits(news, shape) for shape in self.player.to_browser), sorted(news)
         self.got.append(news)
         if self.awake:
-            self.player.hear({"live": {"painted": news["number"]}})
+            self.player.hear({"painted": news["number"]})
 
     def look(self, awake):
         self.awake = awake
-        self.player.hear({"live": {"visible": awake}})
+        self.player.hear({"visible": awake})
 
     def parts(self, name):
         return [news[name] for news in self.got if name in news]

@@ -196,14 +196,6 @@ def test_what_is_left_no_room_for_is_refused_at_once(state):
         assert "no information" in state.work.message and len(state.knowledge.known) == 1
 
 
-def test_messages_of_browsers_that_make_no_sense_are_ignored(state):
-    for message in ({"hold": [10**9, 1.0, 0]}, {"hold": [1]}, {"release": "x"}, {"x": 1}):
-        state.knowledge.heard(message)
-    assert not state.knowledge.known and not state.work.busy
-    state.knowledge.heard({"hold": [4, float("nan"), 0]})
-    assert not state.knowledge.known and "must lie between" in state.work.message
-
-
 def test_another_packing_has_its_own(state):
     held(state, 4)
     state.choose(mu=1)
@@ -215,23 +207,23 @@ def test_pulls_keep_what_is_held(state):
     told = []
     hand, state.hand.tell = state.hand, told.append
     held(state, 4)
-    hand.heard({"grab": 9})
+    hand.grab(9)
     wait_for(state)
     rail = told[-1]["rail"]
     normal = rail["normal"].reshape(len(rail["values"]), -1)
     np.testing.assert_allclose(normal[:, 4], state.knowledge.known[0].value, atol=1e-6)
     assert np.ptp(normal[:, 9]) > 0
-    hand.heard({"grab": 4})
+    hand.grab(4)
     assert told[-1] == {"rail": None} and "release it" in state.work.message
 
 
 def test_what_was_pulled_can_be_held(state):
     told = []
     hand, state.hand.tell = state.hand, told.append
-    hand.heard({"grab": 9})
+    hand.grab(9)
     wait_for(state)
     rail = told[-1]["rail"]
-    hand.heard({"hold": [9, (rail["lower"] + 3 * rail["upper"]) / 4]})
+    hand.pull(9, (rail["lower"] + 3 * rail["upper"]) / 4)
     wait_for(state)
     pulled = told[-1]["held"]["normal"]
     state.knowledge.hold(9, float(pulled[9]))

@@ -8,7 +8,7 @@ import param
 from granforce.types import Integers
 
 from ....browser.bundle import Scripted
-from ....browser.messages import Message
+from ....browser.messages import from_browser
 from ....state.app_state import AppState
 from ....state.known import Knowledge, Ranked
 from ....widgets.hints import term
@@ -40,15 +40,19 @@ class Known(Scripted):
             task.param.watch(self._show, "running")
         self._show()
 
-    def _heard(self, message: Message) -> None:
-        knowledge = self._state.knowledge
-        match message:
-            case {"release": int(contact)}:
-                knowledge.release(contact)
-            case {"next": True}:
-                knowledge.rank()
-            case {"choose": int(contact)} if 0 <= contact < len(self._state.replay.backbone):
-                self._state.looks.contact = contact
+    @from_browser(release=int)
+    def _release(self, release: int) -> None:
+        self._state.knowledge.release(release)
+
+    @from_browser(next=True)
+    def _rank(self) -> None:
+        """Find the contact to measure next."""
+        self._state.knowledge.rank()
+
+    @from_browser(choose=int)
+    def _choose(self, choose: int) -> None:
+        if choose in self._state.contacts:
+            self._state.looks.contact = choose
 
     def _show(self, *events: Any) -> None:
         state = self._state

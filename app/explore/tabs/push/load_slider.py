@@ -5,7 +5,7 @@ from collections.abc import Callable
 import param
 
 from ....browser.bundle import Scripted
-from ....browser.messages import Message
+from ....browser.messages import from_browser
 
 
 class LoadSlider(Scripted):
@@ -22,9 +22,10 @@ class LoadSlider(Scripted):
         super().__init__(sizing_mode="stretch_width", margin=(4, 10))
         self._pushed, self._reached = pushed, reached
 
-    def _heard(self, message: Message) -> None:
-        match message:
-            case {"push": True}:
-                self._pushed()
-            case {"reached": True}:
-                self._reached()
+    @from_browser(push=True)
+    def _push(self) -> None:
+        self._pushed()
+
+    @from_browser(reached=True)
+    def _reach(self) -> None:
+        self._reached()

@@ -20,7 +20,7 @@ export function render({ model, view }) {
   function line({ entry, name, what, when, megabytes, shown }) {
     const row = document.createElement("tr"), look = { className: "soft" }
     const field = createElement("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
-    field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
+    field.addEventListener("change", () => ask(model, view, { entry, name: field.value }))
     const words = createElement("span", { textContent: what })
     const last = shown ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
     last.push(" ", button("Delete", (element) => remove(entry, element), look))

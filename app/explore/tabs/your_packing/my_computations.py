@@ -8,7 +8,7 @@ from granforce.records import InputError
 
 from ....background.jobs import reading
 from ....browser.bundle import Scripted
-from ....browser.messages import Message
+from ....browser.messages import from_browser
 from ....results import entry_labels, my_results
 from ....state.app_state import AppState
 
@@ -32,22 +32,30 @@ class Mine(Scripted):
         on_screen = self._state.cell and self._state.cell.name
         self.rows = [row | {"shown": row["entry"] == on_screen} for row in rows]
 
-    def _heard(self, message: Message) -> None:
-        """The visitor opens, names or deletes one of the rows."""
-        state, known = self._state, {row["entry"] for row in self.rows}
-        match message:
-            case {"open": str(entry)} if entry in known:
-                for cell in state.catalogue:
-                    if cell.name == entry:
-                        state.show(cell)
-            case {"call": [str(entry), str(name)]} if entry in known:
-                try:
-                    entry_labels.call(state.library.writable_cache, entry, name)
-                except InputError as error:
-                    state.work.message = str(error)
-                self._list()
-            case {"delete": str(entry)} if entry in known:
-                self._task.start(
-                    lambda job: my_results.delete(state.library, entry),
-                    lambda nothing: state.refresh(),
-                )
+    def _has(self, entry: str) -> bool:
+        return any(row["entry"] == entry for row in self.rows)
+
+    @from_browser(open=str)
+    def _open(self, open: str) -> None:
+        for cell in self._state.catalogue:
+            if cell.name == open and self._has(open):
+                self._state.show(cell)
+
+    @from_browser(entry=str, name=str)
+    def _name(self, entry: str, name: str) -> None:
+        state = self._state
+        if self._has(entry):
+            try:
+                entry_labels.call(state.library.writable_cache, entry, name)
+            except InputError as error:
+                state.work.message = str(error)
+            self._list()
+
+    @from_browser(delete=str)
+    def _delete(self, delete: str) -> None:
+        library = self._state.library
+        if self._has(delete):
+            self._task.start(
+                lambda job: my_results.delete(library, delete),
+                lambda nothing: self._state.refresh(),
+            )
