@@ -1,5 +1,6 @@
 """A small store, the app served from it, and pages of a browser, for the app's tests."""
 
+import itertools
 import json
 import re
 
@@ -32,6 +33,7 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
 
+FRICTIONS = (round(0.4 + k / 1000, 3) for k in itertools.count(1))
 HERE = re.compile(r"(http|ws)://localhost:|data:|blob:|file:|about:")
 
 
@@ -60,6 +62,12 @@ def served(shipped, tmp_path_factory):
     folder = tmp_path_factory.mktemp("served")
     with serve(folder, GRANFORCE_DATA=str(shipped)) as (url, _):
         yield url, folder
+
+
+@pytest.fixture
+def own_mu():
+    """A friction that no other test on this server has its packing made at."""
+    return next(FRICTIONS)
 
 
 @pytest.fixture(scope="session")

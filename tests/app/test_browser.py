@@ -85,14 +85,11 @@ def link_of(page, number=0):
 # The packing
 
 
-@pytest.mark.parametrize("width", [1280, 400])
-def test_disks_are_to_scale(visit, page, width):
+def test_disks_are_to_scale(page):
     """Painted disks are as wide as high, and as large as their radii say, in pixels."""
-    page = page if width == 1280 else visit(width=width)
     page.locator(".scene").click(trial=True)  # nothing lies over it
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
     size, high = page.locator(".scene").evaluate("e => [e.clientWidth, e.clientHeight]")
-    assert size == pytest.approx(high, abs=1) and size > 0.35 * width
+    assert size == pytest.approx(high, abs=1) and size > 0.35 * 1280
     (x0, y0), (x1, y1) = (scene(page, f"scene.toPixel({place})") for place in ("0, 0", "1, 1"))
     assert x1 - x0 == pytest.approx(y0 - y1, rel=1e-9)
     # the box's dashed edges, as painted, stand apart as its sides say
@@ -278,20 +275,21 @@ DRAWN_AND_POSSIBLE = f"""(() => {{
 }})()"""
 
 
-@pytest.mark.parametrize("colour", ["extent", "change", "sign"])
-def test_chains_are_coloured_by_what_is_chosen(visit, colour):
-    page = visit(f"?mu=0.1&n=30&states=30&relax=nearest_piqp&colour={colour}&frame=6&reference=3")
+def test_chains_are_coloured_by_what_is_chosen(visit):
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest_piqp&colour=sign&frame=6&reference=3")
     normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
-    shown, low, high = map(np.array, scene(page, DRAWN_AND_POSSIBLE))
-    if colour == "sign":
-        np.testing.assert_array_equal(shown, 1 + np.sign(normal[6] - normal[3]))
-    elif colour == "change":
-        change = np.clip(0.5 + (normal[6] - normal[0]), 0, 1)
-        np.testing.assert_allclose(shown, 32 * change, atol=0.501)
-    else:
+    shown = scene(page, "Array.from(scene.style.bin)")
+    np.testing.assert_array_equal(shown, 1 + np.sign(normal[6] - normal[3]))
+    for colour in ("change", "extent"):
+        page.locator(".legend select").first.select_option(colour)
+        until(page, f"scene.hand.player.look.settings.colour === '{colour}'")
+        shown, low, high = map(np.array, scene(page, DRAWN_AND_POSSIBLE))
         extent = high - low
-        most = np.quantile(extent, 0.98)
-        np.testing.assert_allclose(shown, 32 * np.clip(extent / most, 0, 1), atol=0.501)
+        part = {
+            "change": 0.5 + (normal[6] - normal[0]),
+            "extent": extent / np.quantile(extent, 0.98),
+        }
+        np.testing.assert_allclose(shown, 32 * np.clip(part[colour], 0, 1), atol=0.501)
 
 
 # Playing
@@ -334,22 +332,22 @@ def test_what_is_shown_between_two_states_is_admissible(page):
     assert np.all(np.abs(tangential) <= 0.1 * normal + 1e-6) and np.all(normal >= 0)
 
 
-@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
-def test_a_pause_goes_to_the_nearest_state(visit, motion):
-    page = visit()
-    page.emulate_media(reduced_motion=motion)
+def test_a_pause_goes_to_the_nearest_state(page):
     page.locator("input.speed").fill("1")
-    page.locator("button.play").click()
     player = "scene.hand.player"
-    until(page, f"{player}.replay.position > 0.5")
-    page.locator("button.play").click()
-    until(page, f"!{player}.playing && {player}.replay.position % 1 === 0")
-    shown, frames, frame, told = scene(
-        page,
-        "[scene.mixed.normal, scene.geometry.normal, scene.hand.player.replay.frame,"
-        " scene.hand.player.model.frame].map((value) => value.length ? Array.from(value) : value)",
-    )
-    assert shown == frames[frame * len(shown) : (frame + 1) * len(shown)] and told == frame
+    for motion in ("no-preference", "reduce"):
+        page.emulate_media(reduced_motion=motion)
+        page.keyboard.press("Home")
+        page.locator("button.play").click()
+        until(page, f"{player}.replay.position > 0.5")
+        page.locator("button.play").click()
+        until(page, f"!{player}.playing && {player}.replay.position % 1 === 0")
+        shown, frames, frame, told = scene(
+            page,
+            f"[scene.mixed.normal, scene.geometry.normal, {player}.replay.frame,"
+            f" {player}.model.frame].map((value) => value.length ? Array.from(value) : value)",
+        )
+        assert shown == frames[frame * len(shown) : (frame + 1) * len(shown)] and told == frame
 
 
 def test_step_back_and_restart(page):
@@ -485,9 +483,9 @@ def test_another_stored_mu_is_shown_by_a_key(page):
     page.get_by_text(f"μ = {scene(page, 'scene.geometry.mu'):g}, 30 disks").wait_for()
 
 
-def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
-    ask(page, 0.39)
-    page.get_by_text("μ = 0.39, 30 disks").wait_for()
+def test_mu_typed_is_computed_and_shown_with_exact_intervals(page, own_mu):
+    ask(page, own_mu)
+    page.get_by_text(f"μ = {own_mu}, 30 disks").wait_for()
     page.wait_for_function(  # they follow by themselves
         f"() => {MODEL}('bars').get_column('exact_high').every(Number.isFinite)"
     )
@@ -502,9 +500,8 @@ def test_wrong_mu_is_one_clear_line(page):
     told.wait_for()
 
 
-def test_scripts_are_fetched_once_and_run_as_they_are(visit):
+def test_scripts_are_fetched_once_and_run_as_they_are(page):
     """What is fetched early is what Panel asks for later, and nothing is translated in the page."""
-    page = visit()
     fetched = page.evaluate(
         "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => /[.]js/.test(n))"
     )
@@ -543,10 +540,8 @@ def test_the_command_line_is_copied(page):
 # Themes and widths
 
 
-@pytest.mark.parametrize("width, dark", [(1280, 1), (400, 0)])
-def test_pictures_by_day_and_by_night(visit, width, dark):
-    page = visit(f"?dark={dark}&frame=7&colour=extent", width)
+def test_a_narrow_page_is_dark_by_night_and_no_wider_than_the_window(visit):
+    page = visit("?dark=1&frame=7&colour=extent", 400)
     background = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    brightness = sum(int(value) for value in re.findall(r"\d+", background)[:3]) / 3
-    assert (brightness < 80) == bool(dark)
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert sum(int(value) for value in re.findall(r"\d+", background)[:3]) / 3 < 80
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400

@@ -81,11 +81,3 @@ def test_a_contradiction_in_a_link_is_one_line(visit):
     page = visit("?known=4:0.5~9:80")
     page.get_by_role("alert").filter(has_text="satisfies all known forces").wait_for()
     expect(page.locator(".chip")).to_have_count(0)
-
-
-def test_the_plane_of_stresses(visit):
-    page = visit("?tab=plane")
-    page.get_by_role("combobox", name="Plane").select_option("stress")
-    page.get_by_text("Only the pressure is prescribed").wait_for()
-    assert len(column(page, "outer", "x")) > 3
-    picture(page, "known/stresses")

@@ -40,7 +40,7 @@ def head(page, number):
 
 
 @pytest.mark.parametrize(
-    "width", [390, 1440, *(pytest.param(wide, marks=pytest.mark.slow) for wide in (1280, 1920))]
+    "width", [390, *(pytest.param(wide, marks=pytest.mark.slow) for wide in (1280, 1440, 1920))]
 )
 def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     page = visit("?scene=many&tab=upload", width, 900)

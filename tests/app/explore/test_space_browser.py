@@ -43,15 +43,13 @@ def ready(page):
     until(page, "scene.hand.player.plots.plane.xn?.length > 0")
 
 
-@pytest.mark.parametrize("query", ["?axes=principal", "?pair=3-8"])
-def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
-    page = visit(query, 1920, 1000)
+def test_the_point_follows_the_hand_and_the_network_the_point(visit):
+    page = visit("?axes=principal", 1920, 1000)
     ready(page)
-    if "axes" in query:  # a chain first; in the plane of a pair it would become one of the two
-        pulled(page)
-        page.mouse.up()
-        searched(page, "pull=")
-        until(page, "scene.hand.player.replay.held.pull !== undefined")
+    pulled(page)  # first; in the plane of a pair this contact would become one of the two
+    page.mouse.up()
+    searched(page, "pull=")
+    until(page, "scene.hand.player.replay.held.pull !== undefined")
     before, start, frames = normal(page), here(page), scene(page, "scene.hand.frames")
     middle = [np.mean(column(page, "outer", name)) for name in "xy"]
     (x, y), (u, v) = place(page, *start), place(page, *middle)
@@ -132,10 +130,9 @@ def test_the_point_stands_where_a_pull_led_before_force_space_was_opened(visit):
     searched(page, "~")
 
 
-@pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
-def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
+def test_force_space_fills_while_the_walk_goes_on(visit, own_mu):
     """Every state that has arrived has its place, on axes of those found before."""
-    page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest_piqp{query}", width, 1000)
+    page = visit(f"?mu={own_mu}&n=30&states=20000&relax=nearest_piqp&tab=plane", 1280, 1000)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 30")
     there = f"{MODEL}('path')?.get_column('x')?.filter(Number.isFinite).length"
     page.wait_for_function(f"() => {there} > 20")

@@ -101,15 +101,15 @@ def test_a_tilting_packing_is_drawn_with_its_images(visit):
     assert shown[5] == packing.tilt and shown[6] == pytest.approx((shown[4][1] - shown[4][0]) / 2)
 
 
-def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
-    """Pale at once, then a shrinking box, then a walk that grows."""
+def test_a_new_mu_is_seen_to_jam_and_to_walk_and_can_be_discarded(visit, own_mu):
+    """Pale at once, a shrinking box, then a walk that grows; without it, the old one is back."""
     page = visit()
     page.locator(".scene").evaluate(WATCH)
     bars, values = page.locator(".in-intervals"), page.locator(".results td")
     faint = "e => getComputedStyle(e).opacity"
     z = values.all_inner_texts()[-4]
     ask_for_many_states(page)
-    ask(page, "0.41")
+    ask(page, own_mu)
     # Beside the new packing there is no number of the old one.
     until(page, "scene.hand.player.live.moves")
     assert bars.evaluate(faint) == "0" and set(values.all_inner_texts()[1:5]) == {"–"}
@@ -117,19 +117,23 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
     assert bars.evaluate(faint) == "1"  # of the walk that grows
     assert values.all_inner_texts()[-4] not in (z, "–")  # z is already that of the new packing
     assert set(values.all_inner_texts()[1:5]) == {"–"}
-    shows(page, 0.41)
+    shows(page, own_mu)
     seen = page.evaluate("seen")
     assert seen["pale"] and len(seen["pictures"]) >= 12 and seen["states"]
     assert seen["pictures"][0] > 1.1 * seen["pictures"][-1]
     # The walk is on screen, not the packing that moved before.
     until(page, "!scene.hand.player.live.moves && scene.painted > 0")
     page.get_by_role("button", name="Discard").click()
+    until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
+    no_more(page, str(own_mu))
+    expect(page.locator(".stage.pale")).to_have_count(0)
+    expect(page.locator("input.typed").first).to_have_value("0.1")
 
 
-def test_computed_states_are_shown_to_the_last(visit):
-    page = visit("?mu=0.41&n=30&states=300&relax=nearest_piqp")
-    until(page, "scene.geometry.mu === 0.41 && !scene.hand.player.grows")
-    page.get_by_text("μ = 0.41, 30 disks").wait_for(state="attached")  # in a fold
+def test_computed_states_are_shown_to_the_last(visit, own_mu):
+    page = visit(f"?mu={own_mu}&n=30&states=300&relax=nearest_piqp")
+    until(page, f"scene.geometry.mu === {own_mu} && !scene.hand.player.grows")
+    page.get_by_text(f"μ = {own_mu}, 30 disks").wait_for(state="attached")  # in a fold
     page.keyboard.press("End")  # the last state, where all intervals have been seen
     until(page, "scene.hand.player.replay.frame === scene.hand.player.replay.last")
     page.wait_for_function(
@@ -139,20 +143,8 @@ def test_computed_states_are_shown_to_the_last(visit):
     expect(page.locator(".requested")).to_be_empty()
 
 
-def test_discarded_the_old_packing_is_back_with_its_friction(visit):
-    page = visit()
-    ask_for_many_states(page)
-    ask(page, "0.47")
-    until(page, "scene.hand.player.grows && scene.geometry.mu === 0.47")
-    page.get_by_role("button", name="Discard").click()
-    until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
-    no_more(page, "0.47")
-    expect(page.locator(".stage.pale")).to_have_count(0)
-    expect(page.locator("input.typed").first).to_have_value("0.1")
-
-
-def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
-    page = visit("?mu=0.48&n=30&states=20000&relax=nearest_piqp")
+def test_stopped_a_walk_is_kept_with_the_states_it_has(visit, own_mu):
+    page = visit(f"?mu={own_mu}&n=30&states=20000&relax=nearest_piqp")
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
     page.get_by_role("button", name="Stop and keep").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
@@ -178,9 +170,9 @@ WebSocket.prototype.send = function (frame) {
 """
 
 
-def test_two_pages_see_the_same_walk(visit):
+def test_two_pages_see_the_same_walk(visit, own_mu):
     """The second although its player is there, and hears of the walk, before the page is."""
-    query = "?mu=0.42&n=30&states=20000&relax=nearest_piqp"
+    query = f"?mu={own_mu}&n=30&states=20000&relax=nearest_piqp"
     one = visit(query)
     until(one, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
     two = visit(query, prepare=lambda page: page.add_init_script(LATE))
@@ -197,15 +189,15 @@ def test_two_pages_see_the_same_walk(visit):
         ).click()
 
 
-def test_a_hidden_tab_is_sent_nothing(visit):
+def test_a_hidden_tab_is_sent_nothing(visit, own_mu):
     page = visit()
     page.locator(".scene").evaluate(WATCH)
     page.evaluate("""() => {
         Object.defineProperty(document, "hidden", {value: true, configurable: true})
         document.dispatchEvent(new Event("visibilitychange"))
     }""")
-    ask(page, "0.43")
-    shows(page, 0.43)
+    ask(page, own_mu)
+    shows(page, own_mu)
     seen = page.evaluate("seen")
     assert not seen["pictures"] and not seen["states"]
 
@@ -473,12 +465,11 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
-@pytest.mark.parametrize("sizes", [[(1280, 800), (1536, 864)], [(1700, 900), (1440, 900)]])
-def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, sizes):
-    """One that it was opened with, and one that it is given."""
-    page = visit("", *sizes[0])
+def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit):
+    """One that it was opened with, and those that it is given."""
+    page = visit("", 1700, 900)
     first, last = (page.get_by_role("tab", name=name) for name in ("Intervals", "Export"))
-    for width, height in sizes:
+    for width, height in [(1700, 900), (1440, 900), (1280, 800), (1536, 864)]:
         page.set_viewport_size({"width": width, "height": height})
         last.wait_for()
         packing = at_rest(page.locator(".scene").first)
@@ -487,27 +478,26 @@ def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, sizes):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-@pytest.mark.parametrize("width", [700, 1024, 1440])
-def test_the_packing_is_seen_whole_below_its_controls(visit, width):
-    page = visit("", width, 768)
+def test_the_packing_is_seen_whole_below_its_controls_and_above_its_player(visit):
+    page = visit("", 700, 768)
     page.get_by_label("logarithm of μ").wait_for()
+    for width in (700, 1024, 1440):
+        page.set_viewport_size({"width": width, "height": 768})
+        at_rest(page.locator(".scene").first)
+        assert inside(page, ".scene") and inside(page, ".friction")
+    # Everything is on one screen, and keeps its size when lines come and go.
+    before = at_rest(page.locator(".scene").first)
+    for key in ("n", "Enter"):
+        page.keyboard.press(key)
+        page.locator(".message", has_text="contact").wait_for()
+    page.locator(".legend select").first.select_option("extent")
+    ask(page, "none")
+    page.get_by_role("alert").filter(has_text="none").wait_for()
+    assert at_rest(page.locator(".scene").first) == before
+    for part in ("button.play", ".legend", ".results", ".line"):
+        assert inside(page, part), part
+    page.set_viewport_size({"width": 400, "height": 900})
     at_rest(page.locator(".scene").first)
-    assert inside(page, ".scene") and inside(page, ".friction")
-    if width > 900:  # everything is on one screen, and keeps its size when lines come and go
-        before = at_rest(page.locator(".scene").first)
-        for key in ("n", "Enter"):
-            page.keyboard.press(key)
-            page.locator(".message", has_text="contact").wait_for()
-        page.locator(".legend select").first.select_option("extent")
-        ask(page, "none")
-        page.get_by_role("alert").filter(has_text="none").wait_for()
-        assert at_rest(page.locator(".scene").first) == before
-        for part in ("button.play", ".legend", ".results", ".line"):
-            assert inside(page, part), part
-
-
-def test_on_a_phone_the_player_is_below_the_packing(visit):
-    page = visit("", 400, 900)
     above, below = (
         page.locator(f".stage {name}").bounding_box() for name in (".scene", ".bar:has(.play)")
     )
