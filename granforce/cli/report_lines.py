@@ -1,14 +1,30 @@
-"""The meaning of report lines, for `--help`."""
+"""The lines of reports: which there are, in which order, their meaning, and where they are stored.
+
+Nothing here needs NumPy: `--help` reads this file.
+"""
 
 import textwrap
+from typing import NamedTuple
 
-from granforce.quantities import QUANTITIES
+from granforce.quantities import FORCE, QUANTITIES
 from granforce.system.wording import spaced
+
+
+class Line(NamedTuple):
+    """A line of a report."""
+
+    meaning: str
+    stored: str = ""  # the stored quantity with its value; empty if it is computed for the report
+    reduced: str = ""  # how an array becomes one number: max, mean or sum
+    unit: str = ""  # FORCE: in the packing's unit, reported in that of --unit
+    nonzero: str = ""  # a stored quantity: the line is left out where it is zero
+
 
 # The largest number of contacts that a report on exact results lists.
 FEW = 30
-# By names as in --json, of lines that are not quantities of the store, or say more or else.
-_MEANINGS = {
+# By names as in --json, of lines that are not quantities of the store, or say more or else; a text
+# alone: the meaning of a line that is computed for the report.
+_LINES: dict[str, str | Line] = {
     "determined_contacts": "contacts with the same force in all networks",
     "undetermined_clusters": "connected groups of undetermined contacts",
     "position_of_f_n_in_tenths": "number of undetermined contacts whose original f_n is in the "
@@ -34,10 +50,17 @@ _MEANINGS = {
     "backbone_contacts": "contacts that can carry force",
     "friction": "friction coefficient μ",
     "pressure": "pressure P0; undefined in an open packing",
-    "coordination": "mean number z of contacts of a backbone grain, including those with walls; "
-    "walls and rattlers do not count as grains",
-    "mean_normal_force": "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
-    "the pressure is prescribed, otherwise the plain mean of the original network",
+    "coordination": Line(
+        "mean number z of contacts of a backbone grain, including those with walls; "
+        "walls and rattlers do not count as grains",
+        "coordination",
+    ),
+    "mean_normal_force": Line(
+        "mean normal force ⟨f_n⟩: weighted by the distance between centres if "
+        "the pressure is prescribed, otherwise the plain mean of the original network",
+        "force_scale",
+        unit=FORCE,
+    ),
     "residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
     "violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
     "largest_overlap": "largest overlap of two bodies, in units of the largest radius",
@@ -64,13 +87,19 @@ _MEANINGS = {
     "entry": "name of the result in the store",
     "cached": "whether the result was already in the store",
     "states": "number of states",
-    "exact_eta3": "η3 of the exact intervals; undefined if some are infinite",
-    "mean_iterations": "mean number of iterations of a relaxation",
-    "largest_residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
-    "largest_violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
-    "mean_distance_to_centre": "mean distance of states from the centre, in units of ⟨f_n⟩",
-    "mean_extent_of_f_n": "mean length of the interval of f_n",
-    "largest_extent_of_f_n": "length of the longest interval of f_n",
+    "exact_eta3": Line("η3 of the exact intervals; undefined if some are infinite", "eta3"),
+    "mean_iterations": Line("mean number of iterations of a relaxation", "sweeps", "mean"),
+    "largest_residual": Line(
+        "largest unbalanced force on a grain, in units of ⟨f_n⟩", "residual", "max"
+    ),
+    "largest_violation": Line(
+        "largest violation of Coulomb's law, in units of ⟨f_n⟩", "violation", "max"
+    ),
+    "mean_distance_to_centre": Line(
+        "mean distance of states from the centre, in units of ⟨f_n⟩", "distance_to_centre", "mean"
+    ),
+    "mean_extent_of_f_n": Line("mean length of the interval of f_n", unit=FORCE),
+    "largest_extent_of_f_n": Line("length of the longest interval of f_n", unit=FORCE),
     "contacts_with_unbounded_f_n": "contacts whose f_n has no upper bound, as grains are wedged; "
     "not in the mean and largest extent",
     "contacts_with_unbounded_f_t": "contacts whose f_t has no bound on one or both sides",
@@ -81,31 +110,46 @@ _MEANINGS = {
     "f_t_low": "smallest f_t, negative in the other direction",
     "f_t_high": "largest f_t",
     "reached": "whether the requested size or accuracy was reached",
-    "largest_duality_gap": "largest possible error of a bound, certified, in units of ⟨f_n⟩",
-    "ln_volume": "logarithm of the volume V of S, with forces in units of ⟨f_n⟩",
-    "standard_error": "standard error of ln V",
+    "largest_duality_gap": Line(
+        "largest possible error of a bound, certified, in units of ⟨f_n⟩", "max_gap"
+    ),
+    "ln_volume": Line(
+        "logarithm of the volume V of S, with forces in units of ⟨f_n⟩", "log_volume"
+    ),
+    "standard_error": Line("standard error of ln V", "log_volume_error"),
     "ln_volume_on_the_way_down": "ln V from the ladder of decreasing β alone, as a check",
     "ln_volume_on_the_way_up": "ln V from the ladder of increasing β alone",
-    "ln_volume_per_grain": "ln V per grain of the backbone",
-    "extent_over_mean_normal_force": "extent V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩",
+    "ln_volume_per_grain": Line("ln V per grain of the backbone", "log_volume_per_grain"),
+    "extent_over_mean_normal_force": Line(
+        "extent V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩", "extent"
+    ),
     "paths": "paths of the billiard walk",
-    "mean_limit_load": "mean limit load",
-    "least_limit_load": "smallest limit load of a contact",
-    "largest_limit_load": "largest limit load of a contact",
+    "mean_limit_load": Line("mean limit load", "limit_load", "mean", FORCE),
+    "least_limit_load": Line("smallest limit load of a contact", unit=FORCE),
+    "largest_limit_load": Line("largest limit load of a contact", unit=FORCE),
     "contacts_without_a_limit": "contacts on which any force pair can be balanced; not in the mean",
-    "largest_shear_over_pressure": "largest √((σ_xx − σ_yy)²/4 + σ_xy²)/P that the contacts can "
-    "carry",
-    "certainly_not_above": "certified upper bound on this ratio",
+    "largest_shear_over_pressure": Line(
+        "largest √((σ_xx − σ_yy)²/4 + σ_xy²)/P that the contacts can carry", "friction"
+    ),
+    "certainly_not_above": Line("certified upper bound on this ratio", "friction_bound"),
     "own_shear_over_pressure": "this ratio for the packing's original forces",
     "own_normal_difference": "(σ_xx − σ_yy)/2P of the packing's original forces",
     "own_shear_stress": "σ_xy/P of the packing's original forces",
-    "mean_critical_force": "mean critical force F_crit, the force pair at which grains start to "
-    "move",
-    "critical_force_deciles": "F_crit: smallest value, deciles, largest value",
+    "mean_critical_force": Line(
+        "mean critical force F_crit, the force pair at which grains start to move", unit=FORCE
+    ),
+    "critical_force_deciles": Line("F_crit: smallest value, deciles, largest value", unit=FORCE),
     "limit_load": "largest force pair that can be balanced",
     "fit_range": "distances r of the fit, in the packing's units; undefined in small packings",
-    "largest_breach": "largest violation of Coulomb's law by a first motion, relative to the "
-    "fastest contact",
+    "largest_breach": Line(
+        "largest violation of Coulomb's law by a first motion, relative to the fastest contact",
+        "motion_breach",
+        "max",
+    ),
+    **{
+        name: Line(QUANTITIES[name].meaning, name, "sum")
+        for name in ("loads_at_rest", "loads_moving", "loads_undecided")
+    },
     "load_factor": "largest multiple of the load that contact forces can balance",
     "certified_error": "certified bound on how much the true load factor can exceed the reported "
     "one",
@@ -118,6 +162,14 @@ _MEANINGS = {
     "is steady",
     "measured_components": "number of measured f_n and f_t",
     "measured_where_nothing_can_carry": "measured f_n and f_t outside the backbone, ignored",
+    "directions_taken_as_pinned": Line(
+        "directions of S too narrow to be resolved, if there are any",
+        "flat_directions",
+        nonzero="flat_directions",
+    ),
+    "as_narrower_than": Line(
+        "width of S in these directions, in units of ⟨f_n⟩", "resolution", nonzero="flat_directions"
+    ),
     # of a photoelastic frame
     "contacts_listed": "pairs of grains in the file, each counted once",
     "candidates": "pairs of grains close enough to touch but not in the file, added as unmeasured "
@@ -130,17 +182,24 @@ _MEANINGS = {
     "decrease with the other sign of f_t (--reverse)",
     "error": "median standard error of a measured f_n, in units of the mean measured f_n; without "
     "--error, chosen so that χ² equals its degrees of freedom",
-    "mean_change_of_f_n": "mean |inferred − measured| f_n",
+    "mean_change_of_f_n": Line("mean |inferred − measured| f_n", unit=FORCE),
     "suspects": "contacts that deviate by more than 3 σ",
-    "mean_standard_error": "mean standard error of a force",
-    "unmeasured_spread": "standard error with which unmeasured forces count as 0, in units of "
-    "⟨f_n⟩; if S is unbounded, error bars of forces without measured bounds depend on it",
+    "mean_standard_error": Line("mean standard error of a force", "standard_error", "mean", FORCE),
+    "unmeasured_spread": Line(
+        "standard error with which unmeasured forces count as 0, in units of "
+        "⟨f_n⟩; if S is unbounded, error bars of forces without measured bounds depend on it",
+        "unmeasured",
+    ),
     "unmeasured_contacts": "contacts whose f_n was not measured",
     "carry_for_certain": "unmeasured contacts that carry force in every network within 3 σ",
-    "mean_interval_now": "mean length of the interval of f_n before a measurement",
+    "mean_interval_now": Line(
+        "mean length of the interval of f_n before a measurement", unit=FORCE
+    ),
 }
-_STATES = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3")
-_CHECKS = ("largest_residual", "largest_violation", "seconds", "cached")
+_EXTENSION = ("dimension", "directions_taken_as_pinned", "as_narrower_than")
+_ETAS = ("eta1", "eta2", "eta3")
+_CHECKS = ("largest_residual", "largest_violation")
+_END = ("seconds", "cached")
 PACKING = (
     *("grains", "grains_left_open", "contacts", "backbone_grains", "backbone_contacts"),
     *("rattlers", "friction", "pressure", "packing_fraction", "coordination", "dimension"),
@@ -155,29 +214,36 @@ PEGS = (
 )
 IMPORT = (*PACKING, "timestep", "time", "contacts_skipped", "walls", "contacts_with_walls")
 WALK = (
-    *("entry", *_STATES, "acceptance", "accepted", "rejected", "unconverged", "skipped"),
-    *("rattlers", "unloaded_contacts", "mean_iterations", *_CHECKS),
+    *("entry", "packing_fraction", "coordination", *_EXTENSION, *_ETAS, "acceptance", "accepted"),
+    *("rejected", "unconverged", "skipped", "rattlers", "unloaded_contacts", "mean_iterations"),
+    *(*_CHECKS, *_END),
 )
-SCAN = (*_STATES, "acceptance", "rejected", "unconverged", "skipped", "cached")
+SCAN = (
+    *("packing_fraction", "coordination", "dimension", *_ETAS, "acceptance", "rejected"),
+    *("unconverged", "skipped", "cached"),
+)
 MEASURE = (
-    *("mu", "states", *_STATES, "mean_normal_force", "mean_extent_of_f_n"),
-    *("largest_extent_of_f_n", "correlation", "correlation_low", "correlation_high"),
-    *("mean_distance_to_centre", "original_distance"),
+    *("mu", "states", *_EXTENSION, "coordination", "packing_fraction", *_ETAS),
+    *("mean_normal_force", "mean_extent_of_f_n", "largest_extent_of_f_n", "correlation"),
+    *("correlation_low", "correlation_high", "mean_distance_to_centre", "original_distance"),
 )
-MIXING = ("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped")
+# Work of the samplers, which only the JSON report has.
+WORK = ("turns", "refused", "dropped", "held")
+_MIXING = ("worst_r_hat", "least_bulk_size", "least_tail_size", *WORK)
+_SAMPLING = ("setup_seconds", "sampling_seconds")
 UNIFORM = (
-    *("entry", "states", *_STATES, *MIXING, "held", "skipped", "rattlers", "unloaded_contacts"),
-    *("reached", "mean_distance_to_centre", "original_distance", "setup_seconds"),
-    *("sampling_seconds", *_CHECKS),
+    *("entry", "states", *_EXTENSION, "packing_fraction", "coordination", *_ETAS, *_MIXING),
+    *("skipped", "rattlers", "unloaded_contacts", "reached", "mean_distance_to_centre"),
+    *("original_distance", *_CHECKS, *_SAMPLING, *_END),
 )
 VOLUME = (
-    *("entry", "dimension", "ln_volume", "standard_error", "ln_volume_on_the_way_down"),
+    *("entry", *_EXTENSION, "ln_volume", "standard_error", "ln_volume_on_the_way_down"),
     *("ln_volume_on_the_way_up", "ln_volume_per_grain", "extent_over_mean_normal_force"),
-    *("reached", "paths", "turns", "refused", "seconds", "cached"),
+    *("reached", "paths", "turns", "refused", *_END),
 )
-_SOLVED = ("programs", "again", "largest_duality_gap", "seconds", "cached")
+_SOLVED = ("programs", "again", "largest_duality_gap", *_END)
 INTERVALS = (
-    *("contacts", "dimension", "coordination", "exact_eta3", "mean_normal_force"),
+    *("contacts", *_EXTENSION, "coordination", "exact_eta3", "mean_normal_force"),
     *("mean_extent_of_f_n", "largest_extent_of_f_n", "contacts_with_unbounded_f_n"),
     *("contacts_with_unbounded_f_t", "contacts_not_certified", "correlation"),
     *("determined_contacts", "undetermined_clusters", "position_of_f_n_in_tenths", *_SOLVED),
@@ -198,10 +264,10 @@ REST = (
 )
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),
-    *("twins", "seconds", "cached"),
+    *("twins", *_END),
 )
 STRESS = (
-    *("dimension", "largest_shear_over_pressure", "certainly_not_above"),
+    *(*_EXTENSION, "largest_shear_over_pressure", "certainly_not_above"),
     *("own_shear_over_pressure", "own_normal_difference", "own_shear_stress"),
     *("normal_difference_from_to", "shear_stress_from_to", "admissible_stress", *_SOLVED),
 )
@@ -210,24 +276,23 @@ PERTURB = (
     "critical_force_deciles",
     *("decay_exponent", "decay_low", "decay_high", "fit_range", "loads_at_rest", "loads_moving"),
     *("loads_undecided", "rattlers", "unloaded_contacts", "largest_residual", "largest_breach"),
-    *("seconds", "cached"),
+    *_END,
 )
 CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
     *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
-    *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error", *MIXING),
-    *("held", "setup_seconds", "sampling_seconds", "seconds", "cached"),
+    *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error"),
+    *(*_MIXING, *_SAMPLING, *_END),
 )
 
-MEANINGS = {
-    name: _MEANINGS[name] if name in _MEANINGS else QUANTITIES[name].meaning
-    for lines in (
-        *(PACK, PEGS, IMPORT, WALK, SCAN, MEASURE, UNIFORM, VOLUME, INTERVALS, BOUNDS, LIMIT_LOADS),
-        *(LOADS, LOAD_FACTOR, REST, INFORMATIVE, STRESS, PERTURB, CRITICAL, INFER),
-    )
-    for name in lines
-}
+
+def line(name: str) -> Line:
+    """The line of this name, by default the stored quantity of this name."""
+    declared = _LINES.get(name)
+    if declared is None:
+        return Line(QUANTITIES[name].meaning, name)
+    return declared if isinstance(declared, Line) else Line(declared)
 
 
 def explained(names: tuple[str, ...]) -> str:
@@ -235,7 +300,7 @@ def explained(names: tuple[str, ...]) -> str:
     width = 24
     lines = []
     for name in names:
-        first, *others = textwrap.wrap(MEANINGS[name], 78 - width)
+        first, *others = textwrap.wrap(line(name).meaning, 78 - width)
         label = f"  {spaced(name)}"
         if len(label) > width - 2:
             lines.append(label)

@@ -1,9 +1,10 @@
 """The results of commands: parameters and conditions from options, and their datasets."""
 
 import argparse
+import json
 import threading
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,11 +12,13 @@ import xarray as xr
 
 from granforce import measures
 from granforce.cli.input_tables import read_known
+from granforce.cli.report_lines import WORK, line
 from granforce.explore.uniform import unreliable
 from granforce.forces.knowledge import Known, refuse_others
 from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
+from granforce.quantities import FORCE
 from granforce.records import InputError, Packing, ResultWarning, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -164,7 +167,36 @@ class StoredResult(NamedTuple):
     entry: str  # its name in the store
     parameters: Parameters
     dataset: xr.Dataset
-    ends: dict[str, Any]  # last lines of the report: cost, and whether it was stored already
+    cached: bool  # whether it was already in the store
+
+    def report(
+        self, names: Sequence[str], arguments: argparse.Namespace, **given: Any
+    ) -> dict[str, Any]:
+        """The named lines, in this order: given values, else stored ones; others are left out.
+
+        given: forces in the packing's unit; they are reported in that of --unit.
+        """
+        given = {"entry": self.entry, "cached": self.cached} | given
+        report: dict[str, Any] = {}
+        for name in names:
+            value = given[name] if name in given else self._stored(name)
+            if (name in WORK and not arguments.json) or (name not in given and value is None):
+                continue
+            if line(name).unit == FORCE:
+                report |= unit(arguments, self.dataset).reported({name: value})
+            else:
+                report[name] = value
+        return report
+
+    def _stored(self, name: str) -> Any:
+        """The value of a line in the dataset, or among its counts; None if it is in neither."""
+        source, dataset = line(name), self.dataset
+        if source.stored not in dataset:
+            return json.loads(dataset.attrs.get("counts", "{}")).get(name)
+        if source.nonzero and not dataset[source.nonzero].item():
+            return None
+        values = dataset[source.stored]
+        return (getattr(values, source.reduced)() if source.reduced else values).item()
 
 
 def stored_result(
@@ -194,8 +226,7 @@ def stored_result(
             if kind is not kinds.INFORMATIVE:  # the commands say so themselves, also if cached
                 warnings.simplefilter("ignore", ResultWarning)
             dataset, cached = study.get(store, kind, parameters, **keywords)
-    ends = {"seconds": dataset["seconds"].item(), "cached": cached}
-    return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, ends)
+    return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, cached)
 
 
 def telling_eta(bar: Any) -> Callable[[Any], None]:
@@ -271,14 +302,10 @@ def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
 
 
 def extents(dataset: xr.Dataset) -> dict[str, float]:
-    """Lengths of the intervals of f_n, by name, in the packing's unit; and the mean f_n.
-
-    Infinite ones do not count.
-    """
+    """Lengths of the finite intervals of f_n, by name, in the packing's unit."""
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
     extent = extent[np.isfinite(extent)]
     return {
-        "mean_normal_force": dataset["force_scale"].item(),
         "mean_extent_of_f_n": float(extent.mean()) if len(extent) else np.nan,
         "largest_extent_of_f_n": float(extent.max()) if len(extent) else np.nan,
     }
@@ -297,15 +324,6 @@ def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredRe
     )
 
 
-def extension(dataset: xr.Dataset) -> dict[str, Any]:
-    """The dimension of S and, for results that include it, directions taken as pinned."""
-    lines = {"dimension": dataset["dimension"].item()}
-    if "flat_directions" in dataset and dataset["flat_directions"].item():
-        lines["directions_taken_as_pinned"] = dataset["flat_directions"].item()
-        lines["as_narrower_than"] = dataset["resolution"].item()
-    return lines
-
-
 def sample_notes(dataset: xr.Dataset) -> list[str]:
     """A note if the states of a sample are not to be relied on, and what to do."""
     if not dataset["dimension"].item():
@@ -313,12 +331,3 @@ def sample_notes(dataset: xr.Dataset) -> list[str]:
     sizes = [dataset[name].item() for name in ("least_bulk_size", "least_tail_size")]
     why = unreliable(dataset["worst_r_hat"].item(), min(sizes))
     return [f"the sample is unreliable: {why}; use more --states"] if why else []
-
-
-# Work of the samplers, which only the JSON report has.
-_WORK = ("turns", "refused", "dropped", "held")
-
-
-def without_work(lines: Mapping[str, Any], arguments: argparse.Namespace) -> dict[str, Any]:
-    """The lines of a report; those on the samplers' work only for --json."""
-    return {name: v for name, v in lines.items() if arguments.json or name not in _WORK}

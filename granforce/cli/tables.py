@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.cli.results import get_packing
+from granforce.cli.results import StoredResult, get_packing
 from granforce.labelled import (
     CONTACT_LABELS,
     Declared,
@@ -18,19 +18,18 @@ from granforce.labelled import (
     table,
 )
 from granforce.quantities import quantity
-from granforce.study.keys import Parameters
 from granforce.study.series import save_series
 from granforce.system.files import written
 
 
 def of_contacts(
-    arguments: argparse.Namespace, parameters: Parameters, stored: xr.Dataset, declared: Declared
+    arguments: argparse.Namespace, result: StoredResult, declared: Declared
 ) -> xr.Dataset:
     """Variables of a stored result with labels of its contacts, in the unit of --unit."""
-    packing, _ = get_packing(arguments.store, parameters["packing"])
+    packing, _ = get_packing(arguments.store, result.parameters["packing"])
     if arguments.unit == "mean":
-        declared = in_mean_forces(declared, stored["force_scale"].item())
-    return labelled_dataset(declared, packing, stored["backbone"].values)
+        declared = in_mean_forces(declared, result.dataset["force_scale"].item())
+    return labelled_dataset(declared, packing, result.dataset["backbone"].values)
 
 
 def columns(dataset: xr.Dataset) -> dict[str, Any]:
@@ -73,13 +72,13 @@ def write_csv(path: str | Path, columns: Mapping[str, Any], *, digits: int = 17)
         )
 
 
-def write_states(arguments: argparse.Namespace, parameters: Parameters, stored: xr.Dataset) -> None:
+def write_states(arguments: argparse.Namespace, result: StoredResult) -> None:
     """Write the states of a walk or sample with their contacts to the file of --out."""
     path = arguments.out
     if path is None:
         return
-    states = stored["states"].values.astype(np.float64)
-    dataset = of_contacts(arguments, parameters, stored, {"states": (quantity("states"), states)})
+    states = result.dataset["states"].values.astype(np.float64)
+    dataset = of_contacts(arguments, result, {"states": (quantity("states"), states)})
     if path.endswith(".npz"):
         names = {name: dataset[name].values for name in ("contact", *CONTACT_LABELS)}
         name = column_name(None, "states", arguments.unit)

@@ -10,7 +10,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb.critical_force import CriticalForce
-from granforce.records import Packing
+from granforce.records import Packing, brief_list
 from granforce.study.schema import extension, labelled, stored
 from granforce.types import Floats
 
@@ -58,6 +58,14 @@ def perturbation_dataset(S: Ensemble, parts: Sequence[xr.Dataset]) -> xr.Dataset
         {"fit_range": json.dumps(fit.fit)},
     )
     return whole.merge(scalars, combine_attrs="drop_conflicts")
+
+
+def unsteady(dataset: xr.Dataset) -> str:
+    """A message on contacts without steady motion above their critical force; empty without any."""
+    limited = dataset["critical_high"].values >= dataset["limit_load"].values
+    steady = dataset["motion_breach"].values <= perturb.STEADY
+    contacts = dataset["backbone"].values[~(steady | limited)].tolist()
+    return perturb.unsteady(f"contact {brief_list(contacts)}") if contacts else ""
 
 
 def moved_grains(packing: Packing, dataset: xr.Dataset) -> tuple[Floats, Floats]:

@@ -8,18 +8,16 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.cli.report_lines import CRITICAL, FEW
+from granforce.cli import report_lines
 from granforce.cli.results import (
     StoredResult,
     conditions,
     different,
-    extension,
     extents,
     get_packing,
     known_forces,
     numbers,
     stored_result,
-    unit,
 )
 from granforce.cli.tables import columns, of_contacts, write_table
 from granforce.explore.intervals import Intervals, LimitLoads, uncertified
@@ -34,28 +32,21 @@ from granforce.perturb.critical_force import COUNTS, CriticalForce
 from granforce.quantities import quantity
 from granforce.study import kinds
 from granforce.study.cells import Kind
+from granforce.study.responses import unsteady
 from granforce.system.terminal import print_notes, print_report, report_after
 from granforce.system.wording import integer, number
-
-LOADS = COUNTS[:3]  # by outcome; then comes the work done
 
 
 def listed(dataset: xr.Dataset) -> dict[str, list[Any]]:
     """Columns of a result per contact for the report, which lists at most FEW contacts."""
-    few = dataset.sizes["contact"] <= FEW
+    few = dataset.sizes["contact"] <= report_lines.FEW
     return {name: values.tolist() for name, values in columns(dataset).items()} if few else {}
-
-
-def solved(dataset: xr.Dataset) -> dict[str, int]:
-    """Linear programs solved, once and again."""
-    counts = json.loads(dataset.attrs["counts"])
-    return {name: counts[name] for name in ("programs", "again") if name in counts}
 
 
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
     chosen = different("--contacts", arguments.contacts, integer)
-    _, parameters, dataset, ends = stored_result(
+    result = stored_result(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
         random=None if arguments.all or chosen is not None else arguments.random,
@@ -63,36 +54,28 @@ def perturb(arguments: argparse.Namespace) -> None:
         precision=arguments.precision,
         **conditions(arguments),
     )
-    forces, scale = unit(arguments, dataset), dataset["force_scale"].item()
+    dataset = result.dataset
+    declared = from_store(CriticalForce, dataset, *report_lines.CRITICAL)
+    few = listed(of_contacts(arguments, result, declared))
     load = dataset["critical_low"].values
-    reported = {
-        "mean_normal_force": scale,
-        "mean_critical_force": dataset["critical_force"].item() * scale,
-        "mean_limit_load": float(dataset["limit_load"].mean()),
-    }
-    declared = from_store(CriticalForce, dataset, *CRITICAL)
-    few = listed(of_contacts(arguments, parameters, dataset, declared))
     inner, outer = json.loads(dataset.attrs["fit_range"])
-    if not few:
-        reported["critical_force_deciles"] = np.quantile(load, np.linspace(0, 1, 11))
-    lines = {
-        "contacts": len(load),
-        **forces.reported(reported),
-        **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
-        "fit_range": [inner, outer] if inner < outer else None,
-        **{name: int(dataset[name].sum()) for name in LOADS},
-        **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
-        "largest_residual": float(dataset["load_residual"].max()),
-        "largest_breach": float(dataset["motion_breach"].max()),
-        **ends,
-    }
+    deciles = {} if few else {"critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11))}
+    lines = result.report(
+        report_lines.PERTURB,
+        arguments,
+        contacts=len(load),
+        mean_critical_force=dataset["critical_force"].item() * dataset["force_scale"].item(),
+        fit_range=[inner, outer] if inner < outer else None,
+        largest_residual=float(dataset["load_residual"].max()),
+        **deciles,
+    )
     with report_after(lines, arguments.json, few):
         if arguments.out is not None:
             names = ("pair_opening", "opened", "slid", "kept", *COUNTS)
             declared |= {name: (quantity(name), dataset[name].values) for name in names}
-            write_table(arguments.out, of_contacts(arguments, parameters, dataset, declared))
-    if undecided := lines["loads_undecided"]:
-        print_notes([f"{undecided} loads ended in unsteady motion: F_crit may be larger"])
+            write_table(arguments.out, of_contacts(arguments, result, declared))
+    if note := unsteady(dataset):
+        print_notes([note])
 
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
@@ -105,8 +88,8 @@ def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
 
 def intervals(arguments: argparse.Namespace) -> None:
     """Compute or load exact intervals, and report them."""
-    _, parameters, dataset, ends = _exact(arguments, kinds.INTERVALS)
-    forces = unit(arguments, dataset)
+    result = _exact(arguments, kinds.INTERVALS)
+    dataset = result.dataset
     low, high = (dataset[side].values for side in ("low", "high"))
     bounded, certified = np.isfinite(high - low), ~(np.isnan(low) | np.isnan(high))
     left = dataset["backbone"].values[~certified.all(axis=1)]
@@ -118,24 +101,18 @@ def intervals(arguments: argparse.Namespace) -> None:
     cluster = dataset["cluster"].values
     undetermined = np.isfinite(position)
     histogram = np.histogram(np.clip(position[undetermined], 0, 1), bins=10, range=(0, 1))[0]
-    lines = {
+    given = {
         "contacts": dataset.sizes["contact"],
-        **extension(dataset),
-        "coordination": dataset["coordination"].item(),
-        "exact_eta3": dataset["eta3"].item(),
-        **forces.reported(extents(dataset)),
+        **extents(dataset),
         **_without_limit(bounded | ~certified),
         **({"contacts_not_certified": len(left)} if len(left) else {}),
-        "correlation": dataset["correlation"].item(),
         "determined_contacts": int(np.sum(cluster < 0)),
         "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
         **({"position_of_f_n_in_tenths": histogram.tolist()} if undetermined.any() else {}),
-        **solved(dataset),
-        "largest_duality_gap": dataset["max_gap"].item(),
-        **ends,
     }
+    lines = result.report(report_lines.INTERVALS, arguments, **given)
     declared = from_store(Intervals, dataset) | {"cluster": (quantity("cluster"), cluster)}
-    bounds = of_contacts(arguments, parameters, dataset, declared).assign_attrs(
+    bounds = of_contacts(arguments, result, declared).assign_attrs(
         max_gap=dataset["max_gap"].item(), converged=int(certified.all())
     )
     with report_after(lines, arguments.json, listed(bounds)):
@@ -157,28 +134,20 @@ def _without_limit(bounded: Any) -> dict[str, int]:
 
 def limit_loads(arguments: argparse.Namespace) -> None:
     """Compute or load limit loads, and report them."""
-    _, parameters, dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
-    forces, load = unit(arguments, dataset), dataset["limit_load"].values
-    finite = load[np.isfinite(load)]
-    reported = {"mean_normal_force": dataset["force_scale"].item()}
-    if len(finite):
-        reported |= {
-            "mean_limit_load": float(finite.mean()),
-            "least_limit_load": float(finite.min()),
-            "largest_limit_load": float(finite.max()),
-        }
-    without, left = int(np.isinf(load).sum()), dataset["backbone"].values[np.isnan(load)]
-    lines = {
+    result = _exact(arguments, kinds.LIMIT_LOADS)
+    dataset, load = result.dataset, result.dataset["limit_load"].values
+    finite, without = load[np.isfinite(load)], int(np.isinf(load).sum())
+    left = dataset["backbone"].values[np.isnan(load)]
+    reported = {"mean": finite.mean, "least": finite.min, "largest": finite.max}
+    given = {
         "contacts": len(load),
-        **forces.reported(reported),
+        **{f"{name}_limit_load": float(of()) for name, of in reported.items() if len(finite)},
         **({"contacts_without_a_limit": without} if without else {}),
         **({"contacts_not_certified": len(left)} if len(left) else {}),
-        **solved(dataset),
-        "largest_duality_gap": dataset["max_gap"].item(),
-        **ends,
     }
+    lines = result.report(report_lines.LIMIT_LOADS, arguments, **given)
     declared = from_store(LimitLoads, dataset, "limit_load")
-    loads = of_contacts(arguments, parameters, dataset, declared)
+    loads = of_contacts(arguments, result, declared)
     with report_after(lines, arguments.json, listed(loads)):
         if arguments.out is not None:
             write_table(arguments.out, loads)
@@ -225,24 +194,22 @@ def rest(arguments: argparse.Namespace) -> None:
 def stress(arguments: argparse.Namespace) -> None:
     """Compute or load the outline of stresses, and report it."""
     chosen = {"angles": arguments.angles, **known_forces(arguments)}
-    _, parameters, dataset, ends = stored_result(arguments, kinds.STRESS, arguments.out, **chosen)
+    result = stored_result(arguments, kinds.STRESS, arguments.out, **chosen)
+    dataset = result.dataset
     original, carried = dataset["stress_own"].values, dataset["stress_inner"].values
-    packing, _ = get_packing(arguments.store, parameters["packing"])
+    packing, _ = get_packing(arguments.store, result.parameters["packing"])
     middle = stress_inside(carried, packing.pressure)
-    lines = {
-        **extension(dataset),
-        "largest_shear_over_pressure": dataset["friction"].item(),
-        "certainly_not_above": dataset["friction_bound"].item(),
-        "own_shear_over_pressure": float(np.hypot(*original)),
-        "own_normal_difference": float(original[0]),
-        "own_shear_stress": float(original[1]),
-        "normal_difference_from_to": np.quantile(carried[:, 0], [0, 1]).tolist(),
-        "shear_stress_from_to": np.quantile(carried[:, 1], [0, 1]).tolist(),
-        "admissible_stress": ",".join(f"{value:.8g}" for value in middle),
-        **solved(dataset),
-        "largest_duality_gap": float(dataset["stress_gap"].max()),
-        **ends,
-    }
+    lines = result.report(
+        report_lines.STRESS,
+        arguments,
+        own_shear_over_pressure=float(np.hypot(*original)),
+        own_normal_difference=float(original[0]),
+        own_shear_stress=float(original[1]),
+        normal_difference_from_to=np.quantile(carried[:, 0], [0, 1]).tolist(),
+        shear_stress_from_to=np.quantile(carried[:, 1], [0, 1]).tolist(),
+        admissible_stress=",".join(f"{value:.8g}" for value in middle),
+        largest_duality_gap=float(dataset["stress_gap"].max()),
+    )
     with report_after(lines, arguments.json):
         if arguments.out is not None:
             write_table(arguments.out, labelled_dataset(from_store(StressOutline, dataset)))

@@ -1,25 +1,21 @@
 """States of S: walks, uniform samples, their measures, and the volume."""
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 
 import numpy as np
 
-from granforce.cli.report_lines import MIXING
+from granforce.cli import report_lines
 from granforce.cli.results import (
     check_outputs,
     conditions,
     different,
-    extension,
     extents,
     packing_options,
     sample_notes,
     stored_result,
-    unit,
     walked,
-    without_work,
 )
 from granforce.cli.tables import of_contacts, write_csv, write_states, write_table
 from granforce.explore.random_walk import UNBOUNDED_WALK
@@ -27,7 +23,6 @@ from granforce.explore.volume import inaccurate
 from granforce.labelled import Declared
 from granforce.quantities import quantity
 from granforce.records import InputError, whole, worker_count
-from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
 from granforce.study.keys import Parameters
@@ -42,31 +37,16 @@ DIGITS = 9
 
 def walk(arguments: argparse.Namespace) -> None:
     """Make or load a random walk, and report its course."""
-    entry, parameters, dataset, ends = walked(arguments, arguments.out)
-    if np.isnan(dataset["eta1"].item()):
+    result = walked(arguments, arguments.out)
+    if np.isnan(result.dataset["eta1"].item()):
         print_notes([f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined"])
-    write_states(arguments, parameters, dataset)
-    lines = {
-        "entry": entry,
-        **{name: dataset[name].item() for name in (*study.ROW, *study.ROW_COUNTS)},
-        **extension(dataset),
-        "mean_iterations": float(dataset["sweeps"].mean()),
-        "largest_residual": float(dataset["residual"].max()),
-        "largest_violation": float(dataset["violation"].max()),
-        **ends,
-    }
-    print_report(lines, arguments.json)
-
-
-UNIFORM_LINES = (
-    *("packing_fraction", "coordination", "eta1", "eta2", "eta3", *MIXING),
-    *("held", "skipped", "rattlers", "unloaded_contacts"),
-)
+    write_states(arguments, result)
+    print_report(result.report(report_lines.WALK, arguments), arguments.json)
 
 
 def uniform(arguments: argparse.Namespace) -> int:
     """Draw or load a uniform sample and report it. Returns 1 if it missed the requested size."""
-    entry, parameters, dataset, ends = stored_result(
+    result = stored_result(
         *(arguments, kinds.UNIFORM, arguments.out),
         states=arguments.states,
         seed=arguments.sample_seed,
@@ -74,24 +54,16 @@ def uniform(arguments: argparse.Namespace) -> int:
         effective=arguments.effective,
         **conditions(arguments),
     )
-    write_states(arguments, parameters, dataset)
-    reached = bool(dataset["reached"].item())
-    lines = {
-        "entry": entry,
-        "states": dataset.sizes["state"],
-        **extension(dataset),
-        **{name: dataset[name].item() for name in UNIFORM_LINES},
+    write_states(arguments, result)
+    reached = bool(result.dataset["reached"].item())
+    lines = result.report(
+        report_lines.UNIFORM,
+        arguments,
+        states=result.dataset.sizes["state"],
         **({} if arguments.effective is None else {"reached": reached}),
-        "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
-        "original_distance": dataset["original_distance"].item(),
-        "largest_residual": float(dataset["residual"].max()),
-        "largest_violation": float(dataset["violation"].max()),
-        "setup_seconds": dataset["setup_seconds"].item(),
-        "sampling_seconds": dataset["sampling_seconds"].item(),
-        **ends,
-    }
-    print_report(without_work(lines, arguments), arguments.json)
-    notes = sample_notes(dataset)
+    )
+    print_report(lines, arguments.json)
+    notes = sample_notes(result.dataset)
     if arguments.effective is not None and not reached and not notes:
         notes = ["the effective sample size is less than --effective; use more --states"]
     print_notes(notes)
@@ -105,57 +77,39 @@ def volume(arguments: argparse.Namespace) -> int:
         "seed": arguments.volume_seed,
         **conditions(arguments),
     }
-    entry, _, dataset, ends = stored_result(arguments, kinds.VOLUME, **chosen)
-    down, up = dataset["log_volume_ladders"].values
-    reached = bool(dataset["reached"].item())
-    lines = {
-        "entry": entry,
-        **extension(dataset),
-        "ln_volume": dataset["log_volume"].item(),
-        "standard_error": dataset["log_volume_error"].item(),
-        "ln_volume_on_the_way_down": float(down),
-        "ln_volume_on_the_way_up": float(up),
-        "ln_volume_per_grain": dataset["log_volume_per_grain"].item(),
-        "extent_over_mean_normal_force": dataset["extent"].item(),
-        "reached": reached,
-        **{name: n for name, n in json.loads(dataset.attrs["counts"]).items() if name != "rungs"},
-        **ends,
-    }
-    print_report(without_work(lines, arguments), arguments.json)
+    result = stored_result(arguments, kinds.VOLUME, **chosen)
+    down, up = result.dataset["log_volume_ladders"].values.tolist()
+    reached = bool(result.dataset["reached"].item())
+    lines = result.report(
+        report_lines.VOLUME,
+        arguments,
+        ln_volume_on_the_way_down=down,
+        ln_volume_on_the_way_up=up,
+        reached=reached,
+    )
+    print_report(lines, arguments.json)
     if not reached:
-        print_notes([inaccurate(dataset["log_volume_error"].item(), down, up)])
+        print_notes([inaccurate(result.dataset["log_volume_error"].item(), down, up)])
     return 0 if reached else 1
 
 
 def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or loaded."""
-    _, parameters, dataset, _ = walked(arguments, arguments.out)
-    if np.isnan(dataset["eta1"].item()):
+    result = walked(arguments, arguments.out)
+    if np.isnan(result.dataset["eta1"].item()):
         raise InputError(
             f"{UNBOUNDED_WALK}: nothing to measure; granforce intervals has its bounds"
         )
-    forces = unit(arguments, dataset)
-    names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
-    lines = {
-        "mu": parameters["mu"],
-        "states": parameters["states"],
-        **extension(dataset),
-        **{name: dataset[name].item() for name in names},
-        **forces.reported(extents(dataset)),
-        "correlation": dataset["correlation"].item(),
-        "correlation_low": dataset["correlation_low"].item(),
-        "correlation_high": dataset["correlation_high"].item(),
-        "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
-        "original_distance": dataset["original_distance"].item(),
-    }
+    given = {name: result.parameters[name] for name in ("mu", "states")} | extents(result.dataset)
+    lines = result.report(report_lines.MEASURE, arguments, **given)
     with report_after(lines, arguments.json):
         if arguments.out is not None:
             sources = {"f_n": "original", "f_n_seen_low": "low", "f_n_seen_high": "high"}
             declared: Declared = {
-                name: (quantity(source, "contact"), dataset[source].values[:, 0])
+                name: (quantity(source, "contact"), result.dataset[source].values[:, 0])
                 for name, source in sources.items()
             }
-            write_table(arguments.out, of_contacts(arguments, parameters, dataset, declared))
+            write_table(arguments.out, of_contacts(arguments, result, declared))
 
 
 def scan(arguments: argparse.Namespace) -> int:
