@@ -1,6 +1,5 @@
 """Tables that commands write (.csv, .npz, .zarr), as input of other commands."""
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,9 @@ import xarray as xr
 from granforce.forces.knowledge import Known
 from granforce.labelled import COMPONENTS, UNITS, column_name
 from granforce.packing import importers
+from granforce.packing.importers.known import known_in
 from granforce.packing.importers.npz import read_arrays
-from granforce.packing.importers.text import PACKING, read_csv
+from granforce.packing.importers.text import PACKING, of_columns, read_csv
 from granforce.records import InputError, Packing, are_whole, float_array
 from granforce.system.files import expanded
 from granforce.types import Floats, Integers
@@ -29,10 +29,8 @@ def read_known(path: str) -> Known:
     columns = {name: values for name, values in arrays.items() if values.shape == (_rows(arrays),)}
     if not columns:
         raise InputError(f"{path}: not a table with a row for each contact")
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    table = io.StringIO("\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]))
-    table.name = path
-    return importers.read_known(table)
+    values = [column.tolist() for column in columns.values()]
+    return known_in(of_columns(path, columns, values))
 
 
 def _rows(arrays: _Arrays) -> int:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from granforce.fields import record
-from granforce.packing.importers.text import LARGEST, Source, read_csv
+from granforce.packing.importers.text import MISSING, Source, read_csv
 from granforce.records import InputError
-from granforce.system.wording import number
 from granforce.types import Floats, Integers
 
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
@@ -63,24 +61,10 @@ def read_measurement(source: Source) -> Measurement:
     table = read_csv(source).in_packing_unit(COLUMNS)
     contacts = table.whole("contact")
     table.index("contact")  # each occurs once
-    values = np.empty((len(contacts), 4))
-    for k, name in enumerate(COLUMNS):
-        for row, text in enumerate(table.fields(name)):
-            values[row, k] = _value(text, name, table.place(row))
+    values = np.column_stack([table.numbers(name, MISSING) for name in COLUMNS])
     forces, sigma = values[:, :2], values[:, 2:]
     if not np.isfinite(forces + sigma).any():
         raise InputError(f"{table.name}: no component has both a force and a standard error")
     for row in np.flatnonzero((sigma <= 0).any(axis=1))[:1]:
         raise InputError(f"{table.place(row)}: a standard error is not above 0")
     return Measurement(contacts, forces, sigma)
-
-
-def _value(text: str, name: str, place: str) -> float:
-    """One number, or NaN for an empty field."""
-    try:
-        value = number(text or "nan")
-    except ValueError:
-        value = math.inf
-    if abs(value) > LARGEST:
-        raise InputError(f"{place}: {name} is {text[:40]!r}, not a finite number")
-    return value

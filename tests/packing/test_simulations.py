@@ -22,9 +22,9 @@ from granforce.cli.entry_point import main
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.packing.importers import (
-    dem,
     lammps,
     load_packing,
+    mercury,
     read_lammps,
     read_mercury,
     read_table,
@@ -127,7 +127,7 @@ def test_the_last_whole_frame_is_read_where_a_file_is_cut_off(name, file, cut):
 
 
 def snapshots_of(name, files, options):
-    opened = {"lammps": lammps.open_lammps, "mercury": dem.open_mercury}[name]
+    opened = {"lammps": lammps.open_lammps, "mercury": mercury.open_mercury}[name]
     found = opened(*given(*files), MU, **options)
     assert isinstance(found, snapshots.Snapshots)
     return found
@@ -208,13 +208,14 @@ def test_a_single_frame_that_is_cut_off_is_refused():
 
 
 @pytest.mark.parametrize("name, file", [(name, file) for name in READ for file in (0, 1)])
-def test_a_single_frame_needs_no_end_of_its_last_line(name, file):
-    """Editors strip it."""
+@pytest.mark.parametrize("before", [[], ["particles"], ["particles", "contacts"]])
+def test_a_single_frame_needs_no_end_of_its_last_line(name, file, before):
+    """Editors strip it; and empty frames before it do not matter."""
     read, _, options, _ = READ[name]
-    files = [particles(100), contacts(100, 1.0)] if name == "lammps" else [*mercury_files([1.0])]
+    files = list(some_empty(name, [*before, ""]))
     files[file] = files[file].rstrip()
     found = read(*given(*files), MU, **options)
-    assert found.pressure == pytest.approx(1.0) and found.info["residual"] < 1e-12
+    assert found.pressure == pytest.approx(len(before) + 1) and found.info["residual"] < 1e-12
 
 
 def test_a_single_contact_that_is_cut_off_is_refused():

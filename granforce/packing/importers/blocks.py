@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,7 +10,7 @@ import numpy as np
 
 from granforce.packing.assemblies import area, blocks, nearly_touching
 from granforce.packing.importers.notes import packing_noted
-from granforce.packing.importers.text import Source, Table, read_csv, read_text
+from granforce.packing.importers.text import Source, Table, csv_table, read_text
 from granforce.records import InputError, Packing, brief, positive
 from granforce.system.wording import counted
 from granforce.types import Floats, Integers
@@ -66,9 +65,7 @@ def read_blocks(
     if text.lstrip()[:1] in "{[":
         bodies = _from_json(file, text)
     else:
-        table = io.StringIO(text)
-        table.name = file
-        bodies = _from_table(read_csv(table))
+        bodies = _from_table(csv_table(file, text))
     if density is not None and None not in bodies.density:
         raise InputError(f"{file} gives the density of every body: leave out --density (density=)")
     usual = 1.0 if density is None else positive(density, "density")

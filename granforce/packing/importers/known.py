@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from granforce.forces.knowledge import Known
-from granforce.packing.importers.text import Source, Table, make_table, read_csv
+from granforce.packing.importers.text import MISSING, Source, Table, read_csv
 from granforce.records import InputError
 from granforce.tolerances import REVERSED
 from granforce.types import Floats
@@ -42,39 +42,49 @@ def read_known(source: Source) -> Known:
         Naming the offending line, also for an exact value outside its bounds, and for a column in
         another unit.
     """
-    table = _renamed(read_csv(source).in_packing_unit([*_COLUMNS, *_EARLIER]))
+    return known_in(read_csv(source))
+
+
+def known_in(table: Table) -> Known:
+    """The Known in a table with the columns of `read_known`."""
+    table = table.in_packing_unit([*_COLUMNS, *_EARLIER])
+    table = table.named([_EARLIER.get(name, name) for name in table.header])
     contacts = table.whole("contact")
-    low, high = np.full((2, len(contacts), 2), np.inf)
-    low *= -1
     if not set(_COLUMNS) & set(table.header):
         raise InputError(f"{table.name}: none of the columns {', '.join(_COLUMNS)}")
+    low, high = (
+        np.column_stack([_bounds(table, f"{name}_{side}", unknown) for name in _COMPONENTS])
+        for side, unknown in (("low", -np.inf), ("high", np.inf))
+    )
     for k, name in enumerate(_COMPONENTS):
-        for column, side, unknown in ((f"{name}_low", low, "-inf"), (f"{name}_high", high, "inf")):
-            given, values = _numbers(table, column, unknown)
-            side[given, k] = values
-        for row, value in zip(*_numbers(table, name), strict=True):
-            bounds = low[row, k], high[row, k]
-            largest = max(abs(number) for number in (value, *bounds) if np.isfinite(number))
-            if not bounds[0] - REVERSED * largest <= value <= bounds[1] + REVERSED * largest:
-                raise InputError(
-                    f"{table.place(row)}: {name} is {value:.9g}, outside its bounds "
-                    f"{bounds[0]:.9g} … {bounds[1]:.9g}; correct or remove one of them"
-                )
-            low[row, k] = high[row, k] = value
+        exact = _numbers(table, name)
+        _check_inside(table, name, exact, low[:, k], high[:, k])
+        given = np.isfinite(exact)
+        low[given, k] = high[given, k] = exact[given]
     ends = [table.whole(name) for name in "ij"] if {"i", "j"} <= set(table.header) else []
     return Known(contacts, low, high, np.column_stack(ends) if ends else None)
 
 
-def _renamed(table: Table) -> Table:
-    """The table with earlier names of bounds replaced; InputError if both names are present."""
-    header = [_EARLIER.get(name, name) for name in table.header]
-    return make_table(table.name, header, table.rows, table.lines)
+def _bounds(table: Table, column: str, unknown: float) -> Floats:
+    """Bounds (rows,), `unknown` where there is none."""
+    values = _numbers(table, column, str(unknown))
+    return np.where(np.isnan(values), unknown, values)
 
 
-def _numbers(table: Table, column: str, unknown: str = "") -> tuple[list[int], Floats]:
-    """Rows with an entry in a column, and their numbers; without the column none."""
+def _numbers(table: Table, column: str, *missing: str) -> Floats:
+    """A column (rows,), NaN for missing values and without the column."""
     if column not in table.header:
-        return [], np.empty(0)
-    fields = enumerate(table.fields(column))
-    given = [row for row, text in fields if text.lower() not in ("", "nan", unknown)]
-    return given, table.some(given).numbers(column)
+        return np.full(len(table.rows), np.nan)
+    return table.numbers(column, (*MISSING, *missing))
+
+
+def _check_inside(table: Table, name: str, exact: Floats, low: Floats, high: Floats) -> None:
+    """InputError naming a row whose exact value is outside its bounds."""
+    for row in np.flatnonzero(np.isfinite(exact)).tolist():
+        value, bounds = exact[row], (low[row], high[row])
+        largest = max(abs(number) for number in (value, *bounds) if np.isfinite(number))
+        if not bounds[0] - REVERSED * largest <= value <= bounds[1] + REVERSED * largest:
+            raise InputError(
+                f"{table.place(row)}: {name} is {value:.9g}, outside its bounds "
+                f"{bounds[0]:.9g} … {bounds[1]:.9g}; correct or remove one of them"
+            )

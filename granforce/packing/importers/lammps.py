@@ -187,7 +187,11 @@ def open_lammps(
         raise InputError(
             f"{first.name} and {second.name} have no timestep in common; dump both at the same step"
         )
-    cut = [dump.name for dump in (first, second) if len(steps) > 1 and dump.is_cut(steps[-1])]
+    # In the contacts' dump, too, a snapshot without atoms has no rows.
+    empty = {step: "contacts" for step in steps if second.announced(step) == "0"}
+    empty |= {step: "atoms" for step in steps if first.announced(step) == "0"}
+    others = any(step not in empty for step in steps[:-1])
+    cut = [dump.name for dump in (first, second) if others and dump.is_cut(steps[-1])]
 
     def read(step: int) -> Snapshot:
         items = first.items(step)
@@ -211,9 +215,7 @@ def open_lammps(
         return Snapshot(found, np.sort(atoms.numbers("id")))
 
     whole = steps[:-1] if cut else steps
-    # In the contacts' dump, too, a snapshot without atoms has no rows.
-    empty = {step: "contacts" for step in whole if second.announced(step) == "0"}
-    empty |= {step: "atoms" for step in whole if first.announced(step) == "0"}
+    empty = {step: empty[step] for step in whole if step in empty}
     filled = [step for step in whole if step not in empty]
     lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""
     # Reading one of them says which table is empty.

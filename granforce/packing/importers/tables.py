@@ -17,7 +17,6 @@ from granforce.packing.importers.text import (
     Source,
     Table,
     check_grains,
-    make_table,
     of_frame,
     read_csv,
     renamed,
@@ -184,8 +183,7 @@ def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
 
 def _with_full_names(table: Table) -> Table:
     """The table with forces called f_n and f_t, without their unit."""
-    header = [_SHORT.get(name, name) for name in table.header]
-    named = make_table(table.name, header, table.rows, table.lines, table.word)
+    named = table.named([_SHORT.get(name, name) for name in table.header])
     return named.in_packing_unit(_SHORT.values())
 
 

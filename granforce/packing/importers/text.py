@@ -38,6 +38,8 @@ _ZSTD, _ZIP = b"\x28\xb5\x2f\xfd", b"PK\x03\x04"
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
 
+# Texts of missing values, in lower case.
+MISSING = ("", "nan", "-nan")
 # Suffix allowed in the names of columns of forces in the packing's unit.
 PACKING = " [packing]"
 
@@ -47,13 +49,33 @@ class EmptyError(InputError):
 
 
 class Table(NamedTuple):
-    """Rows of text fields under named columns."""
+    """Rows of text fields and their places in a file, under columns once they are `named`."""
 
     name: str  # file name, for messages
     header: tuple[str, ...]  # column names
-    rows: list[list[str]]  # as many fields as columns
+    rows: list[list[str]]  # of one table with as many fields as columns
     lines: list[int]  # line number of each row in the file
     word: str = "line"  # what these numbers count
+    comments: Sequence[str] = ()  # lines that began with a comment sign, without it
+    complete: bool = True  # False if the last number may be cut off: its line has no end
+
+    def named(self, header: Sequence[str]) -> Table:
+        """The table with other column names, checked to be as many as the fields of every row.
+
+        Raises InputError naming a row of another length, or a repeated column name.
+        """
+        for column, times in Counter(header).items():
+            if column and times > 1:
+                raise InputError(
+                    f"{self.name}: column {some_of([column])} appears twice; rename or remove one"
+                )
+        for row, fields in enumerate(self.rows):
+            if len(fields) != len(header):
+                raise InputError(
+                    f"{self.place(row)}: {len(fields)} fields for {len(header)} columns; "
+                    "fill or remove the row"
+                )
+        return self._replace(header=tuple(header))
 
     def place(self, row: int) -> str:
         """'file, line n' of a row."""
@@ -78,8 +100,7 @@ class Table(NamedTuple):
                     f"{self.name}: column {_quoted(name)} is not in the packing's unit; write the "
                     "table with --unit packing, or multiply it and leave out the brackets"
                 )
-        header = [name.removesuffix(PACKING) for name in self.header]
-        return make_table(self.name, header, self.rows, self.lines, self.word)
+        return self.named([name.removesuffix(PACKING) for name in self.header])
 
     def require(self, *columns: str) -> None:
         """InputError unless all these columns are present."""
@@ -96,15 +117,15 @@ class Table(NamedTuple):
         position = self.header.index(column)
         return [row[position] for row in self.rows]
 
-    def numbers(self, column: str) -> Floats:
-        """One column as float64 (rows,); InputError names the line of an invalid number."""
+    def numbers(self, column: str, missing: Collection[str] = ()) -> Floats:
+        """One column as float64 (rows,); InputError names the line of an invalid number.
+
+        missing: texts in lower case, such as "nan", whose number is NaN.
+        """
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
-            try:
-                values[row] = number(text)
-            except ValueError:
-                values[row] = math.nan
-            if not abs(values[row]) <= LARGEST:
+            values[row] = finite_number(text)
+            if np.isnan(values[row]) and text.lower() not in missing:
                 raise InputError(
                     f"{self.place(row)}: {column} is {_quoted(text)}, not a finite number; "
                     "repair or remove the row"
@@ -154,23 +175,8 @@ class Table(NamedTuple):
 def make_table(
     name: str, header: Sequence[str], rows: list[list[str]], lines: list[int], word: str = "line"
 ) -> Table:
-    """A Table, checked to have as many fields in every row as column names.
-
-    Raises InputError naming a row of another length, or a repeated column name.
-    """
-    for column, times in Counter(header).items():
-        if column and times > 1:
-            raise InputError(
-                f"{name}: column {some_of([column])} appears twice; rename or remove one"
-            )
-    table = Table(name, tuple(header), rows, lines, word)
-    for row, fields in enumerate(rows):
-        if len(fields) != len(header):
-            raise InputError(
-                f"{table.place(row)}: {len(fields)} fields for {len(header)} columns; "
-                "fill or remove the row"
-            )
-    return table
+    """A Table with named columns; InputError as by `Table.named`."""
+    return Table(name, (), rows, lines, word).named(header)
 
 
 def some_of(columns: Sequence[str]) -> str:
@@ -256,10 +262,14 @@ def read_csv(source: Source) -> Table:
     empty fields at the end of all lines are skipped. Raises InputError, also for empty rows between
     others, where data may be missing.
     """
-    name, text = read_text(source)
+    return csv_table(*read_text(source))
+
+
+def csv_table(name: str, text: str) -> Table:
+    """A Table from the text of a file that `read_csv` takes."""
     lines = _from_the_header(text.splitlines())
     head = next(line for line in lines if line.strip())
-    delimiter = next((mark for mark in ",;\t" if mark in head), " " if " " in head.strip() else ",")
+    delimiter = separator_of(head) or (" " if " " in head.strip() else ",")
     lines = [line.strip() for line in lines] if delimiter == " " else lines
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
     rows, numbers = [], []
@@ -285,22 +295,57 @@ def read_csv(source: Source) -> Table:
     return make_table(name, [column.lower() for column in header], rows, numbers[1:])
 
 
-def of_frame(frame: Any, name: str) -> Table:
-    """The Table of a pandas DataFrame, whose rows count from 0; named columns of its index count.
+def read_rows(source: Source) -> Table:
+    """A Table without names, at least one row, of fields separated by blanks or commas.
 
-    Missing values are empty fields. Raises InputError for a table without rows.
+    Lines that begin with # are its comments, in lower case. Raises InputError.
+    """
+    name, text = read_text(source)
+    lines = numbered_lines(text)
+    is_comment = [line.startswith("#") for _, line in lines]
+    rows = [line for line, comment in zip(lines, is_comment, strict=True) if not comment]
+    if not rows:
+        raise InputError(f"{name}: no line with numbers")
+    return Table(
+        name,
+        (),
+        [line.replace(",", " ").split() for _, line in rows],
+        [number for number, _ in rows],
+        comments=[line.lstrip("# \t").lower() for _, line in lines if line.startswith("#")],
+        complete=text.endswith("\n") or is_comment[-1],
+    )
+
+
+def numbered_lines(text: str) -> list[tuple[int, str]]:
+    """The lines that are not blank, without blanks around them, and their numbers from 1."""
+    lines = enumerate(map(str.strip, text.splitlines()), start=1)
+    return [(number, line) for number, line in lines if line]
+
+
+def separator_of(line: str) -> str | None:
+    """What separates the fields of a line: a comma, semicolon or tab, or None for blanks."""
+    return next((mark for mark in ",;\t" if mark in line), None)
+
+
+def of_frame(frame: Any, name: str) -> Table:
+    """The Table of a pandas DataFrame; named columns of its index count.
+
+    Raises InputError for a table without rows.
     """
     if any(level is not None for level in frame.index.names):
         frame = frame.reset_index()
     if not len(frame):
         raise InputError(f"the DataFrame of {name} is empty")
-    columns = [
-        ["" if value != value else str(value) for value in frame.iloc[:, k].tolist()]
-        for k in range(frame.shape[1])
-    ]
-    rows = [list(row) for row in zip(*columns, strict=True)]
-    header = [str(column).strip().lower() for column in frame.columns]
-    return make_table(f"the DataFrame of {name}", header, rows, list(range(len(rows))), "row")
+    columns = [frame.iloc[:, k].tolist() for k in range(frame.shape[1])]
+    return of_columns(f"the DataFrame of {name}", frame.columns, columns)
+
+
+def of_columns(name: str, header: Iterable[Any], columns: Sequence[Sequence[Any]]) -> Table:
+    """The Table of columns of values, whose rows count from 0; missing values are empty fields."""
+    texts = [["" if value != value else str(value) for value in column] for column in columns]
+    rows = [list(row) for row in zip(*texts, strict=True)]
+    names = [str(column).strip().lower() for column in header]
+    return make_table(name, names, rows, list(range(len(rows))), "row")
 
 
 def _from_the_header(lines: list[str]) -> list[str]:
@@ -325,6 +370,15 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def finite_number(text: str) -> float:
+    """The number in a text, NaN unless it is finite and at most LARGEST."""
+    try:
+        value = number(text)
+    except ValueError:
+        return math.nan
+    return value if abs(value) <= LARGEST else math.nan
 
 
 def _trimmed(rows: list[list[str]]) -> list[list[str]]:
