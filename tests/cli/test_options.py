@@ -141,7 +141,7 @@ def place(tmp_path_factory):
     grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
     frames.write(folder, grains, rows)
     open_store(folder / "done" / "cells.zarr").make()
-    (folder / "bench.md").write_text("<!-- bench: walks -->\n<!-- end -->\n")
+    (folder / "bench.md").write_text("<!-- bench: frames -->\n<!-- end -->\n")
     rows = [{"solver": "nearest", "mu": 0.1, "n": n, "seconds": 1.0} for n in (1, 2, 3)]
     results = {"environment": {"libraries": {}}, "scaling": rows}
     (folder / "bench.json").write_text(json.dumps(results))
