@@ -11,7 +11,7 @@ import importlib
 
 from granforce.system.compiled import find_a_place as _find_a_place
 
-__version__ = "0.3.0.dev0"
+__version__ = "0.3.0"
 
 _find_a_place()
 

@@ -114,12 +114,13 @@ def folder(away):
 
 
 def test_all_documents_name_one_version():
-    """The newest heading of the changelog is the version, with a date unless it is unreleased."""
+    """The newest heading of the changelog is the version, and its date that of CITATION.cff."""
     (heading, *_) = re.findall(r"^## (.+)$", text("CHANGELOG.md"), re.M)
     version, _, date = heading.partition(" — ")
-    assert version == granforce.__version__.removesuffix(".dev0")
-    assert (date == "unreleased") == granforce.__version__.endswith(".dev0")
-    assert f"\nversion: {granforce.__version__}\n" in text("CITATION.cff")
+    citation = yaml.safe_load(text("CITATION.cff"))
+    assert version == granforce.__version__ == citation["version"]
+    assert date == f"{citation['date-released']:%-d %B %Y}"
+    assert f"version = {{{version}}}" in text("granforce/docs/pages/howto/cite.md")
 
 
 def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_wheel():
@@ -137,7 +138,7 @@ def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_wheel():
 
 def test_the_readme_is_short_and_gives_the_commands_that_install():
     lines = text("README.md").splitlines()
-    assert len(lines) <= 110
+    assert len(lines) <= 90
     for ends in ("panel serve app --show", "-m pytest"):
         assert any(
             line.startswith("python3 -m venv .venv") and line.endswith(ends) for line in lines
@@ -187,18 +188,22 @@ def test_every_snippet_runs(document, folder):
             assert language in ("", "sh", "text")
 
 
-TUTORIAL = re.findall(
-    r"^```python\n(.*?)^```\n\n```text\n(.*?)^```$",
-    text("granforce/docs/pages/tutorial.md"),
-    re.M | re.S,
-)
+def outputs(document):
+    """(code, output) of every snippet followed by what it prints."""
+    pattern = r"^```python\n(.*?)^```\n\n```text\n(.*?)^```$"
+    return re.findall(pattern, text(document), re.M | re.S)
 
 
-@pytest.mark.parametrize(
-    ("code", "shown"),
-    [pytest.param(*both, marks=pytest.mark.slow if "400" in both[0] else ()) for both in TUTORIAL],
-)
-def test_the_tutorial_shows_what_its_snippets_print(code, shown, away):
+TUTORIAL = "granforce/docs/pages/tutorial.md"
+OUTPUTS = [
+    pytest.param(*both, marks=pytest.mark.slow if "400" in both[0] else ())
+    for document in ("README.md", "granforce/docs/pages/index.md", TUTORIAL)
+    for both in outputs(document)
+]
+
+
+@pytest.mark.parametrize(("code", "shown"), OUTPUTS)
+def test_documents_show_what_their_snippets_print(code, shown, away):
     """Words are equal, and numbers within 2 %: packings differ between processors."""
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     printed, expected = run.stdout.split(), shown.split()
@@ -211,10 +216,8 @@ def test_the_tutorial_shows_what_its_snippets_print(code, shown, away):
 
 
 def test_each_step_of_the_tutorial_has_its_output():
-    snippets = [
-        code for name, code in blocks("granforce/docs/pages/tutorial.md") if name == "python"
-    ]
-    assert [code for code, _ in TUTORIAL] == snippets
+    snippets = [code for name, code in blocks(TUTORIAL) if name == "python"]
+    assert [code for code, _ in outputs(TUTORIAL)] == snippets
 
 
 @pytest.mark.parametrize("document", [*DOCUMENTS, *GUIDES])
