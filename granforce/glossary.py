@@ -28,10 +28,11 @@ TERMS = {
         "torque on any of them.",
     ),
     "s": Term(
-        "force space",
-        "All force networks that balance this packing at this pressure, with fₙ ≥ 0 and |fₜ| ≤ "
-        "μ fₙ at every contact. Balance gives fewer equations than there are unknown forces, so "
-        "many networks remain; together they form one convex body, without holes or dents.",
+        "set of force networks",
+        "All networks of this packing at this pressure, with fₙ ≥ 0 and |fₜ| ≤ μ fₙ at every "
+        "contact: a convex body, without holes or dents, in force space, which has an axis for "
+        "every force. Balance gives fewer equations than there are forces, so many networks "
+        "remain.",
         "S",
     ),
     "indeterminacy": Term(
@@ -40,9 +41,9 @@ TERMS = {
         "disks: any network in S is possible.",
     ),
     "original": Term(
-        "network as packed",
-        "The forces with which the packing came to rest after compression: one of all possible "
-        "networks.",
+        "original network",
+        "The forces with which the packing came to rest after compression, one of the networks in "
+        "S. For an imported packing, the imported forces. In short, the forces as packed.",
     ),
     "paper": Term(
         "the paper",
@@ -69,17 +70,17 @@ TERMS = {
         "z",
     ),
     "h": Term(
-        "dimensions of force space",
+        "dimension of S",
         "How many numbers can be chosen freely once all forces balance. With friction: two "
         "forces per contact, minus the independent equations (three per disk and one for the "
-        "pressure; in a periodic box two of these follow from the others). If h = 0, the forces "
-        "are determined.",
+        "pressure, two of which follow from the others in a periodic box). If h = 0, the forces"
+        " are determined.",
         "h",
     ),
     "fn": Term(
         "normal force",
-        "How hard the two disks of a contact press on each other; never negative, because disks "
-        "do not stick together.",
+        "How hard the two disks of a contact press on each other. It is never negative, because"
+        " disks do not stick together.",
         "fₙ",
     ),
     "ft": Term(
@@ -89,16 +90,16 @@ TERMS = {
     ),
     "mean_force": Term(
         "mean normal force",
-        "The mean of fₙ over the contacts that can carry force; the unit of force on the page and "
-        "in the figures. If the pressure is prescribed, the mean is weighted by the distance "
-        "between centres, which makes it the same in all networks. Otherwise it is the plain mean "
-        "of the original network.",
+        "The mean of fₙ over the contacts that can carry force, the unit of force on the page "
+        "and in the figures. If the pressure is prescribed, the mean is weighted by the "
+        "distance between centres, which makes it the same in all networks. Otherwise it is the"
+        " plain mean of the original network.",
         "⟨fₙ⟩",
     ),
     "extent": Term(
         "extent of a force",
         "Largest minus smallest fₙ of one contact, over all of S (exact) or over the networks "
-        "seen; the latter grows with their number.",
+        "seen. The latter grows with their number.",
         "ΔFₙ",
     ),
     "eta1": Term(
@@ -115,10 +116,10 @@ TERMS = {
     ),
     "eta3": Term(
         "indeterminacy by intervals",
-        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints, "
-        "which are signed for fₜ; times 0.15, it is comparable to η1 and η2. The value seen grows "
-        "with the number of networks and has no standard error. It can exceed the exact one, "
-        "because their midpoints differ.",
+        "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints,"
+        " which are signed for fₜ. Times 0.15, it is comparable to η1 and η2. The value seen "
+        "grows with the number of networks. It can exceed the exact one: midpoints differ, and "
+        "networks of the paper's walk are slightly outside S.",
         "η3",
     ),
     "width": Term(
@@ -160,7 +161,7 @@ TERMS = {
     "r_hat": Term(
         "mixing",
         "Whether parts of the sample agree, such as both halves of a walk: 1 if they do. Mixed "
-        "means R̂ ≤ 1.1 and enough independent states; otherwise the sample is unreliable.",
+        "means R̂ ≤ 1.1 and enough independent states. Otherwise the sample is unreliable.",
         "R̂",
     ),
     "ess": Term(
@@ -179,7 +180,7 @@ TERMS = {
     "critical_force": Term(
         "critical force",
         "The pair of opposite forces on one contact, increased from zero, at which the disks "
-        "start to move. It never exceeds the limit load; it is smaller where balanced networks "
+        "start to move. It never exceeds the limit load. It is smaller where balanced networks "
         "still exist but friction does not build one up on the way.",
         "F_crit",
     ),
@@ -201,8 +202,8 @@ TERMS = {
     ),
     "certified": Term(
         "certified bounds",
-        "Each end of an exact interval is a linear program. Its dual solution proves that no "
-        "network in S lies beyond the end by more than the gap.",
+        "Each end of an exact interval is a linear program. One network attains it, and a dual "
+        "solution shows, in double precision, that none is beyond it by more than the gap.",
     ),
     "at_rest": Term(
         "at rest",
@@ -222,13 +223,13 @@ TERMS = {
     "seen": Term(
         "seen",
         "The interval of a contact's force over all random networks of the walk or sample, played "
-        "or not: always within the exact one.",
+        "or not. It is within the exact one, but for the residual of the paper's walk.",
     ),
     "now": Term("now", "The network on screen."),
     "rattler": Term(
         "loose disk",
-        "A disk or block that carries no force, also called a rattler; it is drawn pale and left "
-        "out of the equations.",
+        "A disk or block that carries no force, also called a rattler. It is drawn pale and "
+        "left out of the equations.",
     ),
     "unloaded": Term(
         "contact without force",
@@ -253,7 +254,7 @@ TERMS = {
     ),
     "failed": Term(
         "failed attempts",
-        "Kicks after which no balanced network was found; the walk tries again.",
+        "Kicks after which no balanced network was found. The walk tries again.",
     ),
     "segment": Term(
         "force lines",
@@ -285,7 +286,7 @@ TERMS = {
     "gauss_seidel": Term(
         "walk by sweeps, finished exactly",
         "After a kick, contacts are adjusted one by one, again and again (Gauss–Seidel), until "
-        "nearly in balance, as in the paper; the nearest network supplies the last digits.",
+        "nearly in balance, as in the paper. The nearest network supplies the last digits.",
     ),
     "gauss_seidel_only": Term(
         "the paper's walk, by sweeps alone",
@@ -314,9 +315,9 @@ TERMS = {
     "deviation": Term(
         "inferred less measured fₙ",
         "Orange contacts carry more in the inferred network than measured, blue ones less, in "
-        "standard deviations σ of the measurement; grey where nothing was measured.",
+        "standard deviations σ of the measurement, and grey where nothing was measured.",
     ),
-    "measured": Term("measured fₙ", "The measured normal force; blank where nothing was measured."),
+    "measured": Term("measured fₙ", "The measured normal force, blank where nothing was measured."),
     "carrying": Term(
         "carry for certain",
         "Contacts with a force above 0 in every network that remains, by certified bounds.",
@@ -328,13 +329,13 @@ TERMS = {
     # Views of force space
     "principal": Term(
         "principal axes",
-        "The shadow of S on the plane of the two directions along which the networks vary most; "
-        "a shadow, not a section. The percentage at an axis is its share of their scatter "
+        "The shadow of S on the plane of the two directions along which the networks vary most:"
+        " a shadow, not a section. The percentage at an axis is its share of their scatter "
         "(variance).",
     ),
     "cone": Term(
         "forces of one contact",
-        "The shadow of S on the plane of fₙ and fₜ of one contact; it lies inside Coulomb's "
+        "The shadow of S on the plane of fₙ and fₜ of one contact. It lies inside Coulomb's "
         "cone |fₜ| ≤ μ fₙ.",
     ),
     "pair": Term(
@@ -344,9 +345,9 @@ TERMS = {
     ),
     "stress": Term(
         "plane of stresses",
-        "The stress of a network at this pressure P, as a point: how much more it presses along "
-        "x than along y, and how much it shears. At (0, 0) it presses equally in all "
-        "directions; the distance from there is the largest shear stress over P.",
+        "The stress of a network at this pressure P, as a point: how much more it presses along"
+        " x than along y, and how much it shears. At (0, 0) it presses equally in all "
+        "directions. The distance from there is the largest shear stress over P.",
     ),
     "outline": Term("outline", "The edge of the shadow of S: no balanced network lies outside."),
     # Actions
@@ -371,7 +372,7 @@ TERMS = {
     ),
     "study": Term(
         "the study",
-        "Many packings at 14 to 16 values of μ, explored by every method of this page; their "
+        "Many packings at each of many values of μ, explored by every method of this page. Their "
         "averages come with the page.",
     ),
 }

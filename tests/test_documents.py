@@ -114,8 +114,8 @@ def folder(away):
 
 
 def test_all_documents_name_one_version():
-    """The newest heading of the changelog is the version, and its date that of CITATION.cff."""
-    (heading, *_) = re.findall(r"^## (.+)$", text("CHANGELOG.md"), re.M)
+    """The newest release of the changelog is the version, and its date that of CITATION.cff."""
+    (heading, *_) = re.findall(r"^## (\d.+)$", text("CHANGELOG.md"), re.M)
     version, _, date = heading.partition(" — ")
     citation = yaml.safe_load(text("CITATION.cff"))
     assert version == granforce.__version__ == citation["version"]

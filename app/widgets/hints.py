@@ -19,6 +19,7 @@ LABELS = {
     "Networks from": "s",
     "Relaxation": "accelerated",
     "Precomputed results": "store",
+    "network as packed": "original",
     "force as packed": "original",
     "interval ΔFₙ, seen": "extent",
     "interval ΔFₙ, exact": "extent",

@@ -157,7 +157,8 @@ def command_line() -> str:
 
 
 def symbols() -> str:
-    """The glossary as a table."""
+    """The glossary: a heading for each term, which the search finds first."""
     terms = sorted(glossary.TERMS.values(), key=lambda term: not term.symbol)
-    rows = [[term.symbol, term.word, term.sentence] for term in terms]
-    return "# Symbols\n\n" + table(["symbol", "name", "meaning"], rows)
+    heads = [f"{term.word}, {term.symbol}" if term.symbol else term.word for term in terms]
+    parts = [f"## {head}\n\n{term.sentence}\n" for head, term in zip(heads, terms, strict=True)]
+    return "\n".join(["# Symbols and terms\n", *parts])
