@@ -9,9 +9,10 @@ from typing import Any
 
 import xarray as xr
 
+from granforce.live import hulls
 from granforce.records import InputError, NotJammedError
 from granforce.study import cells as study
-from granforce.study import hulls, kinds
+from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 

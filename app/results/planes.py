@@ -12,9 +12,9 @@ import xarray as xr
 from scipy.spatial import ConvexHull, QhullError
 
 from granforce import measures
+from granforce.live.hulls import stress_axes
 from granforce.records import InputError
 from granforce.study import kinds
-from granforce.study.hulls import stress_axes
 from granforce.study.keys import Parameters
 from granforce.types import Floats
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import param
 
+from granforce.live.pulls import Puller
 from granforce.records import InputError
-from granforce.study.pulls import Puller
 from granforce.types import Floats
 
 from ..background.jobs import Job, reading

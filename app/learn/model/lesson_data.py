@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from granforce.live.pulls import Puller
 from granforce.records import InputError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
-from granforce.study.pulls import Puller
 
 from ...packing.player import frames
 from ...packing.view import exact_intervals

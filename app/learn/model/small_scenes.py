@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from granforce.live import hulls
 from granforce.packing import assemblies, importers, masonry, scenes
 from granforce.records import InputError, NotJammedError, Packing, float_array, friction
-from granforce.study import hulls
 from granforce.types import Floats, Integers
 
 from ...state.scene_links import OWN

@@ -10,8 +10,8 @@ from app.background.jobs import Task
 from app.learn.model import small_scenes
 from app.learn.workbench.workbench import Workbench
 from app.state import scene_links
+from granforce.live import hulls
 from granforce.records import InputError
-from granforce.study import hulls
 
 UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"

@@ -10,7 +10,7 @@ from app.packing.captions import network
 from app.packing.view import PackingView
 from app.results import planes
 from app.state import pulls
-from granforce.study import pulls as study_pulls
+from granforce.live import pulls as live_pulls
 
 
 class Page:
@@ -53,7 +53,7 @@ def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
 
 
 def test_of_many_contacts_a_part_of_the_rail_comes_first(page, state, monkeypatch):
-    monkeypatch.setattr(study_pulls, "MANY", 1)
+    monkeypatch.setattr(live_pulls, "MANY", 1)
     page.hear(grab=4)
     part, rail = (message["rail"] for message in page.told if "rail" in message)
     assert not part["whole"] and rail["whole"] and set(part["values"]) < set(rail["values"])

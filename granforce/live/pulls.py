@@ -1,8 +1,6 @@
 """Networks while a contact is pulled or pushed.
 
 They lie along the interval of a contact's f_n, over a plane of S, or under a growing load.
-
-Nothing is stored: a rail or a fan takes some tenths of a second for 400 disks.
 """
 
 from collections.abc import Iterator

@@ -7,11 +7,11 @@ from packings import packed
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.forces.build import ensemble
+from granforce.live import pulls
+from granforce.live.pulls import Puller
 from granforce.numerics.lanes import LANES
 from granforce.perturb.critical_force import critical_force
 from granforce.records import InputError
-from granforce.study import pulls
-from granforce.study.pulls import Puller
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 
