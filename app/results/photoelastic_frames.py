@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from granforce.experiment.listing import plain
+from granforce.experiment.listings.listing import plain
 from granforce.experiment.pegs import open_frames, read_pegs
 from granforce.experiment.regions import regions
 from granforce.experiment.repair import KINDS

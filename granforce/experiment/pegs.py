@@ -17,8 +17,9 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from granforce import notebook
-from granforce.experiment import solved
-from granforce.experiment.listing import Frames, Listing, plain, read_frames
+from granforce.experiment.listings import solved
+from granforce.experiment.listings.listing import Frames, Listing, plain
+from granforce.experiment.listings.text_frames import read_frames
 from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired
 from granforce.experiment.walls import Bodies, bad_fit, bodies, flagged, read_outline, wall_contacts
 from granforce.fields import record

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.experiment.listing import FAR, Listing, plain
+from granforce.experiment.listings.listing import FAR, Listing, plain
 from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
 from granforce.records import InputError
 from granforce.types import Floats, Integers

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from granforce.experiment.listing import Listing
+from granforce.experiment.listings.listing import Listing
 from granforce.experiment.pegs import Photoelastic
 from granforce.fields import record
 from granforce.forces.build import ensemble

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import optimize
 
 from granforce.experiment.boundary import boundary
-from granforce.experiment.listing import Listing
+from granforce.experiment.listings.listing import Listing
 from granforce.packing.importers.geometry import components
 from granforce.records import Contacts, InputError, make_contacts, positive
 from granforce.system.wording import number

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from frames import NEWTON, PIXELS, file, frame
 
-from granforce.experiment.listing import read_frames
+from granforce.experiment.listings.text_frames import read_frames
 from granforce.experiment.pegs import read_pegs
 from granforce.records import InputError
 

@@ -301,9 +301,8 @@ def read_rows(source: Source) -> Table:
     Lines that begin with # are its comments, in lower case. Raises InputError.
     """
     name, text = read_text(source)
-    lines = numbered_lines(text)
-    is_comment = [line.startswith("#") for _, line in lines]
-    rows = [line for line, comment in zip(lines, is_comment, strict=True) if not comment]
+    lines = [(number, line.lstrip()) for number, line in numbered_lines(text)]
+    rows = [(number, line) for number, line in lines if not line.startswith("#")]
     if not rows:
         raise InputError(f"{name}: no line with numbers")
     return Table(
@@ -312,14 +311,13 @@ def read_rows(source: Source) -> Table:
         [line.replace(",", " ").split() for _, line in rows],
         [number for number, _ in rows],
         comments=[line.lstrip("# \t").lower() for _, line in lines if line.startswith("#")],
-        complete=text.endswith("\n") or is_comment[-1],
+        complete=text.endswith("\n") or lines[-1][1].startswith("#"),
     )
 
 
 def numbered_lines(text: str) -> list[tuple[int, str]]:
-    """The lines that are not blank, without blanks around them, and their numbers from 1."""
-    lines = enumerate(map(str.strip, text.splitlines()), start=1)
-    return [(number, line) for number, line in lines if line]
+    """The lines that are not blank, and their numbers from 1."""
+    return [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
 
 
 def separator_of(line: str) -> str | None:

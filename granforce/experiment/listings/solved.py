@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.experiment.listing import Listing
-from granforce.experiment.matfile import read_struct
+from granforce.experiment.listings.listing import Listing
+from granforce.experiment.listings.matfile import read_struct
 from granforce.packing.importers.text import LARGEST, EmptyError, Source
 from granforce.records import InputError
 from granforce.system.files import content_of, path_text

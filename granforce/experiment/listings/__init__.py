@@ -1,0 +1,1 @@
+"""Listings of photoelastic frames, from files of any kind."""
