@@ -123,6 +123,8 @@ _BY_QUESTION = {
         "Loaded": "perturb.loaded",
     },
     "Save, read, draw": {
+        "show": "cli.viewer",
+        "View": "cli.viewer",
         "plot": "figures.picture",
         "to_dataset": "labelled",
         "to_dataframe": "labelled",

@@ -10,7 +10,7 @@ from bokeh.document import Document
 
 from ..browser.panel_patches import send_what_waits
 from ..packing.view import PackingView
-from ..state import visit
+from ..state import held_file, visit
 from ..state.app_state import AppState
 from ..widgets.header import Header
 from ..widgets.hints import Hints
@@ -119,6 +119,7 @@ def explore_page(document: Document, query: str) -> Any:
     looks, work = state.looks, state.work
     looks.dark = visit.dark(query)
     work.message = work.message or " ".join(state.library.notes)
+    held_file.follow(state.knowledge)
     side = pn.Column(PackingView(state, document).player, css_classes=["side"], **WIDE)
     if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":
         whole = framed(None, [side], dark=looks.dark)

@@ -457,8 +457,8 @@ COMMANDS = (
     Command(
         "app",
         "open the app in a browser",
-        "granforce app\n  granforce app --port 8080 --no-show",
-        ("--port --address --allow-websocket-origin --use-xheaders --no-show --warm",),
+        "granforce app\n  granforce app packing.npz\n  granforce app --port 8080 --no-show",
+        ("packing:app --port --address --allow-websocket-origin --use-xheaders --no-show --warm",),
     ),
     Command(
         "docs",

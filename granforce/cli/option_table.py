@@ -143,6 +143,7 @@ OPTIONS = {
     "packing": Option(
         "use this packing instead of making one", Input, nargs="?", suffixes=("npz",)
     ),
+    "packing:app": Option("open this packing", Input, nargs="?", suffixes=("npz",)),
     "packing:required": Option("file of the packing", Input, suffixes=("npz",)),
     "scan": Option(
         "store written by granforce scan (default: $GRANFORCE_CACHE, else the user's cache folder)",

@@ -42,6 +42,8 @@ def study_(arguments: argparse.Namespace) -> int:
 
 def app(arguments: argparse.Namespace) -> None:
     """Serve the app by `panel serve` in this process until interrupted."""
+    from granforce.cli import viewer
+
     port = whole(arguments.port, "--port", 0, 65_535)
     for origin in arguments.allow_websocket_origin:
         if not re.fullmatch(r"[^\s:/,]+(:\d{1,5})?", origin):
@@ -49,14 +51,19 @@ def app(arguments: argparse.Namespace) -> None:
                 f"--allow-websocket-origin {origin[:40]!r}: give a name and a port, such as "
                 "lab.example.org:5006"
             )
-    _check_address(arguments.address, port)
+    port = _checked_port(arguments.address, port)
     words = ["panel", "serve", str(_page()), "--port", str(port), "--address", arguments.address]
     for origin in arguments.allow_websocket_origin:
         words += ["--allow-websocket-origin", origin]
-    words += [] if arguments.no_show else ["--show"]
     words += ["--warm"] if arguments.warm else []
     words += ["--use-xheaders"] if arguments.use_xheaders else []
     words += ["--plugins", "granforce.cli.health"]
+    host = "localhost" if arguments.address in ("0.0.0.0", "::") else arguments.address
+    page = f"http://{host}:{port}/app{viewer.query_of_file(arguments.packing)}"
+    if not arguments.no_show:
+        viewer.open_when_ready(page)
+    elif arguments.packing:
+        print(page, flush=True)
     sys.argv = words
     runpy.run_module("panel", run_name="__main__", alter_sys=True)
 
@@ -70,8 +77,8 @@ def _page() -> Path:
     raise InputError(f"the app is not installed: {package} has no folder app; install the wheel")
 
 
-def _check_address(address: str, port: int) -> None:
-    """InputError if the address cannot be used, or is already in use."""
+def _checked_port(address: str, port: int) -> int:
+    """The port, a free one for 0; InputError if the address cannot be used, or is in use."""
     if not address.strip():
         raise InputError("--address is empty; give a host name or an IP address, such as localhost")
     try:
@@ -79,6 +86,7 @@ def _check_address(address: str, port: int) -> None:
         with socket.socket(family, kind) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
+            return int(probe.getsockname()[1])
     except (OSError, ValueError) as error:  # ValueError: not a valid name
         reason = getattr(error, "strerror", None) or "no such name"
         raise InputError(

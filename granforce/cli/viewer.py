@@ -1,0 +1,152 @@
+"""The app opened on one packing, from Python or by `granforce app FILE`."""
+
+import atexit
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+import webbrowser
+from html import escape
+from pathlib import Path
+from urllib.error import URLError
+from urllib.parse import urlencode
+
+import numpy as np
+
+from granforce.forces.knowledge import Known
+from granforce.packing.importers import load_packing
+from granforce.records import InputError, Packing
+from granforce.study import kinds
+from granforce.study.store import open_store
+
+# The folder into which the app's server writes the forces held on its pages; see `View.known`.
+HELD_VARIABLE = "GRANFORCE_HELD"
+PATIENCE = 60.0  # s until the server must respond
+PAUSE = 0.1  # s between attempts
+
+
+class View:
+    """A page of the app on one packing; in a notebook it is shown below its cell.
+
+    Attributes
+    ----------
+    address : str
+        Address of the page.
+    """
+
+    def __init__(self, address: str, held: Path) -> None:
+        self.address, self._held = address, held
+
+    @property
+    def known(self) -> Known | None:
+        """The forces that are held on the page now, for `gf.ensemble`; None if there are none."""
+        try:
+            rows = json.loads(self._held.read_text())
+        except FileNotFoundError:
+            return None
+        if not rows:
+            return None
+        contacts, low, high = zip(*rows, strict=True)
+        return Known(np.array(contacts), np.array(low), np.array(high))
+
+    def __repr__(self) -> str:
+        return f"View({self.address!r})"
+
+    def _repr_html_(self) -> str:
+        wait_for_server(self.address)
+        return f'<iframe src="{escape(self.address)}" width="100%" height="900"></iframe>'
+
+
+def show(packing: Packing, *, browser: bool | None = None) -> View:
+    """Open the app on a packing; returns at once.
+
+    The packing is saved in the default store. The server ends with this Python process.
+
+    Parameters
+    ----------
+    packing : Packing
+        The packing.
+    browser : bool, optional
+        Whether to open a browser; by default unless in a notebook, which shows the View itself.
+
+    Returns
+    -------
+    View
+        The page.
+
+    Raises
+    ------
+    InputError
+        If packing is no Packing, or if the store cannot be written.
+    """
+    if not isinstance(packing, Packing):
+        raise InputError(f"show takes a Packing, not {type(packing).__name__}")
+    query = stored_query(packing)
+    root, folder = _server()
+    address = f"{root}?{query}"
+    if browser or (browser is None and "ipykernel" not in sys.modules):
+        open_when_ready(address)
+    return View(address, folder / f"{kinds.imported_parameters(packing)['imported']}.json")
+
+
+def stored_query(packing: Packing) -> str:
+    """The query of a link to a packing, which is saved in the default store for it."""
+    parameters = kinds.imported_parameters(packing)
+    kinds.keep_packing(open_store(), parameters, packing)
+    return urlencode({"packing": parameters["imported"], "mu": f"{packing.mu:.9g}"})
+
+
+def query_of_file(path: str | None) -> str:
+    """The query of a link to the packing in an NPZ file; empty without a file."""
+    return "" if path is None else f"?{stored_query(load_packing(path))}"
+
+
+def open_when_ready(address: str) -> None:
+    """Open an address in a browser once its server responds, from a thread."""
+
+    def wait() -> None:
+        if wait_for_server(address):
+            webbrowser.open(address)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def wait_for_server(address: str) -> bool:
+    """Whether the server of an address responds within PATIENCE."""
+    health = f"{address.partition('/app')[0]}/health"
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        try:
+            with urllib.request.urlopen(health, timeout=PATIENCE):
+                return True
+        except (URLError, OSError):
+            time.sleep(PAUSE)
+    return False
+
+
+_started: list[tuple[subprocess.Popen[bytes], str, Path]] = []  # the server of this process
+
+
+def _server() -> tuple[str, Path]:
+    """The address of this process's server, and the folder of held forces; starts it if needed."""
+    if not _started or _started[-1][0].poll() is not None:
+        with socket.socket() as probe:
+            probe.bind(("localhost", 0))
+            port = probe.getsockname()[1]
+        folder = Path(tempfile.mkdtemp(prefix="granforce-held-"))
+        process = subprocess.Popen(
+            [sys.executable, "-m", "granforce", "app", "--no-show", "--port", str(port)],
+            env=os.environ | {HELD_VARIABLE: str(folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        atexit.register(process.terminate)
+        _started[:] = [(process, f"http://localhost:{port}/app", folder)]
+    _, address, folder = _started[-1]
+    return address, folder
