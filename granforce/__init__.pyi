@@ -3,6 +3,8 @@
 from granforce import figures as figures
 from granforce import measures as measures
 from granforce.cell import Cell as Cell
+from granforce.cli.viewer import View as View
+from granforce.cli.viewer import show as show
 from granforce.experiment.carrying import Carrying as Carrying
 from granforce.experiment.carrying import carrying as carrying
 from granforce.experiment.frames import Frame as Frame
