@@ -2,8 +2,9 @@
 
     python tests/app/measurements/record.py [FILE.webp]
 
-By default app/page.webp, the picture of the README. The app is served with the shipped store and a
-cache of its own, so that the packing has to be made.
+By default app/page.webp, the picture of the README. Also takes data/figures/app.png, the picture of
+the documentation. The app is served with the shipped store and a cache of its own, so that the
+packing has to be made.
 """
 
 import base64
@@ -35,6 +36,7 @@ from serving import (  # noqa: E402
 from small_store import ROOT  # noqa: E402
 
 SIZE = {"width": 1500, "height": 880}
+STILL = ROOT / "data" / "figures" / "app.png"
 WIDTH = 900  # px of the file
 MOST_BYTES = 3e6
 LEAST_MS = 120  # between two pictures kept
@@ -177,6 +179,8 @@ def main(path):
             painted(page)
             page.get_by_text("All contacts as a table").wait_for()  # the last to come
             page.wait_for_timeout(4000)
+            still = Image.open(io.BytesIO(page.screenshot()))
+            still.quantize(256).save(STILL, optimize=True)
             recorder = Recorder(page)
             act(page, recorder)
             recorder.stop()
