@@ -8,12 +8,14 @@ limit load, beyond which no equilibrium exists, until REACHED · `precision` are
 is final only after a step of at most LAST_STEP · `precision`: after a longer one the load returns
 BACK steps and rises again in steps a quarter as long, and in full steps once it has passed the load
 of that motion. Motion that is not yet steady is followed for STEADY_STEPS before it is final. The
-critical force F_crit is the last load at rest. Its error is `precision` for most contacts: if load
-steps, precision and the steps of the flow are refined by four, 0, 1, 2 and 8 of 200 at μ = 0.01,
-0.3, 1 and 10 (N = 100) change by more, up to 0.2 ⟨f_n⟩. In most of these, grains set off and come
-to rest elsewhere below F_crit; which rest they find depends on every step. The pair counts in the
-balance of the grains and in the pressure like a force of the contact itself, but not in its Coulomb
-cone, and the box may dilate at constant pressure.
+critical force F_crit is the last load at rest, bracketed to `precision`. That is also its error for
+most contacts: if load steps, precision and the steps of the flow are refined by four, 0, 1, 2 and 8
+of 200 at μ = 0.01, 0.3, 1 and 10 (N = 100) change by more, up to 0.2 ⟨f_n⟩. In most of these, from
+the same forces and under the same load, both steady motion and rest at other forces, up to 0.5
+⟨f_n⟩ away, are solutions; the length of the first step of the flow decides, and no refinement does.
+`converged` cannot tell such contacts, as one search does not know how another would have ended. The
+pair counts in the balance of the grains and in the pressure like a force of the contact itself, but
+not in its Coulomb cone, and the box may dilate at constant pressure.
 
 F_crit ≤ limit load. They differ because sliding contacts do not dilate (the law is not associated):
 grains may start to move although an equilibrium exists.
@@ -146,7 +148,7 @@ Asking = Generator[Push, Outcome, T]
 class Protocol(NamedTuple):
     """How the load on a contact is raised."""
 
-    precision: Annotated[float, "error of F_crit, ⟨f_n⟩"] = 0.01
+    precision: Annotated[float, "largest width of the bracket, ⟨f_n⟩"] = 0.01
     rise: Annotated[float, "first step, as a fraction of the way to the limit load"] = RISE
     max_steps: Annotated[int, "of the flow per load"] = MOST_STEPS
 
