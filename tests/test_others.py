@@ -13,7 +13,6 @@ import pytest
 HOUSE = Path(__file__).parents[1] / "granforce"
 # Where it is used, what, and what it is for.
 NAMES = {
-    "figures/style.py": ("_close_figures", "an inset leaves the figure open that it is drawn into"),
     "study/scan.py": ("_processes", "workers are ended where the work is interrupted"),
     "study/entries.py": ("zarr.core.metadata", "metadata of an array is written as Zarr does"),
     "numerics/lanes.py": ("numba.core", "LLVM's own functions are called for all lanes at once"),
@@ -72,11 +71,6 @@ def test_stored_kernels_can_be_read_or_compiled_anew():
 def told(file):
     name, purpose = NAMES[file]
     return f"granforce/{file} needs {name}, so that {purpose}"
-
-
-def test_holoviews_can_be_told_to_leave_a_figure_open():
-    plot = importlib.import_module("holoviews.plotting.mpl.plot").MPLPlot
-    assert hasattr(plot, "_close_figures"), told("figures/style.py")
 
 
 def test_a_pool_of_processes_knows_its_workers():

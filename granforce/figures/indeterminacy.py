@@ -31,7 +31,7 @@ def indeterminacy(
     outside: Table = (),
     backend: str = "bokeh",
 ) -> hv.Layout:
-    """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
+    """Figure 1: z, and η1, η2 and 0.15 η3, against μ on logarithmic axes.
 
     rows: dicts or a pandas table with mu, coordination (z), and any of eta1, eta2, eta3, extent
     (the width of S per free dimension, in ⟨f_n⟩); or the store of a scan. compare: {name: dicts}
@@ -55,28 +55,21 @@ def indeterminacy(
             points = statistics.means(compare[source], name, factor=factor)
             if points:
                 curves.append((points, f"{label}, {source}", style.COLOURS[k], dash, k))
-    # Leave room for the inset above the curves.
-    top = max((y + e for points, *_ in curves for _, y, e in points), default=1.0) or 1.0
-    linear = style.graph(
+    etas = style.graph(
         *(curves, backend),
         title="Indeterminacy",
         x="μ",
         y="η",
-        ylim=(0, 2.4 * top) if backend == "matplotlib" else (0, 1.1 * top),
-        legend=style.legend_position("top_right", backend),
+        logx=True,
+        logy=True,
+        legend=style.legend_position("bottom_right", backend),
         marks=_crosses(outside, backend),
     )
-    words: dict[str, Any] = {"title": "the same, log–log", "x": "μ", "y": "η"}
-    words["marks"] = _crosses(outside, backend, logarithmic=True)
-    log = style.graph(curves, backend, **words, logx=True, logy=True)
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     # A logarithmic axis has no place for μ = 0.
     zero = "".join(f"; z = {y:.3g} at μ = 0" for mu, y, _ in z[0][0] if mu == 0)
     contacts = style.graph(z, backend, title=f"Coordination{zero}", x="μ", y="z", logx=True)
-    both = style.inset(linear, log, (0.25, 0.56, 0.72, 0.42), backend)
-    # In pictures the legend is next to the last frame.
-    frames = [*both, contacts] if backend == "bokeh" else [contacts, *both]
-    return style.page(frames, backend)
+    return style.page([contacts, etas], backend)
 
 
 def _checked(rows: Any) -> pd.DataFrame:
@@ -95,13 +88,13 @@ def _checked(rows: Any) -> pd.DataFrame:
     return table
 
 
-def _crosses(rows: Table, backend: str, *, logarithmic: bool = False) -> list[Any]:
+def _crosses(rows: Table, backend: str) -> list[Any]:
     """Means of the measures of states outside of S."""
     points = [
         (mu, mean)
         for name, _, factor in _MEASURES
         for mu, mean, _ in statistics.means(rows, name, factor=factor)
-        if min(mu, mean) > 0 or not logarithmic
+        if min(mu, mean) > 0
     ]
     return [style.dots(points, "outside S", style.GREY, backend, "x")] if points else []
 

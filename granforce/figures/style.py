@@ -219,34 +219,6 @@ def graph(
     return frame(drawn, backend, logx=logx, logy=logy, **options)
 
 
-def inset(
-    outer: hv.Overlay, inner: hv.Overlay, place: Sequence[float], backend: str
-) -> list[hv.Overlay]:
-    """The frames, of which one is an inset of the other, as a list.
-
-    place: (left, bottom, width, height) in fractions of the outer frame. Web pages have no insets:
-    there the two frames are next to each other.
-    """
-    if backend == "bokeh":
-        return [outer, inner]
-
-    def draw(plot: Any, _: Any) -> None:
-        axes = plot.handles["axis"].inset_axes(place)
-        small = inner.opts(backend=backend, clone=True, title="", fontscale=0.65, show_legend=False)
-        kind = hv.Store.registry[backend][hv.Overlay]
-        artists = kind(small, fig=axes.figure, axis=axes)
-        artists._close_figures = (
-            False  # otherwise Matplotlib would close the unfinished outer frame
-        )
-        artists.initialize_plot()
-        artists.handles["axis"].tick_params(
-            which="both", labelsize=artists.handles["axis"].xaxis.label.get_size()
-        )
-
-    hooks = [_legend_of(outer.values()), draw]
-    return [outer.opts(backend=backend, clone=True, hooks=hooks)]
-
-
 def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
     """A hook that typesets a picture's legend, with the symbols of points on its lines."""
     looks = {
