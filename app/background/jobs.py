@@ -1,6 +1,7 @@
 """Work off the event loop: threads run it, and the page polls its progress.
 
-The kernels release the interpreter lock, so a thread blocks neither the page nor other threads.
+The kernels release the interpreter lock, so a thread blocks neither the page nor other threads. Of
+jobs that need the same thing, one computes it, in its turn, as long as any of them needs it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
+from weakref import WeakSet, WeakValueDictionary
 
 import param
 
@@ -22,16 +24,77 @@ from granforce.system import cancelling
 
 from .gc_pauses import settle
 from .limits import LIMITS
-from .turns import Later, Turn, turn_of
 
 # Time, s, and part of a stage after which its end can be estimated: earlier, it is off by factors.
 ESTIMATED, ESTIMATED_PART = 4.0, 0.05
 LONGEST_LINE = 500  # characters of an error message on a page
 LONG = 3.0  # s after which a job is a long one
-_ASK = 0.2  # s between two polls
+_ASK = 0.2  # s between two polls, and for which a job waits for its turn before it frees the thread
 WAITING = "waiting for a free processor"  # stage of a job that has not begun
 
 _log = logging.getLogger(__name__)
+_turns: WeakValueDictionary[str, Turn] = WeakValueDictionary()
+_turns_lock = threading.Lock()
+
+
+class Later(Exception):
+    """Raised by work that cannot continue yet; its job goes to the end of the queue."""
+
+
+class Turn:
+    """The turn among jobs that need the thing with one name, and the list of these jobs."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.job: Job | None = None
+        self._wanting: WeakSet[Job] = WeakSet()
+        self._guard = threading.Lock()
+
+    def join(self, job: Job) -> None:
+        """Add a job to those that need it."""
+        with self._guard:
+            self._wanting.add(job)
+
+    def wanted(self, without: Job) -> bool:
+        """Whether another job needs it that is neither cancelled nor ended."""
+        with self._guard:
+            others = [job for job in self._wanting if job is not without]
+        return not all(job.cancelled() or job.ended for job in others)
+
+
+def turn_of(named: Any) -> Turn:
+    """The Turn of a name, which exists while it is referenced."""
+    with _turns_lock:
+        return _turns.setdefault(repr(named), Turn())
+
+
+@contextmanager
+def in_turn(job: Job, *named: Any) -> Iterator[None]:
+    """Run one job at a time for each name: the next finds the result of the first in the cache.
+
+    Raises Later while another job has the turn, so that a waiting job frees its thread.
+    """
+    turn = turn_of(named)
+    turn.join(job)
+    if not turn.lock.acquire(timeout=_ASK):
+        _goes_as(job, turn.job)
+        raise Later
+    turn.job, job.stage = job, "starting"
+    job.turns.append(turn)
+    try:
+        yield
+    finally:
+        job.turns.remove(turn)
+        turn.job = None
+        turn.lock.release()
+
+
+def _goes_as(job: Job, other: Job | None) -> None:
+    """Copy the progress of the other job, which works for both."""
+    job.stage = "already under way"
+    if other is not None:
+        job.stage += f": {other.stage}"
+        job.fraction, job.seconds_left = other.fraction, other.seconds_left
 
 
 class Visitor(NamedTuple):

@@ -5,6 +5,7 @@ import os
 from typing import Any, NamedTuple
 
 from granforce.records import InputError, brief
+from granforce.system.wording import number
 
 LIMITS_VARIABLE = "GRANFORCE_LIMITS"
 
@@ -82,7 +83,7 @@ def _check_radii(text: Any) -> None:
     """InputError unless it is a valid distribution of sizes that can be packed together."""
     kind, _, numbers = str(text).partition(":")
     try:
-        values = [float(number) for number in numbers.split(",")]
+        values = [number(part) for part in numbers.split(",")]
     except ValueError:
         values = []
     sizes = values[:2]

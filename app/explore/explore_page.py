@@ -10,7 +10,7 @@ from bokeh.document import Document
 
 from ..browser.panel_patches import send_what_waits
 from ..packing.view import PackingView
-from ..state import held_file, visit
+from ..state import held_file, page_session
 from ..state.app_state import AppState
 from ..widgets.header import Header
 from ..widgets.hints import Hints
@@ -114,10 +114,10 @@ GRID = {
 
 def explore_page(document: Document, query: str) -> Any:
     """The page of large packings for a link's query; `embed=1`: only the packing."""
-    wake = visit.turns(document)
-    state = AppState(visit.library(), wake, query, visit.visitor(document))
+    wake = page_session.waker(document)
+    state = AppState(page_session.library(), wake, query, page_session.visitor(document))
     looks, work = state.looks, state.work
-    looks.dark = visit.dark(query)
+    looks.dark = page_session.dark(query)
     work.message = work.message or " ".join(state.library.notes)
     held_file.follow(state.knowledge)
     side = pn.Column(PackingView(state, document).player, css_classes=["side"], **WIDE)
@@ -127,9 +127,9 @@ def explore_page(document: Document, query: str) -> Any:
         around = _Around(state, side)
         pn.state.onload(partial(work.piecewise, around.parts()))
         whole = framed(around.header, around.columns, dark=looks.dark, styles=GRID)
-    visit.poll_while_running(work, document)
+    page_session.poll_while_running(work, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
-    visit.at_end(work.close)
+    page_session.at_end(work.close)
     return whole
 
 

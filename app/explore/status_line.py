@@ -34,7 +34,8 @@ class StatusLine(Scripted):
         self._rest: tuple[Cell, bool] | None = None  # whether it was tested
         self._looking = work.task(reading, reported=False)
         state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
-        work.computation.param.watch(self._tell, "running")
+        for task in (work.computation, work.reader):
+            task.param.watch(self._tell, "running")
         state.param.watch(self._look, "cell")
         state.knowledge.param.watch(self._tell, ["known", "narrowed"])
         work.param.watch(self._report, ["message", "progress"])
@@ -85,10 +86,7 @@ def facts(state: AppState) -> Iterator[str]:
     """Facts about the numbers on screen, as HTML."""
     cell, replay = state.cell, state.replay
     if cell is None or replay is None:
-        if not state.missing:
-            yield "opening the packing …"
-        elif not state.work.computation.running:
-            yield f"<b>Nothing is shown</b>: {state.requested}"
+        yield state.nothing
         return
     if state.missing and not state.work.computation.running:
         yield f"<b>Still showing μ = {cell.mu:g}, {cell.series}: the requested results follow</b>"

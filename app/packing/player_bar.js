@@ -36,7 +36,7 @@ export class PlayerBar {
     along.append("network ", this.number)
     speed.append(this.speedInput, this.rate)
     more.append(speed, this.stored, this.keep)
-    this.root = createElement("div", { className: "bar" })
+    this.root = createElement("div", { className: "bar empty" })
     this.root.append(
       createElement("span", { className: "only", textContent: "One network: balance determines every force." }),
       iconButton("back", "one network back (←)", () => actions.back()), this.playButton,
@@ -90,6 +90,7 @@ export class PlayerBar {
   /** Show another track: its length, and whether the omitted networks can be computed. */
   showTrack(replay, keepable) {
     this.replay = replay
+    this.root.classList.remove("empty")
     const { last, swinging, stride } = replay
     this.scrub.max = last
     this.scrub.step = swinging ? 0.01 : 1

@@ -16,8 +16,7 @@ from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 
-from ..background.jobs import Job, Work
-from ..background.turns import in_turn
+from ..background.jobs import Job, Work, in_turn
 from . import progress_feed
 from .library import SOURCES, Cell, Library, Shown
 from .replays import first_replay

@@ -16,6 +16,7 @@ from granforce.live.hulls import stress_axes
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.keys import Parameters
+from granforce.system.wording import integer
 from granforce.types import Floats
 
 from ..background.jobs import Job
@@ -163,7 +164,7 @@ def read(text: str) -> Components:
     """The components () or ((contact, part), (contact, part)) of a name; ValueError if invalid."""
     if text in ("p", "s"):
         return ()
-    first, second = ((int(part[:-1]), "nt".index(part[-1:] or "?")) for part in text.split("-"))
+    first, second = ((integer(part[:-1]), "nt".index(part[-1:] or "?")) for part in text.split("-"))
     return first, second
 
 

@@ -1,18 +1,16 @@
-"""A request for states, and its three forms: words on screen, a link, a command line."""
+"""A request for states, in words on screen and as a command line; state/links.py has its links."""
 
 from __future__ import annotations
 
 import shlex
-from collections import Counter
 from typing import Any, NamedTuple
-from urllib.parse import parse_qsl, urlencode
 
-from granforce.glossary import RELAXATIONS, typed_relaxation
+from granforce.glossary import typed_relaxation
 from granforce.packing.scenes import BLOCKS
-from granforce.records import InputError, choice, friction
-from granforce.records import brief as shortened
+from granforce.records import InputError, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
+from granforce.system.wording import number
 
 from ..background.limits import Limits
 
@@ -34,9 +32,6 @@ KEPT_BYTES = 64e6
 EASY = 500_000
 _WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
 _WEIGHTS["gauss_seidel_only"] = 10
-# Characters of a message about a link, which may contain anything, and of a whole number in a link
-# that Python converts.
-LONGEST_REASON, MOST_DIGITS = 200, 4000
 
 
 class Selection(NamedTuple):
@@ -237,101 +232,9 @@ def of_packing(selection: Selection) -> list[Any]:
     return words
 
 
-def link(selection: Selection, view: dict[str, Any]) -> str:
-    """The query of an address that reopens this selection with the view {name: plain value}."""
-    packing = selection.packing
-    if selection.imported:
-        given = {"packing": packing.get("imported"), "scene": packing.get("scene")}
-        given = {name: value for name, value in given.items() if value}
-    else:
-        given = {"n": packing["n"], "seed": packing["seed"], **unusual(packing)}
-    given["mu"] = f"{selection.mu:.9g}"
-    if not selection.same_mu:
-        given["packed"] = f"{packing['mu']:.9g}"
-    given |= {"source": selection.kind, "states": selection.states}
-    if selection.kind == "walk":
-        given["relax"] = typed_relaxation(selection.relax)
-    if selection.seed:
-        given["walkseed"] = selection.seed
-    return urlencode(given | view)
-
-
-def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
-    """(Selection or None, {name: text} of everything else) from a link's query.
-
-    InputError for an invalid selection; a link without "mu" selects nothing, unless it has a scene.
-    """
-    pairs = parse_qsl(query.lstrip("?"))
-    given = dict(pairs)
-    try:
-        for name, count in Counter(name for name, _ in pairs).items():
-            if count > 1:
-                raise InputError(f"it contains {shortened(name)} {count} times")
-        if given.get("scene") in BLOCKS:
-            given.setdefault("mu", str(BLOCKS[given["scene"]].mu))
-        return (_read_selection(given) if "mu" in given else None), given
-    except (ValueError, TypeError) as error:
-        raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
-
-
 def typed(text: str) -> Any:
     """The number in a text; another text as it is, for a check that refuses it by name."""
     try:
-        return float(text)
+        return number(text)
     except ValueError:
         return text
-
-
-def _read_selection(given: dict[str, str]) -> Selection:
-    kind = choice(given.pop("source", "walk"), KINDS, "source")
-    relax = given.pop("relax", "nearest")
-    if relax != "accelerated":  # as links of earlier versions call it
-        relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
-    mu = friction(typed(given.pop("mu")))
-    packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
-    rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
-    if "packing" in given:
-        packing = {"imported": given.pop("packing"), "mu": packed}
-        return Selection(packing, mu, kind, relax, **rest)
-    if "scene" in given:
-        scene = choice(given.pop("scene"), BLOCKS, "scene")
-        return Selection({"scene": scene, "mu": packed}, mu, kind, relax, **rest)
-    selection = select(
-        _whole(given, "n", 400),
-        mu,
-        _whole(given, "seed", 1),
-        packed,
-        given.pop("box", "square"),
-        kind=kind,
-        relax=relax,
-        **rest,
-    )
-    options: Parameters = {
-        name: (_whole if name == "sweeps" else _number)(given, name)
-        for name in OPTIONS
-        if name in given and name != "radii"
-    }
-    if "radii" in given:
-        options["radii"] = given.pop("radii")
-        if ":" not in options["radii"]:
-            raise InputError("radii in a link must be a named distribution")
-    return selection._replace(packing=selection.packing | options)
-
-
-def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
-    """The whole number of a name, which is taken out; InputError if it is no such number."""
-    text = given.pop(name, str(usual))
-    if not text.lstrip("+-").isdecimal():
-        raise InputError(f"{name} must be a whole number, got {shortened(text)}")
-    if len(text) > MOST_DIGITS:
-        raise InputError(f"{name} must be a number of few digits, got {shortened(text)}")
-    return int(text)
-
-
-def _number(given: dict[str, str], name: str) -> float:
-    """The number of a name, which is taken out; InputError if it is none."""
-    text = given.pop(name)
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{name} must be a number, got {shortened(text)}") from None

@@ -16,11 +16,22 @@ from ..results import compute
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from ..results.progress_feed import Arriving, Following, numbers
 from ..results.replays import Replay
-from ..results.selection import Selection, brief, command, link, read_link
+from ..results.selection import Selection, brief, command
 from . import known, perturbations
 from .comparison import Comparison
 from .known import Knowledge
-from .links import OF_A_REPLAY, VIEW, Numbered, Numbers, View, fitting, read_view, spelled
+from .links import (
+    OF_A_REPLAY,
+    VIEW,
+    Numbered,
+    Numbers,
+    View,
+    fitting,
+    link,
+    read_link,
+    read_view,
+    spelled,
+)
 from .page_tasks import Work
 from .pulls import Hand
 from .view_settings import Looks
@@ -451,6 +462,15 @@ class AppState(param.Parameterized):
             return f"requested: {words}"
         shown = f"of μ = {self.cell.mu:g}; " if self.cell else ""
         return f"{shown}not computed: {words}"
+
+    @property
+    def nothing(self) -> str:
+        """Why no states are on screen, if there are none."""
+        if self.work.reader.running:
+            return "Opening the packing …"
+        if self.work.computation.running:
+            return "Being computed …"
+        return f"Nothing is shown: {self.requested}" if self.requested else "Nothing is shown."
 
     @property
     def unsaved(self) -> str:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from granforce.records import InputError
 from granforce.study import kinds
+from granforce.system.wording import integer, number
 from granforce.tolerances import CARRYING
 from granforce.types import Floats, Integers
 
@@ -389,7 +390,7 @@ def read(text: str) -> list[Statement]:
     """Statements from a link's text; ValueError if invalid."""
     parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]
     pairs = [(contact, rest) for contact, *rest in parts if 1 <= len(rest) <= 2]
-    known = [Statement(int(contact), *map(float, rest)) for contact, rest in pairs]
+    known = [Statement(integer(contact), *map(number, rest)) for contact, rest in pairs]
     numbers = [number for one in known for number in one[1:]]
     contacts = {one.contact for one in known}
     if not len(parts) == len(known) == len(contacts) <= MOST_KNOWN:

@@ -1,22 +1,130 @@
-"""The parameters of the view in a link, besides the selection: formatting and parsing."""
+"""Links: the selection and the view as the query of an address, formatted and parsed."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
+from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
+from granforce.glossary import RELAXATIONS, typed_relaxation
+from granforce.packing.scenes import BLOCKS
+from granforce.records import InputError, brief, choice, friction
+from granforce.study.keys import Parameters
+from granforce.system.wording import integer, number
 from granforce.types import Integers
 
 from ..results.replays import Replay
+from ..results.selection import KINDS, OPTIONS, Selection, select, typed, unusual
 from . import known, pulls
 
 View = dict[str, Any]  # parameters stored in links
 Number = Callable[[int], int]
+# Characters of a message about a link, which may contain anything, and of a whole number in a link
+# that Python converts.
+LONGEST_REASON, MOST_DIGITS = 200, 4000
+
+# The selection
+
+
+def link(selection: Selection, view: dict[str, Any]) -> str:
+    """The query of an address that reopens this selection with the view {name: plain value}."""
+    packing = selection.packing
+    if selection.imported:
+        given = {"packing": packing.get("imported"), "scene": packing.get("scene")}
+        given = {name: value for name, value in given.items() if value}
+    else:
+        given = {"n": packing["n"], "seed": packing["seed"], **unusual(packing)}
+    given["mu"] = f"{selection.mu:.9g}"
+    if not selection.same_mu:
+        given["packed"] = f"{packing['mu']:.9g}"
+    given |= {"source": selection.kind, "states": selection.states}
+    if selection.kind == "walk":
+        given["relax"] = typed_relaxation(selection.relax)
+    if selection.seed:
+        given["walkseed"] = selection.seed
+    return urlencode(given | view)
+
+
+def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
+    """(Selection or None, {name: text} of everything else) from a link's query.
+
+    InputError for an invalid selection; a link without "mu" selects nothing, unless it has a scene.
+    """
+    pairs = parse_qsl(query.lstrip("?"))
+    given = dict(pairs)
+    try:
+        for name, count in Counter(name for name, _ in pairs).items():
+            if count > 1:
+                raise InputError(f"it contains {brief(name)} {count} times")
+        if given.get("scene") in BLOCKS:
+            given.setdefault("mu", str(BLOCKS[given["scene"]].mu))
+        return (_read_selection(given) if "mu" in given else None), given
+    except (ValueError, TypeError) as error:
+        raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
+
+
+def _read_selection(given: dict[str, str]) -> Selection:
+    kind = choice(given.pop("source", "walk"), KINDS, "source")
+    relax = given.pop("relax", "nearest")
+    if relax != "accelerated":  # as links of earlier versions call it
+        relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
+    mu = friction(typed(given.pop("mu")))
+    packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
+    rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
+    if "packing" in given:
+        packing = {"imported": given.pop("packing"), "mu": packed}
+        return Selection(packing, mu, kind, relax, **rest)
+    if "scene" in given:
+        scene = choice(given.pop("scene"), BLOCKS, "scene")
+        return Selection({"scene": scene, "mu": packed}, mu, kind, relax, **rest)
+    selection = select(
+        _whole(given, "n", 400),
+        mu,
+        _whole(given, "seed", 1),
+        packed,
+        given.pop("box", "square"),
+        kind=kind,
+        relax=relax,
+        **rest,
+    )
+    options: Parameters = {
+        name: (_whole if name == "sweeps" else _number)(given, name)
+        for name in OPTIONS
+        if name in given and name != "radii"
+    }
+    if "radii" in given:
+        options["radii"] = given.pop("radii")
+        if ":" not in options["radii"]:
+            raise InputError("radii in a link must be a named distribution")
+    return selection._replace(packing=selection.packing | options)
+
+
+def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
+    """The whole number of a name, which is taken out; InputError if it is no such number."""
+    text = given.pop(name, str(usual))
+    if not text.lstrip("+-").isdecimal():
+        raise InputError(f"{name} must be a whole number, got {brief(text)}")
+    if len(text) > MOST_DIGITS:
+        raise InputError(f"{name} must be a number of few digits, got {brief(text)}")
+    return int(text)
+
+
+def _number(given: dict[str, str], name: str) -> float:
+    """The number of a name, which is taken out; InputError if it is none."""
+    text = given.pop(name)
+    try:
+        return number(text)
+    except ValueError:
+        raise InputError(f"{name} must be a number, got {brief(text)}") from None
+
+
+# The view
 
 
 def _pair(text: str) -> tuple[int, int]:
-    a, b = (int(part) for part in text.split("-"))
+    a, b = (integer(part) for part in text.split("-"))
     return a, b
 
 
@@ -32,7 +140,7 @@ def _joined(pair: tuple[int, int]) -> str:
 
 
 def _place(text: str) -> tuple[float, ...]:
-    place = tuple(float(part) for part in text.split(":"))
+    place = tuple(number(part) for part in text.split(":"))
     if not all(abs(value) < 1e6 for value in place) or not place[-1] > 0:
         raise ValueError("no visible place")
     return place
@@ -65,16 +173,16 @@ class Stored(NamedTuple):
 # Parameters stored in a link if they differ from a new page.
 VIEW: dict[str, Stored] = {
     "tab": Stored(_tab),
-    "contact": Stored(int, key="select", numbered=lambda value, contact, _: contact(value)),
+    "contact": Stored(integer, key="select", numbered=lambda value, contact, _: contact(value)),
     "pair": Stored(_two, _joined, "span", lambda pair, contact, _: tuple(map(contact, pair))),
     "paused": Stored(_flag, int),
     "opened": Stored(lambda text: text.split("."), ".".join, "open"),
-    "frame": Stored(int, key="network", numbered=lambda value, _, network: network(value)),
-    "reference": Stored(int, key="pinned", numbered=lambda value, _, network: network(value)),
+    "frame": Stored(integer, key="network", numbered=lambda value, _, network: network(value)),
+    "reference": Stored(integer, key="pinned", numbered=lambda value, _, network: network(value)),
     "between": Stored(_pair, _joined, "swing", lambda pair, _, network: tuple(map(network, pair))),
     "zoom": Stored(_place, lambda place: ":".join(f"{value:g}" for value in place)),
     "split": Stored(_flag, int),
-    "beside": Stored(float),
+    "beside": Stored(number),
     "pulls": Stored(
         pulls.read, pulls.spelled, "pull",
         lambda given, contact, _: pulls.renumbered(given, contact),
@@ -85,8 +193,8 @@ VIEW: dict[str, Stored] = {
     ),
     "colour": Stored(str),
     "thickness": Stored(str),
-    "full": Stored(float),
-    "stretch": Stored(float),
+    "full": Stored(number),
+    "stretch": Stored(number),
     "drawn": Stored(str),
     "sort": Stored(str),
     "scale": Stored(str),

@@ -15,6 +15,7 @@ import param
 
 from granforce.live.pulls import Puller
 from granforce.records import InputError
+from granforce.system.wording import integer, number
 from granforce.types import Floats
 
 from ..background.jobs import Job, reading
@@ -291,16 +292,16 @@ def read(text: str) -> list[Pull]:
 
 
 def _read(name: str, *at: str) -> Pull:
-    values = tuple(float(value) for value in at)
+    values = tuple(map(number, at))
     if not all(abs(value) < 1e6 for value in values):
         raise ValueError("impossible forces")
     if len(values) == 2:
         planes.read(name)
         return name, *values
     (value,) = values
-    if int(name) < 0 or value < 0:
+    if integer(name) < 0 or value < 0:
         raise ValueError("impossible forces")
-    return int(name), value
+    return integer(name), value
 
 
 def renumbered(pulls: Iterable[Pull], number: Callable[[int], int]) -> list[Pull]:

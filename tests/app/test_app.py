@@ -42,18 +42,16 @@ from app.results.selection import (
     Selection,
     command,
     differing,
-    link,
-    read_link,
     select,
     selected,
 )
-from app.state import app_state, comparison, page_tasks, scene_links, visit
+from app.state import app_state, comparison, page_session, page_tasks, scene_links
 from app.state.app_state import AppState
 from app.state.known import Knowledge, Statement
-from app.state.links import Numbers, fitting, read_view, spelled
+from app.state.links import Numbers, fitting, link, read_link, read_view, spelled
+from app.state.page_session import waker
 from app.state.pulls import Hand
 from app.state.view_settings import SORTS, TABS, Looks
-from app.state.visit import turns
 from granforce import measures
 from granforce.cli import entry_point
 from granforce.experiment.measurements import Measurement
@@ -395,8 +393,8 @@ def test_the_theme_is_the_visitors_own_and_only_otherwise_that_of_a_link(state, 
     assert "dark" not in state.link()
     for chosen, given, dark in [(None, "0", False), (None, "1", True), ("1", "0", True)]:
         cookies = {"dark": chosen} if chosen else {}
-        monkeypatch.setattr(type(visit.pn.state), "cookies", cookies)
-        assert visit.dark(f"?mu=0.1&dark={given}") == dark
+        monkeypatch.setattr(type(page_session.pn.state), "cookies", cookies)
+        assert page_session.dark(f"?mu=0.1&dark={given}") == dark
 
 
 @pytest.mark.parametrize("packed", [None, 0.0])
@@ -775,7 +773,7 @@ BEYOND = {
     "drag_below": ("0", "-1", "1.1", "1e-7", "nan"),
     "pressure": ("0", "1e-300", "1e300", "inf", "nan"),
     "radii": (
-        "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1", "uniform:1,2,3,", "uniform:",
+        "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1", "uniform:1,2,3,", "uniform:1_0,9",
         "bidisperse:1,30,0.5", "bidisperse:-1,1,0.5", "x:" + "1," * 9000,
     ),
     "source": ("oracle", "x" * 9000),
@@ -801,7 +799,19 @@ def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
 
 
 # No number, for any of the keys that take one; and digits of other scripts, which count as digits.
-NO_NUMBER = "9" * 5000 + "x", "²", "0x10", "True", "[1]", "1\n2", "💥", "\0", "1~" * 9000, " "
+NO_NUMBER = (
+    "9" * 5000 + "x",
+    "1_5",
+    "²",
+    "0x10",
+    "True",
+    "[1]",
+    "1\n2",
+    "💥",
+    "\0",
+    "1~" * 9000,
+    " ",
+)
 
 
 @pytest.mark.parametrize("key", ["n", "seed", "states", "walkseed", "sweeps", "mu", "dt", "packed"])
@@ -1421,7 +1431,7 @@ def test_a_page_is_only_called_within_the_loop_and_while_it_is_there():
 
     async def visit():
         page = Page()
-        wake = turns(page)
+        wake = waker(page)
         await asyncio.to_thread(wake, print)
         await asyncio.sleep(0)
         page.session_context = None

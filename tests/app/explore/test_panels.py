@@ -43,8 +43,8 @@ from app.results import distributions, planes, study_data, uploads
 from app.results.library import Library
 from app.results.replays import first_replay
 from app.results.saved_file import csv
-from app.results.selection import link, read_link
 from app.state import perturbations
+from app.state.links import link, read_link
 from app.state.scene_links import request_of
 from app.widgets import label_places
 from app.widgets.file_drop import Dropper

@@ -16,8 +16,9 @@ from app.explore.tabs.export import export
 from app.packing.view import measured
 from app.results import compute, progress_feed, uploads
 from app.results.library import Library
-from app.results.selection import Selection, read_link
+from app.results.selection import Selection
 from app.state.app_state import AppState
+from app.state.links import read_link
 from granforce.study import cells as study
 from granforce.study import kinds
 

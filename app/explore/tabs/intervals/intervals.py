@@ -55,14 +55,18 @@ class View(TabView):
         self.units = question("Unit", SCALES, self.looks, "scale", **SMALL)
         self.choices = [self.drawn, self.sorts, self.units]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
-        self.lead, self.details = note("Opening the packing …"), note()
+        self.lead, self.details = note(), note()
         self.exact.on_click(lambda event: state.compute_exact())
         state.knowledge.param.watch(self.refresh, ["narrowed", "known"])
         state.hand.param.watch(self._explain, "pulls")
+        state.param.watch(self._explain, "missing")
         state.param.watch(self._offer, ["shown", "exact"])
         for task in (state.work.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
+        for task in (state.work.computation, state.work.reader):
+            task.param.watch(self._explain, "running")
         self._offer()
+        self._explain()
         self.catch_up()
 
     def panel(self) -> pn.Column:
@@ -118,7 +122,9 @@ class View(TabView):
     def _explain(self, *events: Any) -> None:
         """Say what is drawn."""
         replay = self.state.shown
-        if replay is not None and self._drawn is not None:
+        if replay is None:
+            self.lead.object = self.state.nothing
+        elif self._drawn is not None:
             self.lead.object = sentence(self.state, replay, *self._drawn)
 
     def _choose(self, contact: int) -> None:

@@ -8,6 +8,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from granforce.records import InputError, brief, friction, make_cell, positive
+from granforce.system.wording import number
 
 from ....background.limits import LIMITS
 from ....results import photoelastic_frames, uploads
@@ -179,7 +180,7 @@ class View:
         gravity = (self.gravity.value_input or self.gravity.value).strip() or "0"
         options = {
             "box": box,
-            "tilt": make_cell(box, _number(sides[2])).tilt if box and sides[2:] else 0.0,
+            "tilt": make_cell(box, _tilt(sides[2])).tilt if box and sides[2:] else 0.0,
             "walls": self.around.value or None,
             "gravity": positive(typed(gravity), "Gravity", or_zero=True),
         }
@@ -238,8 +239,8 @@ class View:
         self.error.param.update(title=line, visible=bool(line))
 
 
-def _number(tilt: str) -> float:
+def _tilt(text: str) -> float:
     try:
-        return float(tilt)
+        return number(text)
     except ValueError:
-        raise InputError(f"the tilt must be a number, got {brief(tilt)}") from None
+        raise InputError(f"the tilt must be a number, got {brief(text)}") from None

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 from bokeh.document import Document
 
+from app.state.page_session import DISCONNECTED_MS, poll_while_running
 from app.state.page_tasks import Work
-from app.state.visit import DISCONNECTED_MS, poll_while_running
 
 PATIENCE = 60  # s, on a busy machine
 

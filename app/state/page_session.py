@@ -48,7 +48,7 @@ def at_end(*closes: Callable[[], object]) -> None:
     pn.state.on_session_destroyed(end)
 
 
-def turns(document: Document) -> Callable[[Callable[[], object]], None]:
+def waker(document: Document) -> Callable[[Callable[[], object]], None]:
     """wake(function): call it soon on the page's thread, when its changes can be sent."""
     loop = IOLoop.current()
 
