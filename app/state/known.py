@@ -325,15 +325,21 @@ def narrowing(
         given: dict[str, Any] = {"mu": selection.mu, "known": rows(shown.replay, known)}
         params = kinds.INTERVALS.parameters(selection.packing, **given)
         stage = "exact intervals given the known forces"
-        options: dict[str, Any] = {"widths": affected(shown.replay, known), "watch": bounds.add}
+        options: dict[str, Any] = {
+            "widths": expected_changes(shown.replay, known),
+            "watch": bounds.add,
+        }
         dataset = compute.load_or_compute(library, job, stage, kinds.INTERVALS, params, **options)
         return Narrowed(known, whole, dataset)
 
     return work
 
 
-def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
-    """(N_c,) correlation of f_n with known forces over the states shown; largest for known ones."""
+def expected_changes(replay: Replay, known: Iterable[Statement]) -> Floats:
+    """(N_c,) by how much f_n changes with a known force, over the states shown; most for known ones.
+
+    It is the covariance with that force, over the force's own spread.
+    """
     off = replay.normal[1:] - replay.normal[1:].mean(axis=0)
     spread = np.maximum(off.std(axis=0), DETERMINED)
     chosen = [one.contact for one in known]

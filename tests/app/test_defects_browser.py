@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from packings import packed
 from serving import (
     MANY,
     MODEL,
@@ -22,6 +23,8 @@ from serving import (
     until,
 )
 from small_store import ROOT
+
+import granforce as gf
 
 # 1: Back and Forward
 
@@ -210,19 +213,18 @@ def test_number_fields_take_whole_numbers_and_typing_after_enter(visit):
 # 5: Uploaded packings
 
 
-def test_uploaded_packings_show_their_own_number_of_disks_and_stay(visit):
+def test_uploaded_packings_show_their_own_number_of_disks_and_stay(visit, tmp_path):
     page = visit("?tab=upload")
-    lammps, given = ROOT / "tests" / "lammps", page.locator("input[type=file]")
-    given.set_input_files(lammps / "lammps_n400_mu0.3.particles.dump")
-    page.get_by_text("Now drop the dump of the contacts").wait_for()
-    given.set_input_files(lammps / "lammps_n400_mu0.3.contacts.dump")
+    given = page.locator("input[type=file]")
+    gf.save_packing(packed(40, 0.3), tmp_path / "mine.npz")
+    given.set_input_files(tmp_path / "mine.npz")
     page.get_by_text("dimension h of S").wait_for()
     searched(page, "packing=")
     given.set_input_files(ROOT / "LICENSE")
     page.get_by_text("neither an NPZ of granforce").wait_for()
     page.get_by_text("dimension h of S").wait_for(state="detached")
-    page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
-    expect(how_it_is_made(page).get_by_role("spinbutton", name="Disks N")).to_have_value("400")
+    page.locator(".source", has_text="mine.npz").wait_for(state="attached")
+    expect(how_it_is_made(page).get_by_role("spinbutton", name="Disks N")).to_have_value("40")
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
     # Neither a look at Learn nor its link back loses the packing and the view.
     page.get_by_role("tab", name="Friction").click()
@@ -231,7 +233,7 @@ def test_uploaded_packings_show_their_own_number_of_disks_and_stay(visit):
         page.get_by_role("link", name="Learn", exact=True).first.click()
         page.get_by_role("heading", name="How hard does the wall press?").first.wait_for()
         back()
-        page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
+        page.locator(".source", has_text="mine.npz").wait_for(state="attached")
         page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
         searched(page, "packing=")
 
