@@ -336,7 +336,7 @@ def narrowing(
 
 
 def expected_changes(replay: Replay, known: Iterable[Statement]) -> Floats:
-    """(N_c,) by how much f_n changes with a known force, over the states shown; most for known ones.
+    """(N_c,) change of f_n that goes with a known force over the states; largest for known ones.
 
     It is the covariance with that force, over the force's own spread.
     """

@@ -8,7 +8,7 @@ from small_store import DISKS
 from visitor import wait_for
 
 import granforce as gf
-from app.background.jobs import Job, turn_of
+from app.background.jobs import Job, Later, turn_of
 from app.explore.controls import Controls
 from app.explore.status_line import StatusLine
 from app.explore.tabs.export import export
@@ -150,7 +150,7 @@ def test_who_waits_for_exact_bounds_leaves_those_under_way_alone(library, import
     first = state.replay.backbone[0]
     feed.restart(SimpleNamespace(index=state.replay.backbone, force_scale=2.0))
     turn = turn_of((kinds.INTERVALS.name, params))
-    with turn.lock, pytest.raises(turns.Later):
+    with turn.lock, pytest.raises(Later):
         compute.exact(library, shown)(Job(lambda job: None))
     feed.add(SimpleNamespace(component=0, side=0, contact=first, value=1.0))
     assert feed.low[0] == 0.5
