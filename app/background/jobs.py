@@ -11,7 +11,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -24,6 +24,7 @@ from granforce.system import cancelling
 
 from .gc_pauses import settle
 from .limits import LIMITS
+from .notifications import as_one
 
 # Time, s, and part of a stage after which its end can be estimated: earlier, it is off by factors.
 ESTIMATED, ESTIMATED_PART = 4.0, 0.05
@@ -365,15 +366,6 @@ def error_line(error: BaseException) -> str:
     if isinstance(error, InputError):
         return line
     return f"the computation failed: {type(error).__name__}: {line}"
-
-
-@contextmanager
-def as_one(*parts: param.Parameterized) -> Iterator[None]:
-    """Announce changes of these parts together, when all are set; the last part announces first."""
-    with ExitStack() as stack:
-        for part in parts:
-            stack.enter_context(param.parameterized.batch_call_watchers(part))
-        yield
 
 
 class Task(param.Parameterized):

@@ -9,6 +9,7 @@ from granforce.records import InputError, friction
 
 from ..background.jobs import reading
 from ..background.limits import LIMITS, MOST_SEED
+from ..background.notifications import observe
 from ..results import study_data
 from ..results.library import SOURCES
 from ..results.selection import KINDS, SOLVERS, Selection, differing, select, typed, unusual
@@ -129,12 +130,11 @@ class Controls:
             widget.param.watch(lambda event: self._ask(), "value")
         self.series.param.watch(self._choose, "value")
         self.go.on_click(lambda event: state.compute())
-        state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        state.param.watch(self._command, ["selection", "missing", "replay"])
-        state.knowledge.param.watch(self._command, "known")
+        observe(self._follow, state, "selection", "missing", "catalogue", "cell")
+        observe(self._command, state, "selection", "missing", "replay", "knowledge.known")
         self._command()
-        self.work.param.watch(self._refused, "message")
-        self.work.computation.param.watch(self._rest, "running")
+        observe(self._refused, self.work, "message")
+        observe(self._rest, self.work, "computation.running")
 
     # From the widgets
 

@@ -7,6 +7,7 @@ from typing import Any
 import param
 import xarray as xr
 
+from ..background.notifications import observe
 from ..browser.bundle import Scripted
 from ..browser.messages import from_browser
 from ..results import compute
@@ -34,11 +35,11 @@ class Results(Scripted):
         super().__init__(**params)
         self._state, self._work = state, state.work
         self._volume: xr.Dataset | None = None
-        state.param.watch(self._look, "replay")
-        state.param.watch(self._tell, ["exact", "shown", "missing"])
-        state.work.computation.param.watch(self._tell, "running")
-        state.knowledge.param.watch(self._tell, ["known", "narrowed"])
-        self._work.measuring.param.watch(self._tell, "running")
+        observe(self._look, state, "replay")
+        observe(
+            self._tell, state, "exact", "shown", "missing", "work.computation.running",
+            "knowledge.known", "knowledge.narrowed", "work.measuring.running",
+        )  # fmt: skip
         self._look()
 
     def _look(self, *events: Any) -> None:

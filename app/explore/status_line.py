@@ -7,6 +7,7 @@ import numpy as np
 import param
 
 from ..background.jobs import Job, reading
+from ..background.notifications import observe
 from ..browser.bundle import Scripted
 from ..browser.messages import from_browser
 from ..results.library import Cell
@@ -33,12 +34,12 @@ class StatusLine(Scripted):
         self._state, work = state, state.work
         self._rest: tuple[Cell, bool] | None = None  # whether it was tested
         self._looking = work.task(reading, reported=False)
-        state.param.watch(self._tell, ["replay", "exact", "missing", "cell"])
-        for task in (work.computation, work.reader):
-            task.param.watch(self._tell, "running")
-        state.param.watch(self._look, "cell")
-        state.knowledge.param.watch(self._tell, ["known", "narrowed"])
-        work.param.watch(self._report, ["message", "progress"])
+        observe(
+            self._tell, state, "replay", "exact", "missing", "cell", "knowledge.known",
+            "knowledge.narrowed", "work.computation.running", "work.reader.running",
+        )  # fmt: skip
+        observe(self._look, state, "cell")
+        observe(self._report, work, "message", "progress")
         self._look()
         self._tell()
         self._report()

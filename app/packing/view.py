@@ -8,6 +8,7 @@ from bokeh.document import Document
 
 from granforce.types import Floats
 
+from ..background.notifications import observe
 from ..results import compute, progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.planes import Plane
@@ -89,29 +90,25 @@ class PackingView:
         for name in ("between", "zoom"):
             self.player.param.watch(self._go, name)
         looks.param.watch(self._follow, APPEARANCE)
-        state.param.watch(self._follow, ["source", "loads"])
-        state.work.param.watch(self._follow, "busy")
-        state.param.watch(self._show, ["shown", "exact", "measured"])
-        state.knowledge.param.watch(self._show, "narrowed")
-        looks.param.watch(self._show, ["between", "full"])
-        state.param.watch(self._pin, "replay")
-        state.knowledge.param.watch(self._pin, ["known", "ranked"])
-        state.param.watch(self._displace, "displacement")
-        state.comparison.param.watch(self._accompany, "twin")
+        observe(self._follow, state, "source", "loads", "work.busy")
+        observe(
+            self._show, state, "shown", "exact", "measured", "knowledge.narrowed", "looks.between",
+            "looks.full",
+        )  # fmt: skip
+        observe(self._pin, state, "replay", "knowledge.known", "knowledge.ranked")
+        observe(self._displace, state, "displacement")
+        observe(self._accompany, state, "comparison.twin")
         dress = self.player.param.update
-        state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
-        looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
-        looks.param.watch(
-            self._explain,
-            ["colour", "thickness", "full", "stretch", "dark", "tab", "reference", "pulled"],
-        )
-        looks.param.watch(self._turn, "tab")
-        state.param.watch(self._explain, ["shown", "exact", "loads", "measured"])
-        state.knowledge.param.watch(self._explain, ["known", "narrowed"])
-        state.hand.param.watch(self._explain, "pulls")
-        state.work.param.watch(self._explain, "moving")
+        observe(lambda event: dress(plane=projection(event.new)), state, "plane")
+        observe(lambda event: dress(palettes=palettes(event.new)), looks, "dark")
+        observe(
+            self._explain, state, "looks.colour", "looks.thickness", "looks.full", "looks.stretch",
+            "looks.dark", "looks.tab", "looks.reference", "looks.pulled", "shown", "exact", "loads",
+            "measured", "knowledge.known", "knowledge.narrowed", "hand.pulls", "work.moving",
+        )  # fmt: skip
+        observe(self._turn, looks, "tab")
         self.thrust = state.work.task(reported=False)
-        state.param.watch(self._bound_thrust, "replay")
+        observe(self._bound_thrust, state, "replay")
         self._show()
         self._accompany()
         self._bound_thrust()

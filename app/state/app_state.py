@@ -10,8 +10,9 @@ import param
 
 from granforce.records import InputError
 
-from ..background.jobs import Job, Visitor, as_one
+from ..background.jobs import Job, Visitor
 from ..background.limits import LIMITS
+from ..background.notifications import as_one, observe
 from ..results import compute
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from ..results.progress_feed import Arriving, Following, numbers
@@ -87,13 +88,10 @@ class AppState(param.Parameterized):
         self._viewed: dict[str, Any] = {
             name: part.param[name] for name in VIEW for part in self.parts if name in part.param
         }
-        self.param.watch(self._need_loads, "replay")
-        self.looks.param.watch(self._need_loads, ["colour", "thickness"])
+        observe(self._need_loads, self, "replay", "looks.colour", "looks.thickness")
         self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
         self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
-        self.param.watch(self._forget, "cell")
-        self.knowledge.param.watch(self._forget, "known")
-        self.hand.param.watch(self._forget, "pulls")
+        observe(self._forget, self, "cell", "knowledge.known", "hand.pulls")
         if query is not None:
             self.open(query)
 

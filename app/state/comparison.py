@@ -7,6 +7,7 @@ import param
 from granforce.records import InputError
 
 from ..background.limits import LIMITS
+from ..background.notifications import observe
 from ..results import compute
 from ..results.library import Shown, cell_of
 from ..results.selection import Selection
@@ -25,8 +26,7 @@ class Comparison(param.Parameterized):
     def __init__(self, state: Any) -> None:
         super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.looks, self.task = state, state.looks, state.work.task()
-        state.param.watch(self._follow, ["cell", "missing"])
-        self.looks.param.watch(self._follow, ["split", "beside"])
+        observe(self._follow, state, "cell", "missing", "looks.split", "looks.beside")
 
     def keep(self, selection: Selection) -> None:
         """React to a new Selection: if only μ differs, the present states become the comparison."""

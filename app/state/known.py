@@ -15,7 +15,8 @@ from granforce.system.wording import integer, number
 from granforce.tolerances import CARRYING
 from granforce.types import Floats, Integers
 
-from ..background.jobs import Job, Task, as_one
+from ..background.jobs import Job, Task
+from ..background.notifications import as_one
 from ..results import compute
 from ..results.library import Cell, Library, Shown
 from ..results.replays import Replay

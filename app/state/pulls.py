@@ -19,6 +19,7 @@ from granforce.system.wording import integer, number
 from granforce.types import Floats
 
 from ..background.jobs import Job, reading
+from ..background.notifications import observe
 from ..results import planes
 from ..results.library import Cell, Library
 from ..results.replays import Replay, flat
@@ -74,9 +75,7 @@ class Hand(param.Parameterized):
         self._followed: tuple[Any, ...] = self._all
         self._task.param.watch(self._failed, "message")
         self.param.watch(self._follow, "pulls")
-        state.param.watch(self._follow, "replay")
-        state.looks.param.watch(self._follow, "frame")
-        state.knowledge.param.watch(self._follow, "known")
+        observe(self._follow, state, "replay", "looks.frame", "knowledge.known")
 
     def grab(self, contact: int) -> None:
         """Select a contact and compute its rail, from the network on screen."""

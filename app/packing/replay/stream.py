@@ -5,6 +5,7 @@ from typing import Any
 
 from bokeh.document import Document
 
+from ...background.notifications import observe
 from ...browser.panel_patches import together
 from ...state.app_state import AppState
 
@@ -22,8 +23,7 @@ class Stream:
         self._sent = self.painted = 0  # numbers of the last messages sent, and painted
         self.visible, self._ticking = False, None
         self.work.param.watch(self._follow, ["live", "arriving"])
-        state.param.watch(self._show, ["missing", "selection", "cell"])
-        self.work.param.watch(self._show, "busy")
+        observe(self._show, state, "missing", "selection", "cell", "work.busy")
         self._follow()
 
     def start(self, visible: bool) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import panel_material_ui as pmui
 
 from ....background.jobs import WAITING
+from ....background.notifications import observe
 from ....browser.panel_patches import together
 from ....results import compute, planes
 from ....results.library import Shown
@@ -28,8 +29,7 @@ class OtherStates:
         self.switch = pmui.Switch(label=ALSO["uniform"], size="small", margin=(6, 8))
         self.task = state.work.task()
         self.switch.param.watch(lambda event: together(self.fetch), "value")
-        self.task.param.watch(self._tell, "running")
-        state.work.param.watch(self._tell, "progress")
+        observe(self._tell, self, "task.running", "state.work.progress")
 
     @property
     def kind(self) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 
+from ....background.notifications import observe
 from ....packing.view import exact_intervals
 from ....results.replays import Replay, worded
 from ....state.app_state import AppState
@@ -57,14 +58,10 @@ class View(TabView):
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.lead, self.details = note(), note()
         self.exact.on_click(lambda event: state.compute_exact())
-        state.knowledge.param.watch(self.refresh, ["narrowed", "known"])
-        state.hand.param.watch(self._explain, "pulls")
-        state.param.watch(self._explain, "missing")
-        state.param.watch(self._offer, ["shown", "exact"])
-        for task in (state.work.computation, state.knowledge.task):
-            task.param.watch(self._offer, "running")
-        for task in (state.work.computation, state.work.reader):
-            task.param.watch(self._explain, "running")
+        observe(self.refresh, state, "knowledge.narrowed", "knowledge.known")
+        running = "work.computation.running"
+        observe(self._explain, state, "hand.pulls", "missing", running, "work.reader.running")
+        observe(self._offer, state, "shown", "exact", running, "knowledge.task.running")
         self._offer()
         self._explain()
         self.catch_up()

@@ -7,6 +7,7 @@ import param
 
 from granforce.types import Integers
 
+from ....background.notifications import observe
 from ....browser.bundle import Scripted
 from ....browser.messages import from_browser
 from ....state.app_state import AppState
@@ -33,11 +34,11 @@ class Known(Scripted):
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
-        state.param.watch(self._show, "shown")
-        state.looks.param.watch(self._show, "contact")
-        state.knowledge.param.watch(self._show, ["known", "narrowed", "ranked"])
-        for task in (state.knowledge.task, state.knowledge.ranking):
-            task.param.watch(self._show, "running")
+        observe(self._show, state, "shown", "looks.contact")
+        observe(
+            self._show, state.knowledge, "known", "narrowed", "ranked", "task.running",
+            "ranking.running",
+        )  # fmt: skip
         self._show()
 
     @from_browser(release=int)
