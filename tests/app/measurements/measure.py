@@ -3,11 +3,9 @@
     python tests/app/measurements/measure.py [PART …]
 
 Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
-crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
-loop while pages and tabs open and while it computes), watching (first moving picture, pictures and
-states a second, what watching costs), dragging (of a force, in blocks too, and of the point in
-force space: frames a second, hand to picture), memory (over open–close cycles), visitors (ten at
-once).
+stalls (of the server's event loop while pages and tabs open and while it computes), dragging (of a
+force, in blocks too, and of the point in force space: frames a second, hand to picture), memory
+(over open–close cycles).
 Each starts a server of its own on the shipped store.
 """
 
@@ -29,7 +27,6 @@ from serving import (  # noqa: E402
     ask,
     chain,
     here,
-    how_it_is_made,
     painted,
     place,
     scene,
@@ -119,31 +116,16 @@ def opening(stage):
 
 def playing(stage):
     """400 disks: painted frames a second, and what they cost the server."""
-    _play(stage, "", "400 disks")
-
-
-def crowd(stage):
-    """The same of 10,000 disks."""
-    query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=nearest"
-    page, _ = stage.open(query)
-    player = "Bokeh.documents[0].get_model_by_name('player')?.player"
-    contacts = f"() => {player}?.replay?.walk.contacts > 10000"
-    page.wait_for_function(contacts)
-    page.context.close()
-    _play(stage, query, "10,000 disks")
-
-
-def _play(stage, query, words):
-    page, _ = stage.open(query, still=True)
+    page, _ = stage.open(still=True)
     page.wait_for_timeout(4000)
     page.locator("input.speed").fill("1")
-    print(f"{words}: segments {scene(page, 'scene.counts')}")
+    print(f"segments {scene(page, 'scene.counts')}")
     before = page.bytes
     page.locator("button.play").click()
     rate, frames = _rate(page, lambda: page.wait_for_timeout(3000))
     page.locator("button.play").click()
     sent = (page.bytes - before) / frames
-    print(f"{words}: playing: {rate:.1f} painted frames a second, {sent:.0f} bytes a frame")
+    print(f"playing: {rate:.1f} painted frames a second, {sent:.0f} bytes a frame")
     box = page.locator(".scene").bounding_box()
     free = scene(page, FREE)
     x, y = box["x"] + free[0], box["y"] + free[1]
@@ -157,7 +139,7 @@ def _play(stage, query, words):
 
     rate, _ = _rate(page, drag)
     page.mouse.up()
-    print(f"{words}: panning: {rate:.1f} painted frames a second")
+    print(f"panning: {rate:.1f} painted frames a second")
     page.context.close()
 
 
@@ -198,88 +180,6 @@ def _longest(log):
     log.write_text("")
     gap, spent = max(tuple(map(float, line.split()[1:])) for line in lines)
     return f"{1000 * gap:.0f} ms ({1000 * spent:.0f} ms of them the server's own)"
-
-
-LOG = """e => {
-    const {hand} = e.scene, {live} = hand.player, {hear} = Object.getPrototypeOf(live)
-    window.log = {begin: performance.now(), pictures: [], states: []}
-    live.hear = (news) => {
-        const now = performance.now() - log.begin, {states} = news
-        const found = states && (states.number ?? states.get("number"))
-        if (found) log.states.push([now, found.length, found[found.length - 1]])
-        else requestAnimationFrame(() => log.pictures.push(performance.now() - log.begin))
-        hear.call(live, news)
-    }
-}"""
-
-
-def watching(stage):
-    """A new μ at 400 disks: when it is seen to move, pictures and states a second, bytes."""
-    page, _ = stage.open()
-    page.wait_for_timeout(4000)
-    for mu in ("0.17", "0.18"):
-        page.locator(".scene").evaluate(LOG)
-        before = page.bytes
-        ask(page, mu)
-        until(page, f"scene.geometry.mu === {mu} && !scene.hand.player.grows")
-        log = page.evaluate("log")
-        pictures, states = log["pictures"], log["states"]
-        seconds = (pictures[-1] - pictures[0]) / 1000
-        walked = (states[-1][0] - states[0][0]) / 1000
-        print(
-            f"μ = {mu}: first moving picture after {pictures[0] / 1000:.2f} s, "
-            f"{(len(pictures) - 1) / seconds:.0f} pictures a second for {seconds:.1f} s, "
-            f"{sum(count for _, count, _ in states) / walked:.0f} states a second seen of "
-            f"{states[-1][2] / walked:.0f} computed, "
-            f"{(page.bytes - before) / 1e6:.1f} MB in all"
-        )
-    page.context.close()
-    _watch_many(stage)
-    _cost_of_watching()
-
-
-def _watch_many(stage, disks=5000, seconds=20):
-    """Pictures a second while so many disks are compressed, from the first on."""
-    page, _ = stage.open()
-    page.wait_for_timeout(3000)
-    page.locator(".scene").evaluate(LOG)
-    how_it_is_made(page)
-    page.get_by_label("Disks N").first.fill(str(disks))
-    page.get_by_label("Disks N").first.press("Enter")
-    page.wait_for_function("() => log.pictures.length > 0")
-    page.wait_for_timeout(1000 * seconds)
-    pictures = page.evaluate("log.pictures")
-    spent = (pictures[-1] - pictures[0]) / 1000
-    print(
-        f"{disks} disks: first moving picture after {pictures[0] / 1000:.2f} s, "
-        f"{(len(pictures) - 1) / spent:.0f} pictures a second for {spent:.1f} s"
-    )
-    page.get_by_role("button", name="Cancel").first.click()
-    page.context.close()
-
-
-def _cost_of_watching():
-    """How much longer compaction and walk take while they are watched, in this process."""
-    import granforce as gf
-
-    def spent(work, rounds=3):
-        times = []
-        for _ in range(rounds):
-            begin = time.perf_counter()
-            done = work()
-            times.append(time.perf_counter() - begin)
-        return min(times), done
-
-    seen = []
-    gf.pack(12, 0.5, 0, watch=seen.append)
-    alone, packing = spent(lambda: gf.pack(400, 0.1, 1))
-    watched, _ = spent(lambda: gf.pack(400, 0.1, 1, watch=seen.append))
-    print(f"compaction of 400 disks: {alone:.2f} s, watched {watched:.2f} s")
-    S = gf.ensemble(packing)
-    gf.walk(S, 2, 0)
-    alone, _ = spent(lambda: gf.walk(S, 100, 0))
-    watched, _ = spent(lambda: gf.walk(S, 100, 0, watch=seen.append))
-    print(f"100 states: {alone:.2f} s, watched {watched:.2f} s")
 
 
 GRABBED = """e => {
@@ -373,32 +273,7 @@ def memory(stage, cycles=50):
     print(f"server's memory: {before:.0f} MB after 5 pages, {after:.0f} MB after {cycles} more")
 
 
-def visitors(stage, count=10):
-    """Ten pages at once while two of them compute: time to change μ, and stalls.
-
-    They stand still: visitors paint on machines of their own, these ten on that of the server.
-    """
-    pages = [stage.open(still=True)[0] for _ in range(count)]
-    for page, mu in zip(pages, ("0.15", "0.25"), strict=False):
-        ask(page, mu)
-    time.sleep(1)
-    _longest(stage.folder / "stalls")
-    spent = []
-    for page in pages[2:]:
-        before, begin = scene(page, "scene.geometry.mu"), time.perf_counter()
-        page.locator(".friction input[type=range]").press("ArrowRight")
-        until(page, f"scene.geometry.mu !== {before}")
-        spent.append(time.perf_counter() - begin)
-    print(
-        f"{count} visitors, 2 computing: change of μ mean {1000 * sum(spent) / len(spent):.0f} ms, "
-        f"longest {1000 * max(spent):.0f} ms; longest stall of the loop "
-        f"{_longest(stage.folder / 'stalls')}; memory {stage.memory():.0f} MB"
-    )
-
-
-PARTS = {
-    f.__name__: f for f in (opening, playing, crowd, watching, dragging, stalls, memory, visitors)
-}
+PARTS = {f.__name__: f for f in (opening, playing, dragging, stalls, memory)}
 
 
 def main(names):
