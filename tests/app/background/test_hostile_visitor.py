@@ -79,14 +79,14 @@ def test_pages_that_are_asked_for_and_never_shown_hold_no_thread(page, address):
     computes(page, address, 12)
 
 
-def test_twenty_pages_opened_and_closed_while_computing(page, address):
+def test_many_pages_opened_and_closed_while_computing(page, address):
     # By a page, as a visitor's browser does: Playwright's own close may wait for ever.
     page.goto(address)
-    for number in range(20):
+    for number in range(8):
         with page.expect_popup() as opened:
-            asked = address + LONG.format(20 + number % 7)
+            asked = address + LONG.format(20 + number % 3)
             page.evaluate("url => { window.opened = window.open(url) }", asked)
-        if number % 10 == 0:
+        if number % 4 == 0:
             computing(opened.value)
         page.evaluate("opened.close()")
     computes(page, address, 13)
@@ -106,11 +106,9 @@ VIEW = (
     "names, given, told",
     [
         (SELECTION, "", "this link cannot be read: source must be walk or uniform"),
-        (SELECTION[:10], "", "this link cannot be read: friction coefficient 1e+300 is too"),
-        (("sweeps",), "mu=0.2&n=30&states=3&seed=14&", "the number of sweeps must lie between"),
         (VIEW, "mu=0.1&n=30&states=30&relax=nearest_piqp&", "seen in all 30 networks"),
     ],
-    ids=["every parameter", "every number", "sweeps", "every choice of the view"],
+    ids=["every parameter", "every choice of the view"],
 )
 def test_a_link_with_the_largest_numbers_computes_nothing(page, address, names, given, told):
     """One line says what is too large, and the usual states are seen; each alone: test_app.py."""
@@ -179,10 +177,9 @@ def test_a_server_says_that_it_is_alive(tmp_path):
         server.wait(20)
 
 
-@pytest.mark.parametrize("options", [(), ("--warm",)])
-def test_limits_that_cannot_be_read_keep_the_server_from_starting(tmp_path, options):
+def test_limits_that_cannot_be_read_keep_the_server_from_starting(tmp_path):
     with pytest.raises(RuntimeError, match="the server ended"):
-        with serve(tmp_path, *options, GRANFORCE_LIMITS="disks=4") as _:
+        with serve(tmp_path, "--warm", GRANFORCE_LIMITS="disks=4") as _:
             pass
     (line,) = (tmp_path / "log").read_text().splitlines()
     assert line.startswith("GRANFORCE_LIMITS: 'disks=4' is not one of n, states, upload")
