@@ -294,11 +294,17 @@ def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(query, visited
 
 
 def test_the_view_travels_with_the_link(state, visited):
-    seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
-    state.looks.param.update(**seen, stretch=2.0)
-    again = visited(state.link())
+    """With what single tabs show, and with its panels; a view that rests, rests again."""
+    seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent", "stretch": 2.0}
+    seen |= {"paused": True, "opened": ["made", "check"], "sort": "extent", "pushing": "all"}
+    seen |= {"axes": "stress", "zoom": (3.5, 4.25, 2.0)}
+    state.looks.param.update(**seen)
+    again = visited(f"?{state.link()}")
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
+    older = "mu=0.1&n=30&states=30&relax=nearest_piqp"
+    assert visited(f"{older}&frame=4").looks.paused  # as it was meant
+    assert not visited(older).looks.paused
 
 
 def test_a_view_that_is_gone_back_to_is_settled_once_it_is_there_or_refused(state):
@@ -358,16 +364,6 @@ def test_all_networks_of_a_walk_can_be_kept_and_the_view_stays(state):
     assert len(state.cells()) == cells and state.work.message == ""
 
 
-def test_a_link_reopens_a_view_that_rests_with_its_panels(state, visited):
-    state.looks.param.update(paused=True, opened=["made", "check"], frame=4, sort="extent")
-    again = visited(state.link())
-    assert again.view == state.view and again.looks.paused
-    assert visited(
-        "mu=0.1&n=30&states=30&relax=nearest_piqp&frame=4"
-    ).looks.paused  # as it was meant
-    assert not visited("mu=0.1&n=30&states=30&relax=nearest_piqp").looks.paused
-
-
 def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
     query = "mu=0.1&n=30&states=30&relax=nearest_piqp"
     numbers = visited(query).replay.number
@@ -423,12 +419,6 @@ def test_state_opens_near_mu_0_1_and_follows_the_selection(state):
     state.choose(mu=1)
     wait_for(state)
     assert state.replay.summary["mu"] == 1 and "precomputed" in state.source
-
-
-def test_a_cell_in_memory_is_shown_at_once(state):
-    state.library.shown(cell_at(state.library, 1))
-    state.choose(mu=1)
-    assert state.cell.mu == 1 and not state.work.busy
 
 
 def test_the_nearest_mu_are_read_ahead_and_no_others(state, monkeypatch):
@@ -624,14 +614,6 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
     wait_for(state)
     assert state.selection.states == 4
     np.testing.assert_array_equal(state.replay.normal[1], first)
-
-
-def test_a_link_keeps_what_single_tabs_show(state, visited):
-    chosen = {"pushing": "all", "axes": "stress"}
-    chosen["zoom"] = (3.5, 4.25, 2.0)
-    state.looks.param.update(**chosen)
-    again = visited(f"?{state.link()}")
-    assert chosen.items() <= again.view.items()
 
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
@@ -1338,21 +1320,21 @@ def test_player_gets_flat_frames(library):
     assert shipped["kind"].max() == 3 or not np.any(shipped["touching"] == 0)
 
 
-@pytest.mark.parametrize("by", ["original", "extent", "exact", "position"])
-def test_contacts_are_sorted_by_what_is_named(state, by):
+def test_contacts_are_sorted_by_what_is_named(state):
     state.compute_exact()
     wait_for(state)
     replay, exact = state.replay, exact_intervals(state.exact, state.replay)
     extent = exact["high"] - exact["low"]
-    value = {
+    sorts = {
         "original": replay.normal[0],
         "extent": replay.high[:, 0] - replay.low[:, 0],
         "exact": extent,
         "position": (replay.normal[0] - exact["low"]) / extent,
-    }[by]
-    order = ordered(replay, exact, by).contacts
-    assert sorted(order) == list(range(len(value)))
-    assert np.all(np.diff(value[order]) >= 0)
+    }
+    for by, value in sorts.items():
+        order = ordered(replay, exact, by).contacts
+        assert sorted(order) == list(range(len(value)))
+        assert np.all(np.diff(value[order]) >= 0), by
 
 
 def test_intervals_take_nothing_over_while_hidden(state):

@@ -494,12 +494,6 @@ def test_mu_typed_is_computed_and_shown_with_exact_intervals(page, own_mu):
     picture(page, "intervals")
 
 
-def test_wrong_mu_is_one_clear_line(page):
-    ask(page, -2)
-    told = page.get_by_text("friction coefficient must be finite and ≥ 0").filter(visible=True)
-    told.wait_for()
-
-
 def test_scripts_are_fetched_once_and_run_as_they_are(page):
     """What is fetched early is what Panel asks for later, and nothing is translated in the page."""
     fetched = page.evaluate(

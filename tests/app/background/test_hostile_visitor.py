@@ -46,16 +46,6 @@ def computing(page):
     ).first.wait_for()
 
 
-def reloaded(page):
-    """Reload the page, unless it does so itself at the same moment, which ends what was asked."""
-    error = pytest.importorskip("playwright.sync_api").Error
-    try:
-        page.reload()
-    except error as ended:
-        if "ERR_ABORTED" not in ended.message:
-            raise
-
-
 def computes(page, address, seed):
     """Another computation is asked for, and succeeds."""
     page.goto(f"{address}?mu=0.2&n=30&states=5&seed={seed}")
@@ -131,20 +121,6 @@ def test_the_largest_allowed_of_everything_can_be_cancelled(page, address):
     cancel.first.click()
     cancel.first.wait_for(state="hidden")
     computes(page, address, 15)
-
-
-def test_a_killed_server_comes_back_and_a_reloaded_page_works(page, shipped, tmp_path):
-    port, variables = free_port(), {"GRANFORCE_DATA": str(shipped)}
-    with serve(tmp_path, port=port, **variables) as (url, server):
-        page.goto(url + LONG.format(3))
-        computing(page)
-        server.kill()
-        server.wait(20)
-        with serve(tmp_path, port=port, **variables) as (again, _):
-            assert again == url
-            reloaded(page)
-            computing(page)
-            computes(page, url, 16)
 
 
 @pytest.mark.parametrize(

@@ -75,9 +75,3 @@ def test_contacts_worth_measuring_are_numbered(visit):
     page.locator(".ranked button").first.click()
     page.locator(".stage.chosen").wait_for()
     picture(page, "known/next")
-
-
-def test_a_contradiction_in_a_link_is_one_line(visit):
-    page = visit("?known=4:0.5~9:80")
-    page.get_by_role("alert").filter(has_text="satisfies all known forces").wait_for()
-    expect(page.locator(".chip")).to_have_count(0)

@@ -291,12 +291,12 @@ def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
             time.sleep(0.1)
 
     with serve(tmp_path, "--setup", str(setup), *CLOSED, **variables) as (url, _):
-        pages = [visit(at=url) for _ in range(3)]
+        pages = [visit(at=url) for _ in range(2)]
         for tab in ("Friction", "Force space", "Push", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()
         # The last tab is there once all before it have been built.
         pages[0].get_by_role("button", name="SVG", exact=True).wait_for()
-        wait_for([3])
+        wait_for([2])
         for page in pages:
             page.close()
         wait_for([0, 1])  # Panel may keep the last one until the next

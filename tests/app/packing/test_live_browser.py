@@ -189,19 +189,6 @@ def test_two_pages_see_the_same_walk(visit, own_mu):
         ).click()
 
 
-def test_a_hidden_tab_is_sent_nothing(visit, own_mu):
-    page = visit()
-    page.locator(".scene").evaluate(WATCH)
-    page.evaluate("""() => {
-        Object.defineProperty(document, "hidden", {value: true, configurable: true})
-        document.dispatchEvent(new Event("visibilitychange"))
-    }""")
-    ask(page, own_mu)
-    shows(page, own_mu)
-    seen = page.evaluate("seen")
-    assert not seen["pictures"] and not seen["states"]
-
-
 # In the hand
 
 
