@@ -81,42 +81,23 @@ class Controls:
         self.kind = Select(label="Networks from", options=by_words(kinds), **LIST)
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **LIST)
         self.series = Select(
-            label="Precomputed results",
-            margin=FIELD["margin"],
-            max_width=580,
+            label="Precomputed results", margin=FIELD["margin"], max_width=580,
             sizing_mode="stretch_width",
-        )
+        )  # fmt: skip
         self.go = pmui.Button(label="Compute", color="primary", visible=False, margin=0, sx=PLAIN)
         self.command = CopyButton(label="Copy CLI command", **FIELD)
         self.opens = Disclosure(line=MADE, margin=0)
         self._connect()
         self._follow()
         self.line = pn.FlexBox(
-            self.scene,
-            self.mu,
-            self.opens,
-            self.go,
-            gap="6px 28px",
-            margin=0,
-            align_items="center",
-            css_classes=["controls-line"],
-            sizing_mode="stretch_width",
-        )
+            self.scene, self.mu, self.opens, self.go, gap="6px 28px", margin=0,
+            align_items="center", css_classes=["controls-line"], sizing_mode="stretch_width",
+        )  # fmt: skip
         self.options = pn.FlexBox(
-            self.n,
-            self.seed,
-            self.packed,
-            self.states,
-            self.kind,
-            self.relax,
-            self.series,
-            self.command,
-            align_items="center",
-            margin=0,
-            visible=False,
-            css_classes=["made"],
+            self.n, self.seed, self.packed, self.states, self.kind, self.relax, self.series,
+            self.command, align_items="center", margin=0, visible=False, css_classes=["made"],
             sizing_mode="stretch_width",
-        )
+        )  # fmt: skip
         self.opens.link(self.options, open="visible")
         state.looks.sync_opened(self.opens, "made")
 
@@ -159,11 +140,9 @@ class Controls:
         packing_mu = self.packed.value.strip()
         packed_mu = None if packing_mu in ("", SAME) else friction(typed(packing_mu))
         details = {
-            "kind": self.kind.value,
-            "relax": self.relax.value,
-            "states": self.states.value,
+            "kind": self.kind.value, "relax": self.relax.value, "states": self.states.value,
             "seed": now.seed,
-        }
+        }  # fmt: skip
         if now.imported:
             return now._replace(mu=friction(self.mu.mu), **details)
         selection = select(self.n.value, self.mu.mu, self.seed.value, packed_mu, **details)

@@ -427,8 +427,8 @@ export function render({ model, view }) {
   observer.observe(player.scene.root)
   model.on("msg:custom", (message) => {
     const news = plain(message)
-    if (news.number === undefined) player.hand.hear(news)
-    else player.live.hear(news)
+    if (news.number === undefined) player.hand.receive(news)
+    else player.live.receive(news)
   })
   const wide = matchMedia(`(min-width: ${WIDE}px)`), tellWidth = () => tell({ wide: wide.matches })
   wide.addEventListener("change", tellWidth)

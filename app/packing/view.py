@@ -349,23 +349,14 @@ def legend(state: AppState) -> str:
     shown = min(widest, LARGE)
     (full_least, full_most), (least, most) = looks.param.full.bounds, looks.param.stretch.bounds
     return worded(replay, LEGEND).format(
-        width=_chosen(state, "thickness", WIDTHS),
-        shown=shown,
-        high=6 + 6 * shown / widest,
-        low=6 - 6 * shown / widest,
-        width_term=EXPLAINED[looks.thickness],
-        colour_term=EXPLAINED[looks.colour],
-        colour=_chosen(state, "colour", colours(state)),
-        wide_bounds=f" ({_kind(state)})" if looks.thickness == "extent" else "",
-        bar=bar,
-        saturation=SATURATION,
-        full="" if looks.full is None else f"{looks.full:g}",
-        full_least=full_least,
-        full_most=full_most,
-        stretch=looks.stretch,
-        stretch_least=least,
+        width=_chosen(state, "thickness", WIDTHS), shown=shown, high=6 + 6 * shown / widest,
+        low=6 - 6 * shown / widest, width_term=EXPLAINED[looks.thickness],
+        colour_term=EXPLAINED[looks.colour], colour=_chosen(state, "colour", colours(state)),
+        wide_bounds=f" ({_kind(state)})" if looks.thickness == "extent" else "", bar=bar,
+        saturation=SATURATION, full="" if looks.full is None else f"{looks.full:g}",
+        full_least=full_least, full_most=full_most, stretch=looks.stretch, stretch_least=least,
         stretch_most=most,
-    )
+    )  # fmt: skip
 
 
 def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:

@@ -329,18 +329,11 @@ class AppState(param.Parameterized):
         with as_one(*self.parts, self.work, self):
             self.work.shown(cell.selection)
             self.param.update(
-                selection=cell.selection,
-                missing=False,
-                before=self._before(cell),
-                cell=cell,
-                replay=replay,
-                shown=replay,
-                exact=exact,
-                source=self._source(cell),
-                displacement=None,
-                loads=self.loads if self.replay is replay else None,
+                selection=cell.selection, missing=False, before=self._before(cell), cell=cell,
+                replay=replay, shown=replay, exact=exact, source=self._source(cell),
+                displacement=None, loads=self.loads if self.replay is replay else None,
                 plane=self.plane if self.replay is replay else None,
-            )
+            )  # fmt: skip
             self._look(fresh | fitting(view or {}, replay))
 
     def _before(self, cell: Cell) -> Shown | None:

@@ -199,13 +199,9 @@ def folded_away(*titled: Any) -> Any:
     """Panels (title, panel, …) that are initially closed."""
     pairs = list(zip(titled[::2], titled[1::2], strict=True))
     return pmui.Accordion(
-        *pairs,
-        active=[],
-        title_variant="subtitle2",
-        sx=FOLDS,
-        margin=(2, 10),
+        *pairs, active=[], title_variant="subtitle2", sx=FOLDS, margin=(2, 10),
         sizing_mode="stretch_width",
-    )
+    )  # fmt: skip
 
 
 def folded(text: str) -> str:

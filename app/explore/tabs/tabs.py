@@ -80,10 +80,8 @@ class Tabs:
             self.looks.tab = self.names[0]
         self.tabs = pmui.Tabs(
             *((TABS[name], self.pages[name]) for name in self.names),
-            active=self.names.index(self.looks.tab),
-            sx=LOOK,
-            sizing_mode="stretch_width",
-        )
+            active=self.names.index(self.looks.tab), sx=LOOK, sizing_mode="stretch_width",
+        )  # fmt: skip
         self._shown = self.tabs.jscallback(args={"space": space}, active=SHOW)
         self.pages["plane"] = space
         for page in self.pages.values():

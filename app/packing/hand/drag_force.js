@@ -192,7 +192,7 @@ export class Grab {
 
   // Messages from the server
 
-  hear({ rail, fan, held }) {
+  receive({ rail, fan, held }) {
     this.aim = null
     if (rail !== undefined) this.takeRail(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))

@@ -104,7 +104,7 @@ export class Live {
   get moves() { return this.window !== null }
 
   /** Handle messages about a computation. */
-  hear(message) {
+  receive(message) {
     const { picture, states, bounds, number } = message, { loaded, model } = this.player
     if (states) this.player.grow(plain(states))
     if (bounds) this.player.arrive(plain(bounds))

@@ -143,7 +143,7 @@ def test_a_picture_on_its_way_is_not_shown_after_cancel(run, cancelled):
             const shown = [], told = [], player = { loaded: {}, model: { live: true } }
             const live = new Live(player, (message) => told.push(message))
             live.show = (picture) => shown.push(picture)
-            live.hear({ picture: { mu: 0.1 }, number: 1 })
+            live.receive({ picture: { mu: 0.1 }, number: 1 })
             if (cancelled) player.model.live = false
             await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
             live.remove()
@@ -649,13 +649,13 @@ def test_a_pull_is_back_after_a_push(run):
             const pulled = (fn) => ({ normal: [fn], tangential: [0], residual: 0, pull: [0, fn] })
             const path = { values: [0, 1], normal: [1, 2], tangential: [0, 0], residual: [0, 0] }
             const look = () => held.push([replay.held.normal[0], replay.held.place ?? "pulled"])
-            hand.hear({ held: pulled(3) })
+            hand.receive({ held: pulled(3) })
             look()
             pushed.begin()
             look()
             pushed.take(path, 0.5, 0.5)
             look()
-            hand.hear({ held: pulled(4) })
+            hand.receive({ held: pulled(4) })
             look()
             pushed.leave()
             look()

@@ -250,16 +250,16 @@ def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
     # that has been replaced by its walk meanwhile.
     page.locator(".scene").evaluate(
         """e => {
-            const {live, split} = e.scene.hand.player, {hear, show} = live
+            const {live, split} = e.scene.hand.player, {receive, show} = live
             const later = window.requestAnimationFrame
             window.beside = []
             live.show = (picture) => {
                 show.call(live, picture)
                 beside.push([split.on, split.other?.walk.mu, split.twin.counts.drawn])
             }
-            live.hear = (news) => {
+            live.receive = (news) => {
                 window.requestAnimationFrame = (draw) => draw(performance.now())
-                hear.call(live, news)
+                receive.call(live, news)
                 window.requestAnimationFrame = later
             }
         }"""

@@ -27,14 +27,14 @@ from small_store import KEPT
 from app.results import geometry
 
 WATCH = """e => {
-    const {hand} = e.scene, {live} = hand.player, {hear} = live
+    const {hand} = e.scene, {live} = hand.player, {receive} = live
     window.seen = {pictures: [], states: 0, pale: 0}
-    live.hear = (news) => {
+    live.receive = (news) => {
         if (news.picture) {
             const {picture} = news, box = picture.box ?? picture.get("box")
             seen.pictures.push([...box][0])
         } else seen.states += 1
-        hear.call(live, news)
+        receive.call(live, news)
     }
     new MutationObserver(() => { seen.pale += hand.player.buttons.root.matches(".pale") })
         .observe(hand.player.buttons.root, {attributes: true})

@@ -42,11 +42,9 @@ class Snapshot:
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)
         self._shown: dict[str, Any] = {
-            "loads": state.loads,
-            "reduction": reduction(knowledge, self.replay),
-            "measured": measured(state, self.replay),
-            "pins": pins(knowledge),
-        }
+            "loads": state.loads, "reduction": reduction(knowledge, self.replay),
+            "measured": measured(state, self.replay), "pins": pins(knowledge),
+        }  # fmt: skip
 
     def file(self, ending: str, mime: str, content: bytes) -> File:
         """A file named after the packing, and after the network on screen if it depends on it."""

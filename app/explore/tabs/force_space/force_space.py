@@ -52,14 +52,9 @@ class View(TabView):
         """Plot, choice of the plane, and explanation."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            self.lead,
-            plotted(self.drawing.figure),
-            self.planes,
-            self.finding,
-            self.details,
-            self.others.switch,
-            **wide,
-        )
+            self.lead, plotted(self.drawing.figure), self.planes, self.finding, self.details,
+            self.others.switch, **wide,
+        )  # fmt: skip
 
     def _fit(self, *events: Any) -> None:
         self.drawing.figure.aspect_ratio = WIDE_ASPECT if self.looks.wide else ASPECT

@@ -22,12 +22,10 @@ from .against_friction import COLOURS, MARKERS, AgainstFriction, Line
 MEASURES = (("eta1", "η₁", 1.0), ("eta2", "η₂", 1.0), ("eta3", "0.15 η₃ seen", 0.15))
 # Parts of the study, and their labels.
 SAMPLERS = {
-    "walk": "seen: nearest-network walk",
-    "sweeps_1e-3": "seen: the paper’s walk, to 10⁻³",
-    "uniform": "seen: uniform in S",
-    "exact": "exact",
+    "walk": "seen: nearest-network walk", "sweeps_1e-3": "seen: the paper’s walk, to 10⁻³",
+    "uniform": "seen: uniform in S", "exact": "exact",
     "sweeps_1e-4": "seen: the paper’s walk, to 10⁻⁴",
-}
+}  # fmt: skip
 CORRELATED = ("walk", "uniform", "exact")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 BINS = 30

@@ -72,14 +72,9 @@ class View(TabView):
         grows = folded_away(GROWS, plotted(self.growth.figure))
         self.looks.sync_opened(grows, "growth")
         return pn.Column(
-            self.lead,
-            plotted(self.drawing.figure),
-            pn.FlexBox(*self.choices, self.exact, **wide),
-            Known(self.state),
-            Contacts(self.looks),
-            grows,
-            **wide,
-        )
+            self.lead, plotted(self.drawing.figure), pn.FlexBox(*self.choices, self.exact, **wide),
+            Known(self.state), Contacts(self.looks), grows, **wide,
+        )  # fmt: skip
 
     def update(self) -> None:
         """Update contacts, exact intervals and the walk's length."""

@@ -69,16 +69,9 @@ class View(TabView):
         """Choices, buttons, numbers and plot."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            self.what,
-            self.lead,
-            self.load,
-            self.every,
-            self.numbers,
-            self.animate,
-            self.plots,
-            self.details,
-            **wide,
-        )
+            self.what, self.lead, self.load, self.every, self.numbers, self.animate, self.plots,
+            self.details, **wide,
+        )  # fmt: skip
 
     def update(self) -> None:
         """Show the selection; unknown results wait for a push, except Fig. 2."""

@@ -24,11 +24,9 @@ from . import frame_picture
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
 SHOWN = {
-    "inferred": "Inferred",
-    "measured": "Measured",
-    "beside": "Both",
+    "inferred": "Inferred", "measured": "Measured", "beside": "Both",
     "deviation": "Difference in σ",
-}
+}  # fmt: skip
 TOLD = 12  # contacts that are listed
 PLAYED_MS = 700  # per frame of a series
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
@@ -71,17 +69,9 @@ class Frames:
     def panel(self) -> list[Any]:
         """All parts, from the top."""
         return [
-            self.player,
-            self.findings,
-            self.choice,
-            self.pictures,
-            self.open,
-            note(OPENED),
-            self.listed,
-            self.compared,
-            self.stresses,
-            self.save,
-        ]
+            self.player, self.findings, self.choice, self.pictures, self.open, note(OPENED),
+            self.listed, self.compared, self.stresses, self.save,
+        ]  # fmt: skip
 
     def _turn(self, number: int) -> None:
         """Show another frame: from memory, or after inference, while the player waits."""
@@ -165,14 +155,11 @@ def compared(frame: Frame) -> Figure:
         ends += [x.min(initial=0), x.max(initial=0), y.min(initial=0), y.max(initial=0)]
         source = ColumnDataSource(
             {
-                "x": x,
-                "y": y,
-                "low": y - error,
-                "high": y + error,
+                "x": x, "y": y, "low": y - error, "high": y + error,
                 "contact": np.flatnonzero(measured),
             },
             name=f"photoelastic_{'nt'[part]}",
-        )
+        )  # fmt: skip
         fig.segment("x", "low", "x", "high", source=source, color=colour, alpha=0.2)
         drawn.append(
             fig.scatter(

@@ -46,12 +46,9 @@ REPORT = """
 """
 ROW = '<tr><td style="padding:2px 18px 2px 0;opacity:.75">{}</td><td><b>{}</b></td></tr>'
 WALLS = {
-    "": "as listed",
-    "box": "a box",
-    "annulus": "an annulus",
-    "circle": "a circle",
+    "": "as listed", "box": "a box", "annulus": "an annulus", "circle": "a circle",
     "open": "left open",
-}
+}  # fmt: skip
 AROUND = {"": "none", "floor": "a floor", "box": "a floor and two sides"}
 SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 # Options of the command and arguments of the function in a message: " (--walls floor, or walls=)".
@@ -68,13 +65,10 @@ class View:
         self.files: uploads.Files = {}
         self.task = state.work.task(reported=False)
         self.dropper = Dropper(
-            self._dropped,
-            self._refuse,
+            self._dropped, self._refuse,
             label="Drop the files of a packing here, or click to choose them",
-            most=LIMITS.upload * 10**6,
-            sizing_mode="stretch_width",
-            margin=(8, 10),
-        )
+            most=LIMITS.upload * 10**6, sizing_mode="stretch_width", margin=(8, 10),
+        )  # fmt: skip
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", placeholder="1", **SMALL)
