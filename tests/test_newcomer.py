@@ -350,8 +350,8 @@ def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys
 
 
 def test_relaxations_are_typed_as_functions_are_called():
-    from granforce.glossary import RELAXATIONS as typed
     from granforce.study.kinds.states import RELAXATIONS as computed
+    from granforce.study.relaxations import RELAXATIONS as typed
 
     assert set(typed.values()) == set(computed)
     for name, word in typed.items():

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shlex
 from typing import Any, NamedTuple
 
-from granforce.glossary import typed_relaxation
 from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
+from granforce.study.relaxations import typed_relaxation
 from granforce.system.wording import number
 
 from ..background.limits import Limits

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from granforce.cli.path_roles import Edited, Input, Output, StorePath, TableOrStore, Workplace
-from granforce.glossary import RELAXATIONS
+from granforce.study.relaxations import RELAXATIONS
 from granforce.system.wording import number
 
 TABLES = ("csv", "npz", "zarr")  # suffixes of files that hold a value per contact or per state

@@ -15,7 +15,6 @@ from granforce.cli.input_tables import read_known
 from granforce.cli.report_lines import WORK, line
 from granforce.explore.uniform import unreliable
 from granforce.forces.knowledge import Known, refuse_others
-from granforce.glossary import RELAXATIONS
 from granforce.labelled import column_name
 from granforce.packing import importers
 from granforce.quantities import FORCE
@@ -24,6 +23,7 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
+from granforce.study.relaxations import RELAXATIONS
 from granforce.study.series import check_folder
 from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, content_of

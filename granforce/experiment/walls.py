@@ -156,10 +156,11 @@ def flagged(
     )
     if flag == "ignore" or not given.any():
         return marks, None
+    shape = "annulus" if np.any(marks < 0) else "box"
     return marks, (
         f"{np.sum(given != 0)} of {len(given)} grains are flagged as touching a wall, so the flag "
         f"is ignored, and the {np.sum(marks != 0)} grains at the boundary of the frame count as "
-        "those at walls (as with --flag ignore); --walls annulus, box or auto makes walls of the "
+        f"those at walls (as with --flag ignore); --walls {shape} or auto makes walls of the "
         "boundary"
     )
 

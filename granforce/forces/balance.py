@@ -109,9 +109,10 @@ def left_open_in(packing: Packing) -> Mask:
 
 
 def mean_load(packing: Packing) -> float:
-    """Mean size of the known loads (largest component, torques over r_max), force; 0 for none."""
-    load = np.abs(np.nan_to_num(packing.load) / [1.0, 1.0, packing.r.max()]).max(axis=1)
-    return float(load[load > 0].mean()) if load.any() else 0.0
+    """Mean size of the known loads (force, or torque over r_max if larger), force; 0 for none."""
+    known = np.nan_to_num(packing.load)
+    size = np.maximum(np.hypot(*known[:, :2].T), np.abs(known[:, 2]) / packing.r.max())
+    return float(size[size > 0].mean()) if size.any() else 0.0
 
 
 def rows_per_grain(contacts: Contacts, mu: float) -> int:

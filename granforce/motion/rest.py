@@ -19,8 +19,8 @@ from granforce.forces.build import ensemble_at
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
 from granforce.motion.flow import Push
+from granforce.motion.flow_lanes import relax, relax_all
 from granforce.motion.inertia import make_step
-from granforce.motion.works import relax, relax_all
 from granforce.quantities import ALL_CONTACTS, FORCE, Field
 from granforce.records import InputError, Packing, float_array, random_seed, whole
 from granforce.system import cancelling

@@ -238,24 +238,25 @@ def places_behind(x: Floats, r: Floats, walls: Floats, tolerance: float) -> Behi
 
 
 def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: float) -> Behind:
+    """Grains behind the places where disks touch walls, of which some press."""
     disk, wall, place, away = _touched(x, r, walls, tolerance)
-    held = pressing[wall] == 0
     lids = np.flatnonzero(pressing)
+    is_held = pressing[wall] == 0
     grain = np.empty(len(disk), dtype=np.int64)
-    grain[held] = len(lids) + np.arange(held.sum())
-    grain[~held] = np.searchsorted(lids, wall[~held])
-    stud, lid = STUD * r[disk[held]], STUD * r.max()
-    facing = [inwards(x, walls[k], away[wall == k]) for k in lids]
-    facing = np.reshape(facing, (-1, 2))
-    load = np.full((len(lids) + len(stud), 3), np.nan)
-    load[: len(lids)] = np.column_stack([facing * pressing[lids, None], np.zeros(len(lids))])
-    centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - facing * lid
+    grain[~is_held] = np.searchsorted(lids, wall[~is_held])
+    grain[is_held] = len(lids) + np.arange(is_held.sum())
+    inward = np.reshape([inwards(x, walls[k], away[wall == k]) for k in lids], (-1, 2))
+    lid_radius, held_radii = STUD * r.max(), STUD * r[disk[is_held]]
+    lid_centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - inward * lid_radius
+    held_centres = place[is_held] + away[is_held] * held_radii[:, None]
+    load = np.full((len(lids) + len(held_radii), 3), np.nan)
+    load[: len(lids)] = np.column_stack([inward * pressing[lids, None], np.zeros(len(lids))])
     return Behind(
         disk=disk,
         grain=grain,
         away=away,
-        x=np.concatenate([centres, place[held] + away[held] * stud[:, None]]),
-        r=np.concatenate([np.full(len(lids), lid), stud]),
+        x=np.concatenate([lid_centres, held_centres]),
+        r=np.concatenate([np.full(len(lids), lid_radius), held_radii]),
         load=load,
         lids=lids,
     )

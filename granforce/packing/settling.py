@@ -23,9 +23,9 @@ from granforce.motion import overdamped
 from granforce.motion.box_motion import BOX_MASS
 from granforce.motion.contact_dynamics import Motion
 from granforce.motion.flow import STEADY, Push
+from granforce.motion.flow_lanes import relax
 from granforce.motion.rest import Rest, rest
 from granforce.motion.step import Step, effective_masses
-from granforce.motion.works import relax
 from granforce.numerics import contact_matrix
 from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained

@@ -36,9 +36,9 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.motion import flow
 from granforce.motion.flow import Outcome, Push
+from granforce.motion.flow_lanes import follow, relax
 from granforce.motion.inertia import grain_velocities, make_step
 from granforce.motion.step import Step, relative_velocities
-from granforce.motion.works import follow, relax
 from granforce.quantities import FORCE, Field, of_one_contact
 from granforce.records import (
     InputError,
@@ -139,7 +139,7 @@ class Response(NamedTuple):
     converged: Annotated[bool, "breach ≤ 0.001"]
 
 
-# A generator for `works.follow` that yields flows, is sent their outcomes, and returns a result.
+# A generator for `flow_lanes.follow`: yields flows, is sent their outcomes, and returns a result.
 T = TypeVar("T")
 Asking = Generator[Push, Outcome, T]
 
@@ -271,7 +271,7 @@ def critical_forces(
         number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
         raise UndecidedError(f"the limit load of contact {number} could not be certified")
     step, start = make_step(S), starting_network(S) / S.force_scale
-    works = [
+    searches = [
         _pushed(S, int(contact), position, float(limit) / S.force_scale, start, protocol)
         for contact, position, limit in zip(contacts, positions, limit_loads, strict=True)
     ]
@@ -282,10 +282,10 @@ def critical_forces(
         if finished is not None:
             finished(k, critical)
 
-    follow(step, works, ended, workers)
+    follow(step, searches, ended, workers)
     if given:
         _check_limits(S, list(found.values()), precision, workers)
-    return [found[k] for k in range(len(works))]
+    return [found[k] for k in range(len(searches))]
 
 
 def checked(protocol: Protocol) -> Protocol:
@@ -319,7 +319,7 @@ def _check_limits(
 def _pushed(
     S: Ensemble, contact: int, position: int, limit: float, start: Floats, protocol: Protocol
 ) -> Asking[CriticalForce]:
-    """Generator for `works.follow`: the CriticalForce of a contact."""
+    """Generator for `flow_lanes.follow`: the CriticalForce of a contact."""
     found = yield from raised(Push(start, position, 0.0, 0, 0.0), limit, protocol)
     loaded = found.forces.copy()
     loaded[position, 0] += found.low
@@ -350,7 +350,7 @@ class Raised(NamedTuple):
 
 
 def raised(push: Push, limit: float, protocol: Protocol) -> Asking[Raised]:
-    """Generator for `works.follow`: raise the load of a Push from 0, and from its forces."""
+    """Generator for `flow_lanes.follow`: raise the load of a Push from 0, and from its forces."""
     counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     past = deque([(0.0, push.forces)], maxlen=2 * BACK)  # the last loads at rest, and their forces
     share, moved_at, max_steps = 1.0, 0.0, protocol.max_steps

@@ -22,8 +22,8 @@ from granforce.forces.contact_problem import forces_of, make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
 from granforce.motion.flow import Outcome, Push
+from granforce.motion.flow_lanes import follow, relax
 from granforce.motion.inertia import make_step
-from granforce.motion.works import follow, relax
 from granforce.numerics.certified_values import most_under
 from granforce.perturb.critical_force import (
     LEAST_PRECISION,

@@ -32,7 +32,6 @@ from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
-from granforce.glossary import RELAXATIONS
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
 from granforce.records import (
@@ -50,6 +49,7 @@ from granforce.records import (
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, entry_name, get, load, row
 from granforce.study.keys import Parameters, canonical
+from granforce.study.relaxations import RELAXATIONS
 from granforce.study.store import open_store
 from granforce.system import cancelling
 from granforce.system.memory import check_memory

@@ -5,8 +5,8 @@ import pytest
 
 from granforce.forces.build import ensemble
 from granforce.motion.flow import STEADY, Push
+from granforce.motion.flow_lanes import relax
 from granforce.motion.inertia import make_step
-from granforce.motion.works import relax
 from granforce.packing.compaction import pack
 
 pytestmark = pytest.mark.fast

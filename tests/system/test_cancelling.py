@@ -18,8 +18,8 @@ import granforce as gf
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import walls
 from granforce.motion.flow import Push
+from granforce.motion.flow_lanes import follow, relax
 from granforce.motion.inertia import make_step
-from granforce.motion.works import follow, relax
 from granforce.numerics import elimination
 from granforce.numerics import highs as programs
 from granforce.system import cancelling

@@ -58,7 +58,7 @@ class Snapshots(NamedTuple):
         return self.chosen(number)
 
     def chosen(self, number: int | None = None) -> Snapshot:
-        """The same without warnings."""
+        """One Snapshot, as by `snapshot`, without warnings."""
         if number is None:
             last = self.numbers[-1]
             notes = [f"{note}; {self.word} {last} is read" for note in self.notes]

@@ -175,7 +175,7 @@ def read_table(
 
 
 def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
-    """The same with the names f_n and f_t for fn and ft."""
+    """The given columns with the names f_n and f_t for fn and ft."""
     if not isinstance(columns, Mapping) or not _SHORT.keys() & columns.keys():
         return columns
     return {_SHORT.get(name, name): theirs for name, theirs in columns.items()}

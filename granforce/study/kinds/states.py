@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce import glossary
 from granforce.experiment import remeasured
 from granforce.experiment.carrying import carrying
 from granforce.experiment.infer import infer
@@ -18,8 +17,8 @@ from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import LEAST_ACCURACY, volume
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, spread_of
-from granforce.glossary import typed_relaxation
 from granforce.records import InputError, brief, positive, random_seed, whole
+from granforce.study import relaxations
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
@@ -36,7 +35,7 @@ from granforce.types import Progress
 STATE_BYTES = 48
 # Arguments of `walk`, by the name of the relaxation in keys of results.
 RELAXATIONS = {
-    stored: random_walk.RELAXATIONS[name] for name, stored in glossary.RELAXATIONS.items()
+    stored: random_walk.RELAXATIONS[name] for name, stored in relaxations.RELAXATIONS.items()
 }
 
 
@@ -93,7 +92,7 @@ def typed(parameters: Parameters) -> Parameters:
     """Parameters with the name of their relaxation as typed."""
     if parameters.get("relax") not in RELAXATIONS:
         return parameters
-    return parameters | {"relax": typed_relaxation(parameters["relax"])}
+    return parameters | {"relax": relaxations.typed_relaxation(parameters["relax"])}
 
 
 def _size(

@@ -33,7 +33,7 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 
 # A generator that yields one flow after another and is sent the outcome of each.
-Work = Generator[Push, Outcome, Any]
+Search = Generator[Push, Outcome, Any]
 
 
 def relax(step: Step, push: Push) -> Outcome:
@@ -54,50 +54,50 @@ def _one(push: Push) -> Generator[Push, Outcome, Outcome]:
 
 def follow(
     step: Step,
-    works: Sequence[Work],
+    searches: Sequence[Search],
     finished: Callable[[int, Any], object],
     workers: int = 1,
 ) -> None:
-    """Run works in lanes on threads: generators of Push that are sent the Outcome of each.
+    """Run searches in lanes on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
-    finished(number, value) is called, by one thread at a time, as a work returns its value; if it
-    raises, it is still called for works that other threads have finished by then. Outcomes are
+    finished(number, value) is called, by one thread at a time, as a search returns its value; if it
+    raises, it is still called for searches that other threads have finished by then. Outcomes are
     bit-identical for any number of threads and lanes.
     """
-    waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
+    waiting, turn, failed = deque(enumerate(searches)), threading.Lock(), threading.Event()
 
     def finish(number: int, value: Any) -> None:
         with turn:
             finished(number, value)
 
-    def carry() -> None:
+    def run() -> None:
         try:
-            _carry(step, waiting, finish, failed)
+            _run_thread(step, waiting, finish, failed)
         except BaseException:
             failed.set()  # stop the other threads
             raise
 
-    cancelling.on_threads(carry, workers)
+    cancelling.on_threads(run, workers)
 
 
-def _carry(
+def _run_thread(
     step: Step,
-    waiting: deque[tuple[int, Work]],
+    waiting: deque[tuple[int, Search]],
     finished: Callable[[int, Any], object],
     failed: threading.Event,
 ) -> None:
-    """One thread: fill lanes with works and run each to its end."""
+    """One thread: fill lanes with searches and run each to its end."""
     if not waiting:
         return
     lanes = lanes_for(len(waiting))
     flows, stop = make_flows(step, len(lanes)), cancelling.flag()
     seconds = np.zeros(len(lanes))
-    carried: list[tuple[int, Work] | None] = [None] * len(lanes)
+    current: list[tuple[int, Search] | None] = [None] * len(lanes)
     while True:
         for lane in np.flatnonzero(~flows.going).tolist():
-            sent = outcome_of(step, flows, lane, seconds[lane]) if carried[lane] else None
-            carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
+            sent = outcome_of(step, flows, lane, seconds[lane]) if current[lane] else None
+            current[lane] = _start_next(step, flows, lane, current[lane], sent, waiting, finished)
             seconds[lane] = 0.0
         going = flows.going.copy()
         if failed.is_set() or not going.any():
@@ -108,28 +108,29 @@ def _carry(
         seconds[going] += (time.perf_counter() - begin) / going.sum()
 
 
-def _go_on(
+def _start_next(
     step: Step,
     flows: Flows,
     lane: int,
-    carried: tuple[int, Work] | None,
+    current: tuple[int, Search] | None,
     sent: Outcome | None,
-    waiting: deque[tuple[int, Work]],
+    waiting: deque[tuple[int, Search]],
     finished: Callable[[int, Any], object],
-) -> tuple[int, Work] | None:
-    """Send a lane's work its outcome and start its next flow, or else the next waiting work.
+) -> tuple[int, Search] | None:
+    """Send a lane's search its outcome and start its next flow, or that of the next waiting search.
 
-    carried: number and work of the lane; None, as is `sent`, in an idle lane. Returns the same.
+    current: number and search of the lane; None, as is `sent`, in an idle lane. Returns those
+    of the flow that starts, or None.
     """
     while True:
         try:
-            number, work = carried or waiting.popleft()
+            number, search = current or waiting.popleft()
         except IndexError:
             return None
         try:
-            start(step, flows, lane, next(work) if sent is None else work.send(sent))
+            start(step, flows, lane, next(search) if sent is None else search.send(sent))
         except StopIteration as ended:
             finished(number, ended.value)
-            carried = sent = None
+            current = sent = None
         else:
-            return number, work
+            return number, search
