@@ -8,10 +8,10 @@ from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
-from granforce.glossary import RELAXATIONS, typed_relaxation
 from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, brief, choice, friction
 from granforce.study.keys import Parameters
+from granforce.study.relaxations import RELAXATIONS, typed_relaxation
 from granforce.system.wording import integer, number
 from granforce.types import Integers
 
