@@ -135,14 +135,14 @@ def groove(angle, ratio):
 
 @pytest.mark.parametrize("angle", [10, 12.5, 30, 45, 60, 77, 90, 120, 150, 179])
 def test_a_groove_ends_where_the_closed_form_says(angle):
-    for ratio in (0.01, 0.3, 0.9, 0.99, 1 - 1e-3, 1 - 1e-4, 1 - 1e-5):
+    for ratio in (0.01, 0.3, 0.9, 0.99, *1 - 10.0 ** -np.array([3, 4, 5, 6, 8, 10])):
         found, least, largest = groove(angle, ratio)
         ends = np.sort(found.forces(found.corners)[:, :, 0], axis=0)
         assert found.bounded and len(found.corners) == 2 and len(found.sides) == 2
         # 10° is 10⁻¹⁵ off in the scene; rounding of an angle changes the tangent of its half, where
         # the groove locks, by the rounding times angle/sin(angle).
         locks = np.finfo(float).eps * np.radians(angle) / np.sin(np.radians(angle))
-        error = max(1e-9, max(1e-14, locks) / (1 - ratio))
+        error = max(1e-9, 2 * max(1e-14, locks) / (1 - ratio))
         np.testing.assert_allclose(ends, [[least] * 2, [largest] * 2], rtol=error)
 
 
@@ -155,14 +155,6 @@ def test_a_groove_locks_from_the_tangent_of_half_its_angle_on(angle):
         low, high = found.intervals
         np.testing.assert_allclose(low[:, 0], least, rtol=1e-9)
         assert np.all(np.isinf(high[:, 0]))
-
-
-def test_just_before_it_locks_a_groove_has_an_end():
-    for angle in (45, 90, 150):
-        for gap in (1e-6, 1e-8, 1e-10):
-            found, _, largest = groove(angle, 1 - gap)
-            end = found.forces(found.corners)[:, :, 0].max()
-            assert found.bounded and end == pytest.approx(largest, rel=2e-14 / gap)
 
 
 def test_sides_in_one_place_have_no_corner_of_their_own():

@@ -245,16 +245,6 @@ def test_bounds_and_loads_agree_with_highs(mu):
             assert abs(value - bound[k // 2, k % 2]) <= 1e-7 * system.force_scale
 
 
-@pytest.mark.parametrize("factor", [1e-12, 1e12])
-def test_forces_scale_with_the_pressure(first, factor):
-    system, found = first
-    packing = system.packing
-    scaled = packing._replace(pressure=packing.pressure * factor, forces=packing.forces * factor)
-    other = intervals(ensemble(scaled))
-    np.testing.assert_allclose(other.high / factor, found.high, atol=1e-7 * system.force_scale)
-    np.testing.assert_allclose(other.low / factor, found.low, atol=1e-7 * system.force_scale)
-
-
 def test_a_square_lattice_without_friction_loads_one_line():
     """At μ = 0 the force on each line of contacts is constant; one line may carry everything."""
     side = 5

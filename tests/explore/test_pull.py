@@ -132,13 +132,6 @@ def test_a_force_pulled_to_zero_has_no_friction_left(S):
     assert abs(found.states[0, position, 1]) <= S.mu * 0.01 * reach.high * (1 + 1e-12)
 
 
-def test_scales_with_the_pressure(S):
-    packing = S.packing._replace(pressure=1e7, forces=1e7 * S.packing.forces)
-    T = gf.ensemble(packing)
-    one, two = gf.pull(S, 162, 5.0), gf.pull(T, 162, 5e7)
-    assert np.abs(two.states / 1e7 - one.states).max() < 1e-7 * S.force_scale
-
-
 def test_what_is_known_of_other_contacts_is_kept(S):
     held, pulled = S.index[[3, 8]], S.index[20]
     value = S.original[[3, 8], 0]

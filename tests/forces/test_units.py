@@ -5,6 +5,7 @@ import pytest
 from packings import packed
 
 import granforce as gf
+from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.packing.scenes import BLOCKS, SCENES
 
 # Factors of lengths and forces, and angles by which open boxes are turned.
@@ -62,6 +63,7 @@ def results(packing, length, force, turn):
     yield "limit loads", gf.limit_loads(S) / force
     start = 1.1 * S.original + 0.1 * S.force_scale
     yield "nearest", gf.nearest(S, start).forces / force
+    yield "nearest by PIQP", nearest_piqp(S, start).forces / force
     yield "at rest", gf.rest(packing).at_rest
     if np.isfinite(high):
         middle = force * (0.3 * low + 0.7 * high)

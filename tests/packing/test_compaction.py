@@ -179,15 +179,6 @@ def test_the_same_seed_gives_the_same_packing():
     assert not np.array_equal(one.r, other.r)
 
 
-def test_pressure_and_radii_only_set_the_units():
-    one = pack(20, 0.3, 7)
-    # Powers of two, so that rounding is the same: the dynamics is chaotic.
-    two = pack(20, 0.3, 7, pressure=2.0**20, radii=f"uniform:{2.0**-11},{2.0**-10}")
-    assert np.array_equal(two.box, 2.0**-10 * one.box)
-    assert np.array_equal(two.forces, 2.0**10 * one.forces)
-    check(two)
-
-
 def test_ten_disks_and_very_unequal_ones():
     check(pack(10, 0.5, 2))
     check(pack(60, 0.3, 2, radii="bidisperse:0.2,1,0.5"))

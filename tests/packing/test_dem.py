@@ -64,15 +64,6 @@ def test_walls_and_open_boxes_become_loads():
     assert found.load.any() and found.info["residual"] < 1e-9
 
 
-def test_a_step_is_chosen():
-    data, fstat = mercury(steps=3)
-    for step in (0, 2):
-        found = read_mercury(*given(data, fstat), MU, frame=step, box=packed(N, MU).box)
-        assert found.x[0, 0] == pytest.approx(packed(N, MU).x[0, 0] + 0.01 * (2 - step))
-    with pytest.raises(InputError, match="no time step 3: there is 0 … 2"):
-        read_mercury(*given(data, fstat), MU, frame=3)
-
-
 @pytest.mark.parametrize(
     "read, files, words",
     [

@@ -2,7 +2,14 @@
 
 import numpy as np
 import pytest
-from packings import lattice, packed, reference
+from packings import (
+    lattice,
+    packed,
+    quarter_turned,
+    reference,
+    relabelled,
+    reversed_contacts,
+)
 
 from granforce.explore.intervals import limit_load_bounds, limit_loads
 from granforce.forces.build import ensemble
@@ -211,39 +218,6 @@ def test_first_motion_does_not_penetrate(mu):
         assert np.allclose(opening, moved.opening, atol=1e-9 * moved.fastest)
 
 
-def turned(packing):
-    """The packing turned by a quarter to the left."""
-
-    def turn(a):
-        return np.column_stack([-a[:, 1], a[:, 0]])
-
-    return packing._replace(
-        x=turn(packing.x) + np.array([packing.box[1], 0.0]),
-        box=packing.box[::-1].copy(),
-        contacts=packing.contacts._replace(normal=turn(packing.contacts.normal)),
-    )
-
-
-def reversed_contacts(packing):
-    c = packing.contacts
-    return packing._replace(
-        contacts=c._replace(i=c.j, j=c.i, normal=-c.normal, arm_i=c.arm_j, arm_j=c.arm_i)
-    )
-
-
-def relabelled(packing, grains, order):
-    """Grain k becomes grain grains[k]; contacts come in the given order."""
-    place = np.argsort(grains)
-    contacts = packing.contacts.picked(order)
-    return packing._replace(
-        x=packing.x[place],
-        r=packing.r[place],
-        load=packing.load[place],
-        forces=packing.forces[order],
-        contacts=contacts._replace(i=grains[contacts.i], j=grains[contacts.j]),
-    )
-
-
 def test_orientation_of_contacts_labels_and_quarter_turns_change_nothing():
     packing = packed(30, 0.3)
     S, rng = ensemble(packing), np.random.default_rng(0)
@@ -255,7 +229,8 @@ def test_orientation_of_contacts_labels_and_quarter_turns_change_nothing():
         (reversed_contacts(packing), contact, np.arange(len(packing.r)), np.eye(2)),
         (relabelled(packing, grains, order), int(np.flatnonzero(order == contact)[0]), grains,
          np.eye(2)),
-        (turned(packing), contact, np.arange(len(packing.r)), np.array([[0, 1.0], [-1, 0]])),
+        (quarter_turned(packing), contact, np.arange(len(packing.r)),
+         np.array([[0, 1.0], [-1, 0]])),
     ):  # fmt: skip
         again = critical_force(other, moved_to)
         assert again.low == pytest.approx(load.low, abs=1e-6 * S.force_scale)

@@ -80,6 +80,37 @@ def skewed(packing, basis=((2, 1), (1, 1))):
     return found, turn
 
 
+def reversed_contacts(packing):
+    """Every contact seen from its other grain: n and t turn over, f_n and f_t stay."""
+    c = packing.contacts
+    return packing._replace(
+        contacts=c._replace(i=c.j, j=c.i, normal=-c.normal, arm_i=c.arm_j, arm_j=c.arm_i)
+    )
+
+
+def quarter_turned(packing):
+    """The packing turned by a quarter to the left."""
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    return packing._replace(
+        x=packing.x @ turn + [packing.box[1], 0.0],
+        box=packing.box[::-1].copy(),
+        contacts=packing.contacts._replace(normal=packing.contacts.normal @ turn),
+    )
+
+
+def relabelled(packing, grains, order=slice(None)):
+    """Grain k becomes grain grains[k]; contacts come in the given order."""
+    place = np.argsort(grains)
+    c = packing.contacts.picked(order)
+    return packing._replace(
+        x=packing.x[place],
+        r=packing.r[place],
+        load=packing.load[place],
+        forces=packing.forces[order],
+        contacts=c._replace(i=grains[c.i], j=grains[c.j]),
+    )
+
+
 def _slip(up, rows, triangular):
     # A triangular lattice leans by half a disk a row: crossing the top shifts by rows/2 columns.
     return np.where(up >= rows, rows // 2, 0) * triangular
