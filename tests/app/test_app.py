@@ -717,7 +717,7 @@ def test_closing_the_page_ends_its_computation(state):
     while job.fraction is None:
         time.sleep(0.01)  # until it is under way
     state.work.close()
-    assert job.wait(30) and job.result is None and job.error == ""
+    assert job.wait(240) and job.result is None and job.error == ""
 
 
 def test_progress_grows_and_estimates_the_rest(state):
@@ -910,7 +910,7 @@ def once_both_are_there(begin, work):
 
     def run(job):
         if not met:
-            met.append(begin.wait(60))
+            met.append(begin.wait(240))
         return work(job)
 
     return run
@@ -919,7 +919,7 @@ def once_both_are_there(begin, work):
 def test_a_later_job_replaces_an_earlier_one():
     release, done = threading.Event(), []
     task = Task()
-    task.start(lambda job: release.wait(60) and "first", done.append)
+    task.start(lambda job: release.wait(240) and "first", done.append)
     task.start(lambda job: "second", done.append)
     release.set()
     while task.running:
@@ -941,12 +941,12 @@ def test_errors_of_a_job_are_told_not_raised():
 def test_a_job_that_waits_is_cancelled_at_once():
     release, begun = threading.Event(), []
     pool = Pool(1, "test")
-    first = Job(lambda job: release.wait(30), pool)
+    first = Job(lambda job: release.wait(240), pool)
     second = Job(begun.append, pool)
     second.cancel()
     assert second.ended and not first.ended
     release.set()
-    assert first.wait(60) and Job(lambda job: None, pool).wait(60) and begun == []
+    assert first.wait(240) and Job(lambda job: None, pool).wait(240) and begun == []
 
 
 class Gate:
@@ -961,13 +961,13 @@ class Gate:
 
         def work(job):
             self.begun.append(name)
-            door.wait(30)
+            door.wait(240)
 
         return Job(work, self.pool, visitor=visitor)
 
     def until(self, *names):
         """Wait until exactly these have begun."""
-        end = time.monotonic() + 30
+        end = time.monotonic() + 240
         while len(self.begun) < len(names) and time.monotonic() < end:
             time.sleep(0.005)
         assert sorted(self.begun) == sorted(names)  # two threads may begin at once
@@ -995,7 +995,7 @@ def test_a_second_computation_waits_behind_the_first_of_others():
     two.until("one", "two", "of another", "of another page")
     for door in (*gate.doors.values(), *two.doors.values()):
         door.set()
-    assert all(job.wait(30) for job in jobs)
+    assert all(job.wait(240) for job in jobs)
 
 
 def test_who_has_nothing_under_way_does_not_wait_for_long_jobs_of_others(monkeypatch):
@@ -1010,7 +1010,7 @@ def test_who_has_nothing_under_way_does_not_wait_for_long_jobs_of_others(monkeyp
     gate.until("hostile 0", "hostile 1", "hostile 6", "of another")
     for door in gate.doors.values():
         door.set()
-    assert all(job.wait(30) for job in jobs)
+    assert all(job.wait(240) for job in jobs)
 
 
 def test_short_jobs_are_waited_for(monkeypatch):
@@ -1021,7 +1021,7 @@ def test_short_jobs_are_waited_for(monkeypatch):
     gate.doors["one"].set()
     gate.until("one", "two")
     gate.doors["two"].set()
-    assert all(job.wait(30) for job in jobs)
+    assert all(job.wait(240) for job in jobs)
 
 
 def test_what_takes_too_long_is_ended_with_a_line():
@@ -1030,7 +1030,7 @@ def test_what_takes_too_long_is_ended_with_a_line():
             cancelling.check("work")
 
     job = Job(work, Pool(1, "test", seconds=0.01))
-    assert job.wait(60) and not job.cancelled()
+    assert job.wait(240) and not job.cancelled()
     assert "longer than the 0.01 s allowed per computation on this server" in job.error
 
 
@@ -1042,7 +1042,7 @@ def test_a_job_of_a_server_that_ends_is_ended_without_a_line(monkeypatch):
         cancelling.check("work")
 
     job = Job(work, Pool(1, "test"))  # without a time limit
-    assert job.wait(60) and job.result is None and job.error == ""
+    assert job.wait(240) and job.result is None and job.error == ""
 
 
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
@@ -1053,9 +1053,9 @@ def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
         return gf.pack(20_000, mu=0.5, seed=1)  # for minutes
 
     job = Job(work)
-    assert begun.wait(60) and not job.wait(0.3)
+    assert begun.wait(240) and not job.wait(0.3)
     job.cancel()
-    assert job.wait(60) and job.result is None and job.error == ""
+    assert job.wait(240) and job.result is None and job.error == ""
 
 
 def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
@@ -1064,7 +1064,7 @@ def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
     work = compute.states(library, selected("walk", cell_parameters(0.2)))
     pool = Pool(2, "test")
     jobs = [Job(once_both_are_there(begin, work), pool) for _ in range(2)]
-    assert all(job.wait(60) and job.error == "" for job in jobs)
+    assert all(job.wait(240) and job.error == "" for job in jobs)
     assert [job.result.cell.mu for job in jobs] == [0.2, 0.2] and made == [1]
 
 
@@ -1075,7 +1075,7 @@ def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
     for states in (3, 4):
         work = compute.states(library, select(DISKS, 0.2, 7, states=states))
         jobs.append(Job(once_both_are_there(begin, work), pool))
-    assert all(job.wait(60) and job.error == "" for job in jobs)
+    assert all(job.wait(240) and job.error == "" for job in jobs)
     assert [len(job.result.replay.number) for job in jobs] == [4, 5] and made == [1]
 
 
@@ -1099,20 +1099,20 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
     def work(job):
         with compute.in_turn(job, "walk", {"mu": 1}):
             inside.set()
-            release.wait(30)
+            release.wait(240)
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(60)
+    assert inside.wait(240)
     second = Job(work, pool)
-    late = time.monotonic() + 30
+    late = time.monotonic() + 240
     while "already under way" not in second.stage and time.monotonic() < late:
         time.sleep(0.01)
     assert "already under way" in second.stage
     second.cancel()
-    assert second.wait(60) and not first.ended
+    assert second.wait(240) and not first.ended
     release.set()
-    assert first.wait(60) and first.error == second.error == ""
+    assert first.wait(240) and first.error == second.error == ""
 
 
 def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
@@ -1138,7 +1138,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
             time.sleep(0.01)
 
     task.start(work)
-    assert told.wait(60)
+    assert told.wait(240)
     state.work.poll()
     assert line.progress["fraction"] == 0.25
     assert line.progress["words"] == "counting — about 20 min more"
@@ -1151,7 +1151,7 @@ def test_a_job_wakes_the_page_when_it_ends():
     woken = threading.Event()
     task = Task(wake=lambda function: woken.set())
     task.start(lambda job: None)
-    assert woken.wait(60)
+    assert woken.wait(240)
 
 
 # Damaged stores
@@ -1234,7 +1234,7 @@ class Panic(BaseException):
 def test_a_pool_survives_what_its_jobs_raise(error):
     pool = Pool(1, "test")
     job = Job(raising(error), pool)
-    assert job.wait(60) and type(error).__name__ in job.error and "\n" not in job.error
+    assert job.wait(240) and type(error).__name__ in job.error and "\n" not in job.error
     assert next_on(pool)
 
 
@@ -1242,9 +1242,9 @@ def test_a_pool_survives_jobs_whose_end_fails():
     pool = Pool(1, "test")
     for _ in range(3):
         job = Job(lambda job: "done", pool, raising(NameError("partial")))
-        assert job.wait(60) and job.result == "done"
+        assert job.wait(240) and job.result == "done"
     release = threading.Event()
-    Job(lambda job: release.wait(60), pool)
+    Job(lambda job: release.wait(240), pool)
     waiting = Job(lambda job: None, pool, raising(NameError("partial")))
     waiting.cancel()  # by the thread of the page, which goes on as well
     release.set()
@@ -1271,9 +1271,9 @@ def test_a_pool_survives_pages_that_are_gone(library):
     for task in tasks:
         task.start(work)
     jobs = [task.job for task in tasks]
-    assert begun.wait(60)
+    assert begun.wait(240)
     state.work.close()
-    assert all(job.wait(60) for job in jobs) and next_on(pool)
+    assert all(job.wait(240) for job in jobs) and next_on(pool)
 
 
 def test_nothing_begins_for_a_page_that_was_closed(state):
@@ -1299,15 +1299,15 @@ def test_who_waits_for_another_page_leaves_the_thread_to_others():
     def work(job):
         with compute.in_turn(job, "walk", {"mu": 2}):
             inside.set()
-            return release.wait(30)
+            return release.wait(240)
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(60)
+    assert inside.wait(240)
     others = [Job(work, pool) for _ in range(3)]
     assert next_on(pool) and not any(job.ended for job in (first, *others))
     release.set()
-    assert all(job.wait(60) and job.result for job in (first, *others))
+    assert all(job.wait(240) and job.result for job in (first, *others))
 
 
 # Views
@@ -1383,7 +1383,7 @@ def test_a_walk_in_the_store_is_found_not_computed(library):
     chosen = selected("walk", cell_parameters(1))
     stored = library.find("walk", cell_parameters(1))
     job = Job(compute.states(library, chosen))
-    assert job.wait(60) and job.error == "" and job.result.cell.mu == 1
+    assert job.wait(240) and job.error == "" and job.result.cell.mu == 1
     assert stored.store is library.shipped
 
 

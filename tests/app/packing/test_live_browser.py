@@ -26,13 +26,15 @@ from small_store import KEPT
 
 from app.results import geometry
 
-WATCH = """e => {
+# With each picture: a side of the box, how pale the bars are, and the numbers beside.
+WATCH = """(e, [bars, results]) => {
     const {hand} = e.scene, {live} = hand.player, {receive} = live
     window.seen = {pictures: [], states: 0, pale: 0}
     live.receive = (news) => {
         if (news.picture) {
             const {picture} = news, box = picture.box ?? picture.get("box")
-            seen.pictures.push([...box][0])
+            const values = [...results.querySelectorAll("td")].map((one) => one.textContent)
+            seen.pictures.push([[...box][0], getComputedStyle(bars).opacity, values])
         } else seen.states += 1
         receive.call(live, news)
     }
@@ -104,23 +106,24 @@ def test_a_tilting_packing_is_drawn_with_its_images(visit):
 def test_a_new_mu_is_seen_to_jam_and_to_walk_and_can_be_discarded(visit, own_mu):
     """Pale at once, a shrinking box, then a walk that grows; without it, the old one is back."""
     page = visit()
-    page.locator(".scene").evaluate(WATCH)
     bars, values = page.locator(".in-intervals"), page.locator(".results td")
+    beside = bars.element_handle(), page.locator("section.results").element_handle()
+    page.locator(".scene").evaluate(WATCH, beside)
     faint = "e => getComputedStyle(e).opacity"
     z = values.all_inner_texts()[-4]
     ask_for_many_states(page)
     ask(page, own_mu)
-    # Beside the new packing there is no number of the old one.
-    until(page, "scene.hand.player.live.moves")
-    assert bars.evaluate(faint) == "0" and set(values.all_inner_texts()[1:5]) == {"–"}
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
     assert bars.evaluate(faint) == "1"  # of the walk that grows
     assert values.all_inner_texts()[-4] not in (z, "–")  # z is already that of the new packing
     assert set(values.all_inner_texts()[1:5]) == {"–"}
     shows(page, own_mu)
     seen = page.evaluate("seen")
-    assert seen["pale"] and len(seen["pictures"]) >= 12 and seen["states"]
-    assert seen["pictures"][0] > 1.1 * seen["pictures"][-1]
+    sides, pale, beside = zip(*seen["pictures"], strict=True)
+    assert seen["pale"] and len(sides) >= 12 and seen["states"]
+    assert sides[0] > 1.1 * sides[-1]
+    # Beside the new packing there is no number of the old one.
+    assert set(pale) == {"0"} and all(text.endswith("–") for one in beside for text in one[1:5])
     # The walk is on screen, not the packing that moved before.
     until(page, "!scene.hand.player.live.moves && scene.painted > 0")
     page.get_by_role("button", name="Discard").click()
