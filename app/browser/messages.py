@@ -10,6 +10,7 @@ A component states both directions: methods with `from_browser` handle what its 
 
 from collections.abc import Callable
 from numbers import Integral, Real
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,6 +31,20 @@ def from_browser(**shape: Any) -> Callable[[Method], Method]:
         return method
 
     return declare
+
+
+def forward(path: str, **shape: Any) -> Callable[..., None]:
+    """A method that passes the field of such messages to a method of a part: "_state.hand.grab".
+
+    A list becomes several arguments; nothing is passed for True.
+    """
+
+    @from_browser(**shape)
+    def passed(self: Any, **fields: Any) -> None:
+        (given,) = fields.values() or ((),)
+        attrgetter(path)(self)(*(given if isinstance(given, (list, tuple)) else (given,)))
+
+    return passed
 
 
 def fits(value: Any, shape: Any) -> bool:

@@ -7,7 +7,7 @@ import param
 from bokeh.document import Document
 
 from ..browser.bundle import Scripted
-from ..browser.messages import Array, from_browser
+from ..browser.messages import Array, forward, from_browser
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
@@ -94,59 +94,22 @@ class Player(Scripted, Appearance):
         self.stream.start(visible)
         self._state.hand.show()
 
-    @from_browser(visible=bool)
-    def _see(self, visible: bool) -> None:
-        self.stream.visible = visible
-
-    @from_browser(painted=int)
-    def _paint(self, painted: int) -> None:
-        self.stream.painted = painted
-
-    @from_browser(grab=int)
-    def _grab(self, grab: int) -> None:
-        self._state.hand.grab(grab)
-
-    @from_browser(pull=[int, float])
-    def _pull(self, pull: tuple[int, float]) -> None:
-        self._state.hand.pull(*pull)
-
-    @from_browser(grab_point=True)
-    def _grab_point(self) -> None:
-        self._state.hand.grab_point()
-
-    @from_browser(pull_point=[float, float])
-    def _pull_point(self, pull_point: tuple[float, float]) -> None:
-        self._state.hand.pull_point(*pull_point)
-
-    @from_browser(undo=True)
-    def _undo(self) -> None:
-        self._state.hand.undo()
-
-    @from_browser(free=True)
-    def _free(self) -> None:
-        self._state.hand.pulls = []
-
-    @from_browser(hold=[int, float, float])
-    def _hold(self, hold: tuple[int, float, float]) -> None:
-        """Declare f_n of a contact known, with ± its error bar."""
-        self._state.knowledge.hold(*hold)
-
-    @from_browser(release=int)
-    def _release(self, release: int) -> None:
-        self._state.knowledge.release(release)
-
-    @from_browser(tab=int)
-    def _choose_tab(self, tab: int) -> None:
-        self._state.looks.choose_tab(tab)
-
-    @from_browser(wide=bool)
-    def _fit(self, wide: bool) -> None:
-        self._state.looks.wide = wide
-
-    @from_browser(keep=int)
-    def _keep(self, keep: int) -> None:
-        """Store all networks of the walk, then show the one with this number."""
-        self._state.keep_all(keep)
+    _see = forward("stream.look", visible=bool)
+    _confirm = forward("stream.confirm", painted=int)
+    # A drag of a contact, and of the point in force space; then f_n is where it was released.
+    _grab = forward("_state.hand.grab", grab=int)
+    _pull = forward("_state.hand.pull", pull=[int, float])
+    _grab_point = forward("_state.hand.grab_point", grab_point=True)
+    _pull_point = forward("_state.hand.pull_point", pull_point=[float, float])
+    _undo = forward("_state.hand.undo", undo=True)
+    _free = forward("_state.hand.free", free=True)
+    # f_n of a contact, and ± its error bar, is taken for known.
+    _hold = forward("_state.knowledge.hold", hold=[int, float, float])
+    _release = forward("_state.knowledge.release", release=int)
+    _choose_tab = forward("_state.looks.choose_tab", tab=int)
+    _fit = forward("_state.looks.fit", wide=bool)
+    # All networks of the walk are stored, then the one with this number is shown.
+    _keep = forward("_state.keep_all", keep=int)
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:

@@ -116,6 +116,10 @@ class Hand(param.Parameterized):
         """Undo the last pull."""
         self.pulls = self.pulls[:-1]
 
+    def free(self) -> None:
+        """Undo all pulls."""
+        self.pulls = []
+
     @property
     def _all(self) -> tuple[Any, ...]:
         """The dependencies: pulls, the Replay and its row on screen, known forces."""

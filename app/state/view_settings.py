@@ -113,6 +113,10 @@ class Looks(Appearance):
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 
+    def fit(self, wide: bool) -> None:
+        """Give force space a place of its own if the window is wide."""
+        self.wide = wide
+
     def choose_tab(self, number: int) -> None:
         """Show tab 1, 2, …; other numbers, and force space where it has no tab, have no effect."""
         name = dict(enumerate(TABS, 1)).get(number)

@@ -20,17 +20,25 @@ class Stream:
         """document: provides the timer; without one, call `tick` yourself."""
         self.state, self.work, self.player = state, state.work, player
         self._document = document
-        self._sent = self.painted = 0  # numbers of the last messages sent, and painted
-        self.visible, self._ticking = False, None
+        self._sent = self._painted = 0  # numbers of the last messages sent, and painted
+        self._visible, self._ticking = False, None
         self.work.param.watch(self._follow, ["live", "arriving"])
         observe(self._show, state, "missing", "selection", "cell", "work.busy")
         self._follow()
 
     def start(self, visible: bool) -> None:
         """Begin anew, for a page that has been redrawn."""
-        self._sent, self.painted, self.visible = 0, 0, visible
+        self._sent, self._painted, self._visible = 0, 0, visible
         if self.work.live is not None:
             self.work.live.rewind()
+
+    def look(self, visible: bool) -> None:
+        """Send to a visible page only."""
+        self._visible = visible
+
+    def confirm(self, painted: int) -> None:
+        """The page has painted the message with this number."""
+        self._painted = painted
 
     def _show(self, *events: Any) -> None:
         self.player.requested = self.state.requested
@@ -51,7 +59,7 @@ class Stream:
     def tick(self) -> None:
         """Send new results if the browser is ready for them."""
         following = self.state.follow()
-        while following and self.visible and self._sent - self.painted < AHEAD:
+        while following and self._visible and self._sent - self._painted < AHEAD:
             news = following.next()
             if news is None:
                 return

@@ -9,7 +9,7 @@ from granforce.types import Integers
 
 from ....background.notifications import observe
 from ....browser.bundle import Scripted
-from ....browser.messages import from_browser
+from ....browser.messages import forward, from_browser
 from ....state.app_state import AppState
 from ....state.known import Knowledge, Ranked
 from ....widgets.hints import term
@@ -41,14 +41,8 @@ class Known(Scripted):
         )  # fmt: skip
         self._show()
 
-    @from_browser(release=int)
-    def _release(self, release: int) -> None:
-        self._state.knowledge.release(release)
-
-    @from_browser(next=True)
-    def _rank(self) -> None:
-        """Find the contact to measure next."""
-        self._state.knowledge.rank()
+    _release = forward("_state.knowledge.release", release=int)
+    _rank = forward("_state.knowledge.rank", next=True)
 
     @from_browser(choose=int)
     def _choose(self, choose: int) -> None:

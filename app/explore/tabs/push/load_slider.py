@@ -5,7 +5,7 @@ from collections.abc import Callable
 import param
 
 from ....browser.bundle import Scripted
-from ....browser.messages import from_browser
+from ....browser.messages import forward
 
 
 class LoadSlider(Scripted):
@@ -22,10 +22,5 @@ class LoadSlider(Scripted):
         super().__init__(sizing_mode="stretch_width", margin=(4, 10))
         self._pushed, self._reached = pushed, reached
 
-    @from_browser(push=True)
-    def _push(self) -> None:
-        self._pushed()
-
-    @from_browser(reached=True)
-    def _reach(self) -> None:
-        self._reached()
+    _push = forward("_pushed", push=True)
+    _reach = forward("_reached", reached=True)
