@@ -1142,9 +1142,12 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     state.work.poll()
     assert line.progress["fraction"] == 0.25
     assert line.progress["words"] == "counting — about 20 min more"
+    job, task.job.keeps = task.job, True
+    line.hear({"stop": True})
+    assert job.enough() and not job.cancelled()
     line.hear({"cancel": True})
     wait_for(state)
-    assert not line.progress
+    assert job.cancelled() and not line.progress
 
 
 def test_a_job_wakes_the_page_when_it_ends():

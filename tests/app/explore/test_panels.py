@@ -43,7 +43,7 @@ from app.results import distributions, planes, study_data, uploads
 from app.results.library import Library
 from app.results.replays import first_replay
 from app.results.saved_file import csv
-from app.state import perturbations
+from app.state import app_state, perturbations
 from app.state.links import link, read_link
 from app.state.scene_links import request_of
 from app.widgets import label_places
@@ -410,7 +410,9 @@ def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):
     assert np.array_equal(made.x, scene("arch").x)
 
 
-def test_an_upload_is_kept_reported_and_shown(state):
+def test_an_upload_is_kept_reported_and_shown(state, monkeypatch):
+    monkeypatch.setattr(upload_view, "STATES", 5)
+    monkeypatch.setattr(app_state, "EXACT_FOLLOW", 0)
     view = upload_view.View(state)
     both = dumps()
     drop(view.dropper, [("a", both["particles"][1])])

@@ -146,17 +146,6 @@ def test_computed_states_are_shown_to_the_last(visit, own_mu):
     expect(page.locator(".requested")).to_be_empty()
 
 
-def test_stopped_a_walk_is_kept_with_the_states_it_has(visit, own_mu):
-    page = visit(f"?mu={own_mu}&n=30&states=20000&relax=nearest_piqp")
-    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
-    page.get_by_role("button", name="Stop and keep").click()
-    until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
-    states = scene(page, "scene.geometry.states")
-    searched(page, f"states={states}")
-    expect(page.locator(".source")).to_contain_text(f"{states} networks")
-    expect(page.locator(".stage.pale")).to_have_count(0)
-
-
 # A message is of three frames: the one that says that the page has come is half a second late.
 LATE = """
 const {send} = WebSocket.prototype
