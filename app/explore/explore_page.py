@@ -9,7 +9,7 @@ import panel as pn
 from bokeh.document import Document
 
 from ..browser.panel_patches import send_what_waits
-from ..packing.view import PackingView
+from ..packing.player import Player
 from ..state import held_file, page_session
 from ..state.app_state import AppState
 from ..widgets.header import Header
@@ -120,7 +120,7 @@ def explore_page(document: Document, query: str) -> Any:
     looks.dark = page_session.dark(query)
     work.message = work.message or " ".join(state.library.notes)
     held_file.follow(state.knowledge)
-    side = pn.Column(PackingView(state, document).player, css_classes=["side"], **WIDE)
+    side = pn.Column(Player(state, document), css_classes=["side"], **WIDE)
     if dict(parse_qsl(query.lstrip("?"))).get("embed") == "1":
         whole = framed(None, [side], dark=looks.dark)
     else:

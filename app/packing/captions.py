@@ -8,7 +8,7 @@ from ..results.library import Cell
 from ..results.selection import Selection
 from ..state.app_state import AppState
 from ..state.view_settings import WIDTHS
-from .view import colour_bar, colours, quantities
+from .legend import colour_bar, colours, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
 PACKED = "network as packed"

@@ -6,12 +6,26 @@ import numpy as np
 import param
 from bokeh.document import Document
 
+from ..background.notifications import observe
 from ..browser.bundle import Scripted
 from ..browser.messages import Array, forward, from_browser
+from ..results import compute, progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.view_settings import Appearance
+from ..widgets.plot_style import palettes
+from .legend import (
+    THRUST,
+    exact_intervals,
+    full_colour,
+    jamming,
+    legend,
+    measured,
+    pins,
+    projection,
+    reduction,
+)
 from .replay.stream import Stream
 
 # Messages to the script: forces in ⟨f_n⟩, arrays flat.
@@ -27,6 +41,11 @@ PICTURE |= {"normal": Array, "tangential": Array}
 # States of a walk in progress, one after the other, each with the numbers shown next to it.
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
 STATES |= {"eta1": Array, "eta2": Array, "eta3": Array}
+
+# Parameters of the view that the player also knows, and those that it may change.
+APPEARANCE = sorted(set(Appearance.param) - {"name"})
+SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
+SHARED += ("stretch", "paused", "opened", "pulled")
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
@@ -64,13 +83,11 @@ class Player(Scripted, Appearance):
     reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
     measured = param.Dict(default={}, doc="of a frame, see packing.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
-    pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
-    thrust = param.Dict(
-        default={}, doc="where resultants at joints can pass, see drawing/thrust.js"
-    )
-    plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
-    palettes = param.Dict(default={}, doc="colours, see style.palettes")
-    scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
+    pins = param.Dict(default={}, doc="contacts that are known, and to measure; see legend.pins")
+    thrust = param.Dict(default={}, doc="where resultants at joints pass, see drawing/thrust.js")
+    plane = param.Dict(default={}, doc="of force space on screen, see legend.projection")
+    palettes = param.Dict(default={}, doc="colours, see plot_style.palettes")
+    scales = param.Dict(default=SCALES, doc="width and full colours of chains, see chain_style.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
     requested = param.String(doc="the requested selection if it is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
@@ -82,11 +99,50 @@ class Player(Scripted, Appearance):
     between = param.List(default=None, allow_None=True)
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    def __init__(self, state: AppState, document: Document | None = None, **params: Any) -> None:
+    def __init__(self, state: AppState, document: Document | None = None) -> None:
         """document: provides the timer of `stream`; without one, call its `tick` yourself."""
-        super().__init__(**params)
-        self._state, self.stream = state, Stream(state, self, document)
-        state.hand.tell = self.tell
+        looks = state.looks
+        super().__init__(
+            name="player",  # its name for other components of the page
+            sizing_mode="stretch_width",
+            palettes=palettes(looks.dark),
+            zoom=None if looks.zoom is None else list(looks.zoom),
+            **{name: getattr(looks, name) for name in APPEARANCE},
+            source=state.source,
+            busy=state.work.busy,
+        )
+        self._state, state.hand.tell = state, self.tell
+        for name in SHARED:
+            self.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
+        self._shown = None
+        for name in ("between", "zoom"):
+            self.param.watch(self._go, name)
+        looks.param.watch(self._follow, APPEARANCE)
+        observe(self._follow, state, "source", "loads", "work.busy")
+        observe(
+            self._show, state, "shown", "exact", "measured", "knowledge.narrowed", "looks.between",
+            "looks.full",
+        )  # fmt: skip
+        observe(self._pin, state, "replay", "knowledge.known", "knowledge.ranked")
+        observe(self._displace, state, "displacement")
+        observe(self._accompany, state, "comparison.twin")
+        dress = self.param.update
+        observe(lambda event: dress(plane=projection(event.new)), state, "plane")
+        observe(lambda event: dress(palettes=palettes(event.new)), looks, "dark")
+        observe(
+            self._explain, state, "looks.colour", "looks.thickness", "looks.full", "looks.stretch",
+            "looks.dark", "looks.tab", "looks.reference", "looks.pulled", "shown", "exact", "loads",
+            "measured", "knowledge.known", "knowledge.narrowed", "hand.pulls", "work.moving",
+        )  # fmt: skip
+        observe(self._turn, looks, "tab")
+        self._bounding = state.work.task(reported=False)
+        observe(self._bound_thrust, state, "replay")
+        self._show()
+        self._accompany()
+        self._bound_thrust()
+        self._pin()
+        self._explain()
+        self.stream = Stream(state, self, document)
 
     @from_browser(drawn=True, visible=bool)
     def _start(self, visible: bool) -> None:
@@ -110,6 +166,78 @@ class Player(Scripted, Appearance):
     _fit = forward("_state.looks.fit", wide=bool)
     # All networks of the walk are stored, then the one with this number is shown.
     _keep = forward("_state.keep_all", keep=int)
+
+    # What it is sent
+
+    def _go(self, event: Any) -> None:
+        """To and fro, or to another part of the picture; browsers send tuples as lists."""
+        self._state.looks.param.update(
+            {event.name: None if event.new is None else tuple(event.new)}
+        )
+
+    def _follow(self, *events: Any) -> None:
+        self.param.update({event.name: event.new for event in events})
+
+    def _show(self, *events: Any) -> None:
+        """Send related changes in one message."""
+        state, looks, replay = self._state, self._state.looks, self._state.shown
+        if replay is None:
+            return
+        exact = exact_intervals(state.drawn, replay)
+        changes = {
+            "exact": exact,
+            "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
+            "measured": measured(state, replay),
+            "most": full_colour(state),
+            "between": None if looks.between is None else list(looks.between),
+        }
+        if self._shown is not replay:
+            self._shown = replay
+            room = len(progress_feed.numbers(replay.summary)) if state.growing else 0
+            changes["walk"] = frames(replay, room)
+        changes["keepable"] = state.keepable
+        self.param.update(changes)
+
+    def _turn(self, event: Any) -> None:
+        """Hide the held forces in the tab of pushes, which ignore them, and show them in others."""
+        if self._state.knowledge.known and "perturb" in (event.old, event.new):
+            self._show()
+
+    def _accompany(self, *events: Any) -> None:
+        """Show another packing next to the one on screen."""
+        twin = self._state.comparison.twin
+        if twin is None:
+            self.twin = {}
+        else:
+            exact = exact_intervals(twin.exact, twin.replay)
+            self.twin = frames(twin.replay) | {"exact": exact}
+
+    def _bound_thrust(self, *events: Any) -> None:
+        """Of bodies: compute where the resultants at their joints can pass."""
+        state, replay = self._state, self._state.replay
+        self.thrust = {}
+        if replay is not None and replay.outlines and replay.summary["dimension"]:
+            work = compute.thrust(state.library, state.cell)
+            self._bounding.start(work, lambda bands: self._show_thrust(bands, replay))
+
+    def _show_thrust(self, bands: dict[str, Any], replay: Replay) -> None:
+        if replay is self._state.replay:
+            self.thrust = bands
+            self._explain()
+
+    def _pin(self, *events: Any) -> None:
+        self.pins = pins(self._state.knowledge)
+
+    def _displace(self, event: Any) -> None:
+        field = event.new
+        flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
+        self.displacement = flat
+
+    def _explain(self, *events: Any) -> None:
+        if self._state.work.moving:
+            self.legend = jamming(self._state)
+            return
+        self.legend = legend(self._state) + (THRUST if self.thrust else "")
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:

@@ -29,8 +29,8 @@ from app.explore.results_line import left_out
 from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
-from app.packing.player import frames
-from app.packing.view import COMING, PackingView, exact_intervals
+from app.packing.legend import COMING, exact_intervals
+from app.packing.player import Player, frames
 from app.page import learns
 from app.results import compute, distributions, replays
 from app.results.geometry import MARGIN
@@ -689,16 +689,16 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
-    view = PackingView(state)
-    assert "change since packed</option>" in view.player.legend
+    player = Player(state)
+    assert "change since packed</option>" in player.legend
     for by in ("pull", "push"):
-        view.player.pulled = by
-        assert f'value="change" selected>change by the {by}</option>' in view.player.legend
+        player.pulled = by
+        assert f'value="change" selected>change by the {by}</option>' in player.legend
     state.looks.colour = "extent"
-    assert '<option value="extent" selected' in view.player.legend  # and can still be chosen
-    assert 'class="scale"' in view.player.legend
+    assert '<option value="extent" selected' in player.legend  # and can still be chosen
+    assert 'class="scale"' in player.legend
     state.looks.colour = "load"
-    assert COMING in view.player.legend and 'class="scale"' not in view.player.legend
+    assert COMING in player.legend and 'class="scale"' not in player.legend
     state.work.cancel()
 
 

@@ -12,8 +12,8 @@ from granforce.records import InputError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
 
+from ...packing.legend import exact_intervals
 from ...packing.player import frames
-from ...packing.view import exact_intervals
 from ...results import study_data
 from ...results.library import Cell, Library, Shown, best_cell
 from ...state.perturbations import path

@@ -37,8 +37,7 @@ from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
 from app.explore.tabs.push.over_packings import responses
 from app.explore.tabs.your_packing import upload as upload_view
-from app.packing.player import frames
-from app.packing.view import PackingView
+from app.packing.player import Player, frames
 from app.results import distributions, planes, study_data, uploads
 from app.results.library import Library
 from app.results.replays import first_replay
@@ -871,7 +870,7 @@ def test_finished_results_say_where_they_have_states_and_where_there_are_none(st
 
 
 def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
-    player = PackingView(state).player
+    player = Player(state)
 
     def offered(*names):
         return [f'<option value="{name}"' in player.legend for name in names]

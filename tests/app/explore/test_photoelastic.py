@@ -9,7 +9,7 @@ from visitor import drop, wait_for
 import granforce as gf
 from app.explore.tabs.your_packing import frame_picture
 from app.explore.tabs.your_packing.upload import View
-from app.packing.view import PackingView
+from app.packing.player import Player
 from app.results import photoelastic_frames, uploads
 from granforce.experiment.pegs import read_pegs
 from granforce.forces.build import ensemble
@@ -193,7 +193,7 @@ def test_a_frame_is_opened_as_a_packing(state):
     shown = state.replay.normal[0] * state.replay.force_scale
     np.testing.assert_allclose(shown, forces[S.index, 0], rtol=1e-5, atol=1e-7 * S.force_scale)
     # Chains can show what was measured, and how far off it is, as in the frame's own pictures.
-    player = PackingView(state).player
+    player = Player(state)
     assert '<option value="deviation"' in player.legend
     assert '<option value="measured"' in player.legend
     own = player.measured["normal"] * state.replay.force_scale

@@ -12,7 +12,7 @@ from app.browser.messages import fits
 from app.explore.controls import Controls
 from app.explore.tabs.force_space import force_space
 from app.explore.tabs.intervals.intervals import View
-from app.packing.view import PackingView
+from app.packing.player import Player
 from app.results import planes, progress_feed
 from app.results.selection import select
 from app.state.page_tasks import Work
@@ -23,7 +23,7 @@ class Browser:
 
     def __init__(self, state, awake=True):
         self.state, self.awake, self.got = state, awake, []
-        self.player = PackingView(state).player
+        self.player = Player(state)
         self.stream = self.player.stream
         self.player.tell = self._take
         self.player.hear({"drawn": True, "visible": awake})
@@ -192,13 +192,13 @@ def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
 
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser = Browser(state)
-    view = PackingView(state)
-    assert "faint disks: no force" in view.player.legend
+    player = Player(state)
+    assert "faint disks: no force" in player.legend
     state.ask(asked(0.35, 20_000), at_once=True)
     browser.run(lambda: state.work.moving)
-    assert "the shrinking box" in view.player.legend
+    assert "the shrinking box" in player.legend
     browser.run(lambda: state.growing)
-    assert "faint disks: no force" in view.player.legend
+    assert "faint disks: no force" in player.legend
     state.work.cancel()
     browser.run()
 

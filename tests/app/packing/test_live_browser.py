@@ -107,7 +107,7 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk_and_can_be_discarded(visit, own_mu)
     """Pale at once, a shrinking box, then a walk that grows; without it, the old one is back."""
     page = visit()
     bars, values = page.locator(".in-intervals"), page.locator(".results td")
-    beside = bars.element_handle(), page.locator("section.results").element_handle()
+    beside = [bars.element_handle(), page.locator("section.results").element_handle()]
     page.locator(".scene").evaluate(WATCH, beside)
     faint = "e => getComputedStyle(e).opacity"
     z = values.all_inner_texts()[-4]

@@ -4,7 +4,7 @@ import pytest
 from small_store import DISKS, STATES
 from visitor import wait_for
 
-from app.packing.view import PackingView
+from app.packing.player import Player
 from app.results.selection import select
 from app.state.app_state import AppState
 
@@ -14,7 +14,7 @@ def asked(mu, **others):
 
 
 def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state):
-    player = PackingView(state).player
+    player = Player(state)
     state.ask(asked(1))
     wait_for(state)
     assert state.looks.beside is None and state.comparison.twin is None  # not split

@@ -7,7 +7,7 @@ from visitor import wait_for
 from app.browser.messages import fits
 from app.explore.tabs.export.files import contacts
 from app.packing.captions import network
-from app.packing.view import PackingView
+from app.packing.player import Player
 from app.results import planes
 from app.state import pulls
 from granforce.live import pulls as live_pulls
@@ -18,7 +18,7 @@ class Page:
 
     def __init__(self, state):
         self.state, self.told = state, []
-        self.player = PackingView(state).player
+        self.player = Player(state)
         state.hand.tell = self._tell
         wait_for(self.state)
         self.hear(drawn=True, visible=True)

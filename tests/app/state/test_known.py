@@ -10,7 +10,8 @@ from app.explore.results_line import tables
 from app.explore.status_line import bounds
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.known_forces import meaning, words
-from app.packing.view import PackingView, legend
+from app.packing.legend import legend
+from app.packing.player import Player
 from app.state import known
 from app.state.known import Statement
 from granforce.packing.importers import read_known
@@ -47,7 +48,7 @@ def test_a_force_in_single_precision_is_held_as_it_is_read(state):
 
 
 def test_colour_and_width_show_what_measuring_took_away(state):
-    player = PackingView(state).player
+    player = Player(state)
     assert player.reduction is None
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     state.knowledge.hold(9, float(state.replay.normal[0, 9]), 0.02)
@@ -106,21 +107,21 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
 
 
 def test_a_push_shows_no_held_forces(state):
-    view = PackingView(state)
+    player = Player(state)
     state.looks.colour = "extent"
     state.compute_exact()
     wait_for(state)
-    most = view.player.most
+    most = player.most
     held(state, 4)
-    given = view.player.exact["high"]
-    assert view.player.most == most and "(scale of the free forces)" in legend(state)
+    given = player.exact["high"]
+    assert player.most == most and "(scale of the free forces)" in legend(state)
     assert "given the held" in bounds(state)
     state.looks.tab = "perturb"
     assert "(exact, this packing)" in legend(state)
-    assert view.player.reduction is None and np.all(view.player.exact["high"] >= given - 1e-6)
-    assert np.any(view.player.exact["high"] > given + 1e-3)
+    assert player.reduction is None and np.all(player.exact["high"] >= given - 1e-6)
+    assert np.any(player.exact["high"] > given + 1e-3)
     state.looks.tab = "intervals"
-    np.testing.assert_array_equal(view.player.exact["high"], given)
+    np.testing.assert_array_equal(player.exact["high"], given)
 
 
 def test_an_error_bar_narrows_less_and_leaves_the_dimension(state):

@@ -12,7 +12,7 @@ from app.background.jobs import Job, Later, turn_of
 from app.explore.controls import Controls
 from app.explore.status_line import StatusLine
 from app.explore.tabs.export import export
-from app.packing.view import measured
+from app.packing.legend import measured
 from app.results import compute, progress_feed, uploads
 from app.results.library import Library
 from app.results.selection import Selection

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ....background.jobs import Job, reading
 from ....packing.captions import caption, known_words, network, origin, shown_stem, stem
-from ....packing.view import measured, pins, reduction
+from ....packing.legend import measured, pins, reduction
 from ....results.compute import computed_anew, thrust
 from ....results.library import Cell, Library
 from ....results.saved_file import File, csv

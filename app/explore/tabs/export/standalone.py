@@ -16,8 +16,8 @@ from bokeh.resources import Resources
 
 from ....background.jobs import Job
 from ....browser.bundle import Scripted, module
+from ....packing.legend import THRUST, exact_intervals, full_colour, legend
 from ....packing.player import Player, frames
-from ....packing.view import THRUST, exact_intervals, full_colour, legend
 from ....results import planes
 from ....results.library import Cell, Library
 from ....results.replays import Replay, evenly

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import panel as pn
 
 from ....background.jobs import Job, reading
-from ....packing.view import exact_intervals
+from ....packing.legend import exact_intervals
 from ....results import distributions, study_data
 from ....results.distributions import Row
 from ....results.library import Cell

@@ -7,7 +7,7 @@ from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
 
-from ....packing.view import Bounds
+from ....packing.legend import Bounds
 from ....results.replays import Replay, worded
 from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import figure

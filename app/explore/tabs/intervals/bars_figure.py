@@ -7,7 +7,7 @@ from bokeh.models import ColumnDataSource, Range1d
 
 from granforce.types import Floats, Integers
 
-from ....packing.view import Bounds
+from ....packing.legend import Bounds
 from ....results.replays import Replay
 from ....widgets.parts import MOVES, figure, on_tap
 from ....widgets.plot_style import DARK, DOT, ORIGINAL, PALE, hover, now

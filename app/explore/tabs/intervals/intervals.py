@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from ....background.notifications import observe
-from ....packing.view import exact_intervals
+from ....packing.legend import exact_intervals
 from ....results.replays import Replay, worded
 from ....state.app_state import AppState
 from ....state.view_settings import DRAWN, SCALES, SORTS

@@ -6,7 +6,7 @@ import numpy as np
 
 from granforce.types import Floats, Integers
 
-from ....packing.view import Bounds
+from ....packing.legend import Bounds
 from ....results.replays import Replay
 from ....state.known import Narrowed
 from ....state.view_settings import SORTS

@@ -1,28 +1,19 @@
-"""The packing: the player, its parameters shared with the server, and the legend."""
+"""What the lines of the packing show: quantities in the form for the player, and the legend."""
 
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from bokeh.document import Document
 
 from granforce.types import Floats
 
-from ..background.notifications import observe
-from ..results import compute, progress_feed
 from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..results.planes import Plane
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..state.known import Knowledge
-from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Appearance
+from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS
 from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
-from .player import Player, frames
-
-# In both directions.
-SHARED = ("contact", "frame", "reference", "split", "beside", "colour", "thickness", "full")
-SHARED += ("stretch", "paused", "opened", "pulled")
-APPEARANCE = sorted(set(Appearance.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty if unknown
 
@@ -64,124 +55,6 @@ MOBILISATION = """
 BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
 )
-
-
-class PackingView:
-    """Disks, chains, their legend, and the player's buttons: the view `player`."""
-
-    def __init__(self, state: AppState, document: Document | None = None) -> None:
-        """document: as for Player."""
-        self.state = state
-        self.looks = looks = state.looks
-        self.player = Player(
-            state,
-            document,
-            name="player",  # its name for other components of the page
-            sizing_mode="stretch_width",
-            palettes=palettes(looks.dark),
-            zoom=None if looks.zoom is None else list(looks.zoom),
-            **{name: getattr(looks, name) for name in APPEARANCE},
-            source=state.source,
-            busy=state.work.busy,
-        )
-        for name in SHARED:
-            self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
-        self._shown = None
-        for name in ("between", "zoom"):
-            self.player.param.watch(self._go, name)
-        looks.param.watch(self._follow, APPEARANCE)
-        observe(self._follow, state, "source", "loads", "work.busy")
-        observe(
-            self._show, state, "shown", "exact", "measured", "knowledge.narrowed", "looks.between",
-            "looks.full",
-        )  # fmt: skip
-        observe(self._pin, state, "replay", "knowledge.known", "knowledge.ranked")
-        observe(self._displace, state, "displacement")
-        observe(self._accompany, state, "comparison.twin")
-        dress = self.player.param.update
-        observe(lambda event: dress(plane=projection(event.new)), state, "plane")
-        observe(lambda event: dress(palettes=palettes(event.new)), looks, "dark")
-        observe(
-            self._explain, state, "looks.colour", "looks.thickness", "looks.full", "looks.stretch",
-            "looks.dark", "looks.tab", "looks.reference", "looks.pulled", "shown", "exact", "loads",
-            "measured", "knowledge.known", "knowledge.narrowed", "hand.pulls", "work.moving",
-        )  # fmt: skip
-        observe(self._turn, looks, "tab")
-        self.thrust = state.work.task(reported=False)
-        observe(self._bound_thrust, state, "replay")
-        self._show()
-        self._accompany()
-        self._bound_thrust()
-        self._pin()
-        self._explain()
-
-    def _go(self, event: Any) -> None:
-        """To and fro, or to another part of the picture; browsers send tuples as lists."""
-        self.looks.param.update({event.name: None if event.new is None else tuple(event.new)})
-
-    def _follow(self, *events: Any) -> None:
-        self.player.param.update({event.name: event.new for event in events})
-
-    def _show(self, *events: Any) -> None:
-        """Send related changes in one message."""
-        state, looks, replay = self.state, self.looks, self.state.shown
-        if replay is None:
-            return
-        exact = exact_intervals(state.drawn, replay)
-        changes = {
-            "exact": exact,
-            "reduction": reduction(state.knowledge, replay) if state.obeys_held else None,
-            "measured": measured(state, replay),
-            "most": full_colour(state),
-            "between": None if looks.between is None else list(looks.between),
-        }
-        if self._shown is not replay:
-            self._shown = replay
-            room = len(progress_feed.numbers(replay.summary)) if state.growing else 0
-            changes["walk"] = frames(replay, room)
-        changes["keepable"] = state.keepable
-        self.player.param.update(changes)
-
-    def _turn(self, event: Any) -> None:
-        """Hide the held forces in the tab of pushes, which ignore them, and show them in others."""
-        if self.state.knowledge.known and "perturb" in (event.old, event.new):
-            self._show()
-
-    def _accompany(self, *events: Any) -> None:
-        """Show another packing next to the one on screen."""
-        twin = self.state.comparison.twin
-        if twin is None:
-            self.player.twin = {}
-        else:
-            exact = exact_intervals(twin.exact, twin.replay)
-            self.player.twin = frames(twin.replay) | {"exact": exact}
-
-    def _bound_thrust(self, *events: Any) -> None:
-        """Of bodies: compute where the resultants at their joints can pass."""
-        state, replay = self.state, self.state.replay
-        self.player.thrust = {}
-        if replay is not None and replay.outlines and replay.summary["dimension"]:
-            work = compute.thrust(state.library, state.cell)
-            self.thrust.start(work, lambda bands: self._show_thrust(bands, replay))
-
-    def _show_thrust(self, bands: dict[str, Any], replay: Replay) -> None:
-        if replay is self.state.replay:
-            self.player.thrust = bands
-            self._explain()
-
-    def _pin(self, *events: Any) -> None:
-        self.player.pins = pins(self.state.knowledge)
-
-    def _displace(self, event: Any) -> None:
-        field = event.new
-        flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
-        self.player.displacement = flat
-
-    def _explain(self, *events: Any) -> None:
-        if self.state.work.moving:
-            self.player.legend = jamming(self.state)
-            return
-        self.player.legend = legend(self.state) + (THRUST if self.player.thrust else "")
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
