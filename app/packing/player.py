@@ -81,7 +81,7 @@ class Player(Scripted, Appearance):
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
     reduction = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
-    measured = param.Dict(default={}, doc="of a frame, see packing.measured")
+    measured = param.Dict(default={}, doc="of a frame, see legend.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see legend.pins")
     thrust = param.Dict(default={}, doc="where resultants at joints pass, see drawing/thrust.js")

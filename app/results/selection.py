@@ -116,24 +116,17 @@ def differing(requested: Selection, shown: Selection | None) -> str:
             if requested.imported
             else f"μ = {requested.mu:g}"
         )
-    words, other = [], shown.packing
-    if requested.mu != shown.mu:
-        words.append(f"μ = {requested.mu:g}")
-    if requested.packing["n"] != other["n"]:
-        words.append(f"N = {requested.packing['n']}")
-    if requested.packing["seed"] != other["seed"]:
-        words.append(f"seed {requested.packing['seed']}")
-    if not requested.same_mu and requested.packing["mu"] != other["mu"]:
-        words.append(f"packed at μ = {requested.packing['mu']:g}")
-    if requested.kind != shown.kind:
-        words.append(
-            f"networks {KINDS[requested.kind]}" if requested.kind == "uniform" else "a random walk"
-        )
-    if requested.states != shown.states:
-        words.append(f"{requested.states} networks")
-    if requested.kind == shown.kind == "walk" and requested.relax != shown.relax:
-        words.append(SOLVERS[requested.relax])
-    return ", ".join(words) or f"μ = {requested.mu:g}"
+    new, old, walks = requested.packing, shown.packing, requested.kind == "walk"
+    parts = {
+        f"μ = {requested.mu:g}": requested.mu != shown.mu,
+        f"N = {new['n']}": new["n"] != old["n"],
+        f"seed {new['seed']}": new["seed"] != old["seed"],
+        f"packed at μ = {new['mu']:g}": not requested.same_mu and new["mu"] != old["mu"],
+        "a random walk" if walks else f"networks {KINDS['uniform']}": requested.kind != shown.kind,
+        f"{requested.states} networks": requested.states != shown.states,
+        SOLVERS[requested.relax]: walks and shown.kind == "walk" and requested.relax != shown.relax,
+    }
+    return ", ".join(words for words, differs in parts.items() if differs) or next(iter(parts))
 
 
 def _plain(selection: Selection) -> Selection:

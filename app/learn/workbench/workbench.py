@@ -37,12 +37,7 @@ class Workbench(Scripted):
     dark = param.Boolean()
 
     def __init__(
-        self,
-        request: scene_links.Request,
-        task: Task,
-        saving: Task,
-        pushing: Task,
-        **params: Any,
+        self, request: scene_links.Request, task: Task, saving: Task, pushing: Task, **params: Any
     ) -> None:
         """request: the request in the link. task, saving, pushing: for longer work, files, limits.
 
@@ -72,11 +67,7 @@ class Workbench(Scripted):
                 self._show(name)
 
     def _replace(self, scene: dict[str, Any]) -> None:
-        for task in (
-            self._task,
-            self._saving,
-            self._pushing,
-        ):  # drop pending results for the previous scene
+        for task in (self._task, self._saving, self._pushing):  # results for the previous scene
             task.cancel()
         self._ready = True
         self.scene = scene

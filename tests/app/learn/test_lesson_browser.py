@@ -98,7 +98,8 @@ def test_every_chapter_is_played_from_prediction_to_answer(opening, lesson):
             page.get_by_role("button", name="Next").click()
     expect(page.get_by_title("done")).to_have_count(7)
     # A finished chapter is shown with its answer again, until it is begun anew.
-    for name, (_, _, answer) in CHAPTERS.items():
+    for name in ("thirteen", "chance", "push"):  # of each kind of experiment one
+        answer = CHAPTERS[name][2]
         page.goto(f"{lesson}?learn={name}")
         found.wait_for()
         told = page.locator(".voice").inner_text()
