@@ -45,21 +45,7 @@ def test_every_scene_of_the_library_is_on_the_list():
         assert page == ("Explore" if name in scene_links.LARGE else "Learn")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "groove",
-        "box",
-        "pyramid",
-        "press",
-        "leaning",
-        "solid",
-        "column",
-        "thirteen",
-        "ladder",
-        "stones",
-    ],
-)
+@pytest.mark.parametrize("name", scene_links.SMALL)
 def test_forces_less_equations_is_free(name):
     drawn = small_scenes.drawn(name)
     count = len(drawn["i"])
