@@ -741,7 +741,8 @@ BEYOND = {
     "drag_below": ("0", "-1", "1.1", "1e-7", "nan"),
     "pressure": ("0", "1e-300", "1e300", "inf", "nan"),
     "radii": (
-        "/etc/passwd", "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1", "uniform:1,2,3,", "uniform:1_0,9",
+        "/etc/passwd", "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1",
+        "uniform:1,2,3,", "uniform:1_0,9", "uniform:",
         "bidisperse:1,30,0.5", "bidisperse:-1,1,0.5", "x:" + "1," * 9000,
     ),
     "source": ("oracle", "x" * 9000),
