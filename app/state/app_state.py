@@ -461,7 +461,7 @@ class AppState(param.Parameterized):
             return "Opening the packing …"
         if self.work.computation.running:
             return "Being computed …"
-        return f"Nothing is shown: {self.requested}" if self.requested else "Nothing is shown."
+        return f"Nothing is shown ({self.requested})." if self.requested else "Nothing is shown."
 
     @property
     def unsaved(self) -> str:

@@ -32,7 +32,7 @@ class Known(Scripted):
     asking = param.Boolean(doc="whether the best contacts to measure are being computed")
 
     def __init__(self, state: AppState, **params: Any) -> None:
-        super().__init__(sizing_mode="stretch_width", margin=0, **params)
+        super().__init__(sizing_mode="stretch_width", margin=0, visible=False, **params)
         self._state = state
         observe(self._show, state, "shown", "looks.contact")
         observe(
