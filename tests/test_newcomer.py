@@ -299,8 +299,8 @@ def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsy
         assert told - LABELS - {"nearly_touching"} <= names, line
         assert names - told <= elsewhere | LABELS | RARE, line
     stored = {name: VARIABLES[name].long_name for name in MEANINGS if name in VARIABLES}
-    for name in ("friction", "limit_load", "residual", "violation", "standard_error", "states"):
-        stored.pop(name)  # the store gives these names to something else, or one for each state
+    for name in ("limit_load", "residual", "violation", "states"):
+        stored.pop(name)  # the store has one for each state or contact
     for name in ("coordination", "pressure", "reached"):  # of which help says more
         stored.pop(name)
     assert len(stored) > 25 and stored.items() <= MEANINGS.items()

@@ -233,13 +233,13 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
 def at_friction(report: dict[str, Any], replay: Replay) -> dict[str, Any]:
     """The report with numbers of the packing on screen, whose friction may differ."""
     summary = replay.summary
-    same = summary["mu"] == report["friction"]
+    same = summary["mu"] == report["mu"]
     return report | {
         "rattlers": summary.get("rattlers", report["rattlers"]),
         "backbone_contacts": summary["contacts"],
         "coordination": summary["coordination"],
         "dimension": summary["dimension"],
-        "friction": summary["mu"],
+        "mu": summary["mu"],
         "mean_normal_force": replay.force_scale,
         "violation": report["violation"] if same else None,
     }
@@ -259,7 +259,7 @@ _ROWS = (
     ("contacts that can carry", "backbone_contacts", ",d", ""),
     ("coordination z", "coordination", ".3f", ""),
     ("dimension h of S", "dimension", ",d", ""),
-    ("friction μ", "friction", "g", ""),
+    ("friction μ", "mu", "g", ""),
     ("packing fraction φ", "packing_fraction", ".4f", ""),
     ("pressure", "pressure", ".4g", ""),
     ("mean normal force", "mean_normal_force", ".4g", ""),

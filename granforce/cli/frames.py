@@ -146,6 +146,6 @@ def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:
         if "standard_error" in one:
             moved = np.abs(one["change"].values) > 3 * one["change_error"].values
             error = float(np.nanmean(one["standard_error"].values))
-            rows[-1] |= unit.reported({"standard_error": error})
+            rows[-1] |= unit.reported({"mean_standard_error": error})
             rows[-1]["changed"] = int(moved.any(axis=1).sum())
     return rows

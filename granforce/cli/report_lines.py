@@ -48,8 +48,7 @@ _LINES: dict[str, str | Line] = {
     "contacts": "number of contacts",
     "backbone_grains": "grains that can carry force",
     "backbone_contacts": "contacts that can carry force",
-    "friction": "friction coefficient μ",
-    "pressure": "pressure P0; undefined in an open packing",
+    "pressure": Line("pressure P0; undefined in an open packing", "pressure"),
     "coordination": Line(
         "mean number z of contacts of a backbone grain, including those with walls; "
         "walls and rattlers do not count as grains",
@@ -61,8 +60,8 @@ _LINES: dict[str, str | Line] = {
         "force_scale",
         unit=FORCE,
     ),
-    "residual": "largest unbalanced force on a grain, in units of ⟨f_n⟩",
-    "violation": "largest violation of Coulomb's law, in units of ⟨f_n⟩",
+    "residual": Line("largest unbalanced force on a grain, in units of ⟨f_n⟩", "residual"),
+    "violation": Line("largest violation of Coulomb's law, in units of ⟨f_n⟩", "violation"),
     "largest_overlap": "largest overlap of two bodies, in units of the largest radius",
     "largest_contact_gap": "largest gap of a contact, in units of the largest radius",
     "least_other_gap": "smallest gap between grains not in contact, in units of the largest radius "
@@ -86,7 +85,7 @@ _LINES: dict[str, str | Line] = {
     # of results
     "entry": "name of the result in the store",
     "cached": "whether the result was already in the store",
-    "states": "number of states",
+    "states": Line("number of states", "states"),
     "exact_eta3": Line("η3 of the exact intervals; undefined if some are infinite", "eta3"),
     "mean_iterations": Line("mean number of iterations of a relaxation", "sweeps", "mean"),
     "largest_residual": Line(
@@ -116,7 +115,7 @@ _LINES: dict[str, str | Line] = {
     "ln_volume": Line(
         "logarithm of the volume V of S, with forces in units of ⟨f_n⟩", "log_volume"
     ),
-    "standard_error": Line("standard error of ln V", "log_volume_error"),
+    "ln_volume_error": Line("standard error of ln V", "log_volume_error"),
     "ln_volume_on_the_way_down": "ln V from the ladder of decreasing β alone, as a check",
     "ln_volume_on_the_way_up": "ln V from the ladder of increasing β alone",
     "ln_volume_per_grain": Line("ln V per grain of the backbone", "log_volume_per_grain"),
@@ -139,7 +138,7 @@ _LINES: dict[str, str | Line] = {
         "mean critical force F_crit, the force pair at which grains start to move", unit=FORCE
     ),
     "critical_force_deciles": Line("F_crit: smallest value, deciles, largest value", unit=FORCE),
-    "limit_load": "largest force pair that can be balanced",
+    "limit_load": Line("largest force pair that can be balanced", "limit_load"),
     "fit_range": "distances r of the fit, in the packing's units; undefined in small packings",
     "largest_breach": Line(
         "largest violation of Coulomb's law by a first motion, relative to the fastest contact",
@@ -202,7 +201,7 @@ _CHECKS = ("largest_residual", "largest_violation")
 _END = ("seconds", "cached")
 PACKING = (
     *("grains", "grains_left_open", "contacts", "backbone_grains", "backbone_contacts"),
-    *("rattlers", "friction", "pressure", "packing_fraction", "coordination", "dimension"),
+    *("rattlers", "mu", "pressure", "packing_fraction", "coordination", "dimension"),
     *("mean_normal_force", "residual", "violation", "largest_overlap", "largest_contact_gap"),
     "least_other_gap",
 )
@@ -237,7 +236,7 @@ UNIFORM = (
     *("original_distance", *_CHECKS, *_SAMPLING, *_END),
 )
 VOLUME = (
-    *("entry", *_EXTENSION, "ln_volume", "standard_error", "ln_volume_on_the_way_down"),
+    *("entry", *_EXTENSION, "ln_volume", "ln_volume_error", "ln_volume_on_the_way_down"),
     *("ln_volume_on_the_way_up", "ln_volume_per_grain", "extent_over_mean_normal_force"),
     *("reached", "paths", "turns", "refused", *_END),
 )

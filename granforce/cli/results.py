@@ -142,7 +142,7 @@ def prepared(
         packing, _ = get_packing(store, named)
         _refuse_others(known, packing)
     else:
-        kinds.keep_packing(store, named, packing, hold=True)
+        kinds.keep_packing(store, named, packing, in_memory=True)
     return store, parameters
 
 

@@ -101,10 +101,10 @@ def save(
     dataset: xr.Dataset,
     *,
     dtypes: Mapping[str, str] | None = None,
-    hold: bool = False,
+    in_memory: bool = False,
 ) -> str:
     """Save a dataset under its kind and parameters, as Store.keep; returns the entry's name."""
-    options: dict[str, Any] = {"version": kind.version, "dtypes": dtypes, "hold": hold}
+    options: dict[str, Any] = {"version": kind.version, "dtypes": dtypes, "in_memory": in_memory}
     return store.keep(kind.name, parameters, dataset, **options)
 
 

@@ -95,7 +95,7 @@ def evolution(
             continue
         named = kinds.imported_parameters(snapshot.packing)
         store.make()  # processes load the packing from there
-        kinds.keep_packing(store, named, snapshot.packing, hold=True)
+        kinds.keep_packing(store, named, snapshot.packing, in_memory=True)
         cells = [StudyCell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
         if states:
             cells.append(StudyCell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))

@@ -188,7 +188,7 @@ class Store(Mapping[str, xr.Dataset]):
     def __init__(self, path: Path, *, readonly: bool = False) -> None:
         self.path = path
         self.readonly = readonly
-        self._held: dict[str, xr.Dataset] = {}  # by name, datasets kept in memory, too
+        self._in_memory: dict[str, xr.Dataset] = {}  # by name, too
         self._incomplete = False
 
     def __repr__(self) -> str:
@@ -243,7 +243,7 @@ class Store(Mapping[str, xr.Dataset]):
         dataset, reason = entries.checked(self.path / name)
         if reason:
             self._warn(name, reason)
-        return self._held.get(name) if dataset is None else dataset
+        return self._in_memory.get(name) if dataset is None else dataset
 
     def save(
         self,
@@ -278,12 +278,12 @@ class Store(Mapping[str, xr.Dataset]):
         params: Mapping[str, Any],
         dataset: xr.Dataset,
         *,
-        hold: bool = False,
+        in_memory: bool = False,
         **options: Any,
     ) -> str:
         """As `save`, but a dataset that cannot be written is kept in memory, with a warning.
 
-        This object loads it as if it were stored, and is `incomplete`. hold: keep it in memory
+        This object loads it as if it were stored, and is `incomplete`. in_memory: keep it there
         although it was written, because another process may remove the entry.
         """
         name = self.name(kind, params, version=options["version"])
@@ -291,9 +291,9 @@ class Store(Mapping[str, xr.Dataset]):
             self.save(kind, params, dataset, **options)
         except NotKeptError as error:
             warnings.warn(f"{error}; results are returned, but not saved", stacklevel=3)
-            hold = self._incomplete = True
-        if hold:
-            self._held[name] = dataset
+            in_memory = self._incomplete = True
+        if in_memory:
+            self._in_memory[name] = dataset
         return name
 
     @property

@@ -125,7 +125,7 @@ def test_a_scene_is_packed_without_a_store(run, tmp_path):
     code, out, _ = run("pack", "--scene", "groove", "--mu", "0.2", "--json", "--out", file)
     assert code == 0
     told = json.loads(out)
-    assert (told["scene"], told["dimension"], told["friction"]) == ("groove", 1, 0.2)
+    assert (told["scene"], told["dimension"], told["mu"]) == ("groove", 1, 0.2)
     assert file.exists() and not (tmp_path / "cache").exists()
     code, _, err = run("pack", "--scene", "grove")
     assert code == 2 and err.count("\n") == 1 and "groove" in err
@@ -235,7 +235,7 @@ def test_the_outline_of_stresses(run, tmp_path):
 def test_the_volume_and_its_error(run):
     words = ["volume", *SMALL[:4], "--accuracy", 0.2, "--json"]
     report = json.loads(run(*words)[1])
-    assert report["reached"] and 0 < report["standard_error"] <= 0.2
+    assert report["reached"] and 0 < report["ln_volume_error"] <= 0.2
     both = report["ln_volume_on_the_way_down"], report["ln_volume_on_the_way_up"]
     assert report["ln_volume"] == pytest.approx(np.mean(both))
     assert json.loads(run(*words, "--workers", 1)[1])["cached"] is True

@@ -135,7 +135,7 @@ def test_a_packing_from_elsewhere_can_be_held(tmp_path):
     store = open_store(tmp_path / "s")
     packing, _ = kinds.get_packing(store, cell()["packing"])
     named = kinds.imported_parameters(packing)
-    kinds.keep_packing(store, named, packing, hold=True)
+    kinds.keep_packing(store, named, packing, in_memory=True)
     open_store(store.path).clear()
     assert kinds.imported_parameters(kinds.get_packing(store, named)[0]) == named
     assert not store.incomplete and not len(store)

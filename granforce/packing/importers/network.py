@@ -195,7 +195,7 @@ def report(packing: Packing) -> dict[str, Any]:
         "backbone_grains": len(ens.grains),
         "backbone_contacts": len(ens.index),
         "rattlers": ens.skipped["rattlers"],
-        "friction": packing.mu,
+        "mu": packing.mu,
         "pressure": None if np.isnan(packing.pressure) else packing.pressure,
         "packing_fraction": packing.packing_fraction if closed else None,
         "coordination": float(ens.coordination),

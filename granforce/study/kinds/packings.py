@@ -144,13 +144,13 @@ def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[P
 
 
 def keep_packing(
-    store: Store, parameters: Parameters, packing: Packing, *, hold: bool = False
+    store: Store, parameters: Parameters, packing: Packing, *, in_memory: bool = False
 ) -> str:
     """Save a packing under its parameters; returns the entry's name.
 
-    hold: as for Store.keep, for imported packings, which cannot be made again.
+    in_memory: as for Store.keep, for imported packings, which cannot be made again.
     """
-    return save(store, PACKING, parameters, packing_dataset(packing), hold=hold)
+    return save(store, PACKING, parameters, packing_dataset(packing), in_memory=in_memory)
 
 
 def cones_of(packing: Parameters, mu: Any, **named: Any) -> Parameters:
