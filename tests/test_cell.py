@@ -11,7 +11,7 @@ from packings import reference, skewed
 import granforce as gf
 from granforce.bench import solvers
 from granforce.cell import Cell
-from granforce.packing.importers.geometry import touching
+from granforce.packing.importers.geometry import touching_contacts
 from granforce.perturb import decay
 from granforce.records import InputError, make_cell, make_contacts, make_packing
 from granforce.study import kinds, slices
@@ -138,11 +138,11 @@ def test_a_packing_is_the_same_in_every_cell_of_its_lattice():
     packing = reference("n100_mu0.1_s11")
     S = gf.ensemble(packing)
     bounds = gf.intervals(S)
-    near = touching(packing.x, packing.r, packing.cell, TOUCHING)
+    near = touching_contacts(packing.x, packing.r, packing.cell, TOUCHING)
     for basis in (((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, 3), (0, 1))):
         other, turn = skewed(packing, basis)
         assert other.tilt != 0 and other.volume == pytest.approx(packing.volume)
-        found = touching(other.x, other.r, other.cell, TOUCHING)
+        found = touching_contacts(other.x, other.r, other.cell, TOUCHING)
         assert rows(found) == pytest.approx(rows(near, turn), abs=1e-6)
         T = gf.ensemble(other)
         assert (T.dimension, T.force_scale) == (S.dimension, pytest.approx(S.force_scale))

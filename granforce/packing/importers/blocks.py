@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.packing.assemblies import area, blocks, nearly_touching
-from granforce.packing.importers.notes import packing_noted
+from granforce.packing.importers.notes import packing_noted, with_notes
 from granforce.packing.importers.text import Source, Table, csv_table, read_text
 from granforce.records import InputError, Packing, brief, positive
 from granforce.system.wording import counted
@@ -87,18 +87,19 @@ def read_blocks(
         )
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
-    notes = _notes(packing)
-    return packing._replace(info=packing.info | {"source": "blocks"} | notes)
+    packing = packing._replace(info=packing.info | {"source": "blocks"})
+    return with_notes(packing, _notes(packing))
 
 
-def _notes(packing: Packing) -> dict[str, list[str]]:
+def _notes(packing: Packing) -> list[str]:
+    """Notes on pairs of bodies that nearly touch, or touch at corners only."""
     notes = []
     if count := len(packing.info["corner_on_corner"]):
         pairs = counted(count, "pair of bodies meets", "pairs of bodies meet")
         notes.append(f"{pairs} corner on corner, which is no contact")
     if near := packing.info["nearly_touching"]:
         notes.append(nearly_touching([gap for _, _, gap in near], packing.info["tolerance"]))
-    return {"notes": notes} if notes else {}
+    return notes
 
 
 def _from_table(table: Table) -> _Bodies:

@@ -7,8 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.geometry import check_disks, doubtful, largest_gap, touching
-from granforce.packing.importers.network import find
+from granforce.packing.importers.geometry import (
+    check_disks,
+    largest_gap,
+    touching_contacts,
+    with_doubts_noted,
+)
+from granforce.packing.importers.network import with_nearest_network
 from granforce.packing.importers.notes import packing_noted
 from granforce.packing.scenes import places_behind
 from granforce.records import (
@@ -87,7 +92,7 @@ def from_disks(
         raise InputError(f"disks need a centre and a radius each: {len(x)} centres, {len(r)} radii")
     x = cell.wrapped(x)
     check_disks(x, r, cell, lambda k: f"disk {k}")
-    contacts = touching(x, r, cell, tolerance)
+    contacts = touching_contacts(x, r, cell, tolerance)
     closed = bool(np.all(np.isfinite(cell.box)))
     if pressure is not None and not closed:
         raise InputError("pressure applies to periodic boxes: leave it out, or give the box")
@@ -102,8 +107,8 @@ def from_disks(
         info={"source": "disks"},
         tilt=cell.tilt,
     )
-    packing = doubtful(packing, tolerance)
-    return find(enclosed(packing, walls, gravity, tolerance), forces="found")
+    packing = with_doubts_noted(packing, tolerance)
+    return with_nearest_network(enclosed(packing, walls, gravity, tolerance), forces="found")
 
 
 def enclosed(

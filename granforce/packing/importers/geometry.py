@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from granforce.cell import Cell
 from granforce.packing.closing import apart
+from granforce.packing.importers.notes import with_notes
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
     Contacts,
@@ -49,7 +50,7 @@ _ENOUGH, _ROUNDING = 3, 1e-12
 OPEN = Cell(np.full(2, np.inf), 0.0)
 
 
-def touching(x: Floats, r: Floats, cell: Cell, tolerance: float) -> Contacts:
+def touching_contacts(x: Floats, r: Floats, cell: Cell, tolerance: float) -> Contacts:
     """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
     i, j, shift = find_pairs(x, r, cell, largest_gap(tolerance) * r.max())
     normal, length, _ = separations(x, r, cell, i, j, shift)
@@ -72,7 +73,7 @@ def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, F
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
-def doubtful(packing: Packing, tolerance: float | None) -> Packing:
+def with_doubts_noted(packing: Packing, tolerance: float | None) -> Packing:
     """The packing with notes in info on large overlaps, and on pairs near the tolerance.
 
     tolerance: which decided what touches, or None if contacts were listed. info["nearly_touching"]
@@ -111,9 +112,7 @@ def doubtful(packing: Packing, tolerance: float | None) -> Packing:
         )
     rows = zip(i.tolist(), j.tolist(), gap.tolist(), strict=True)
     info["nearly_touching"] = [list(row) for row in rows]
-    if notes:
-        info["notes"] = [*packing.info.get("notes", []), *notes]
-    return packing._replace(info=packing.info | info)
+    return with_notes(packing._replace(info=packing.info | info), notes)
 
 
 def _barely(gap: Floats, tolerance: float) -> Integers:
@@ -122,7 +121,7 @@ def _barely(gap: Floats, tolerance: float) -> Integers:
     return np.flatnonzero(gap > max(tolerance / NEARLY, UNUSUAL_GAP * usual))
 
 
-def listed(
+def listed_contacts(
     x: Floats,
     r: Floats,
     cell: Cell,
@@ -149,7 +148,7 @@ def listed(
     return contacts
 
 
-def once(
+def distinct_pairs(
     i: Integers, j: Integers, force: Floats, allowed: float, place: Callable[[int], str]
 ) -> Integers:
     """Rows that remain when pairs listed twice, in either order, count once.

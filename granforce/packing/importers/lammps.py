@@ -9,12 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.cell import Cell
-from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed, once
+from granforce.packing.importers.geometry import (
+    MISFIT,
+    check_disks,
+    components,
+    distinct_pairs,
+    listed_contacts,
+)
 from granforce.packing.importers.network import (
     LOAD_MISFIT,
-    adopt,
     refuse_idle_reverse,
     with_edge,
+    with_given_forces,
 )
 from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
@@ -210,7 +216,7 @@ def open_lammps(
             tilt=box.cell.tilt,
         )
         info = {"timestep": step, "contacts_skipped": skipped}
-        found = adopt(packing, reverse=reverse, **info)
+        found = with_given_forces(packing, reverse=reverse, **info)
         found = found if np.isfinite(found.volume) else with_edge(found)
         return Snapshot(found, np.sort(atoms.numbers("id")))
 
@@ -352,13 +358,13 @@ def _contacts(
         raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
     # Forces are on atom1 = i; granforce uses those on j.
     on_j = -(normal_force + tangential_force)[active]
-    left = once(i[active], j[active], on_j, LOAD_MISFIT, lambda c: table.place(active[c]))
+    left = distinct_pairs(i[active], j[active], on_j, LOAD_MISFIT, lambda c: table.place(active[c]))
     skipped, active = len(i) - len(active), active[left]
 
     def place(c: int) -> str:
         return table.place(active[c])
 
-    joined = listed(x, r, cell, i[active], j[active], place)
+    joined = listed_contacts(x, r, cell, i[active], j[active], place)
     if "distance" in table.header:
         _check_distances(joined.length, table.numbers("distance")[active], r.max(), place)
     forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)

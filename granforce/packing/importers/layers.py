@@ -13,8 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.cell import Cell
-from granforce.packing.importers.geometry import check_disks, components, listed, once
-from granforce.packing.importers.network import LOAD_MISFIT, adopt
+from granforce.packing.importers.geometry import (
+    check_disks,
+    components,
+    distinct_pairs,
+    listed_contacts,
+)
+from granforce.packing.importers.network import LOAD_MISFIT, with_given_forces
 from granforce.packing.importers.text import Table, check_grains, some_of
 from granforce.records import (
     Contacts,
@@ -107,7 +112,7 @@ def packing_of(layer: Layer, options: Options, source: str) -> Packing:
         info={"source": source},
         tilt=options.cell.tilt,
     )
-    packing = adopt(packing, reverse=options.reverse, **info)
+    packing = with_given_forces(packing, reverse=options.reverse, **info)
     if options.walls == "held":
         load = packing.load.copy()
         load[len(r) :] = np.nan
@@ -156,12 +161,12 @@ def _network(layer: Layer, x: Floats, r: Floats, options: Options) -> _Network:
             f"{layer.links.name}: no contact of two grains carries force; is the packing "
             "compressed?"
         )
-    left = once(
+    left = distinct_pairs(
         *(layer.i[carrying], layer.j[carrying], layer.force[carrying], LOAD_MISFIT),
         lambda c: layer.links.place(carrying[c]),
     )
     rows = carrying[left]
-    contacts = listed(
+    contacts = listed_contacts(
         *(x, r, options.cell, layer.i[rows], layer.j[rows]), lambda c: layer.links.place(rows[c])
     )
     return _Network(x, r, contacts, components(layer.force[rows], contacts.normal))

@@ -14,6 +14,7 @@ from granforce.numerics.highs import least_unbalanced
 from granforce.packing.assemblies import larger_tolerance
 from granforce.packing.closing import apart, margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
+from granforce.packing.importers.notes import with_notes
 from granforce.records import InputError, NotJammedError, Packing, UndecidedError, takes
 from granforce.system.wording import counted
 from granforce.tolerances import CARRYING, NO_EQUILIBRIUM, RIGID_OVERLAP, ROUNDING
@@ -28,7 +29,7 @@ MISSED = 0.01
 WORTH_REVERSING = 0.5
 
 
-def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
+def with_given_forces(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     """The packing with the pressure (or, in an open box, the boundary loads) of its forces.
 
     P = Σ f_n ℓ / (2V); a grain's load balances its contact forces, unless loads were given.
@@ -80,8 +81,7 @@ def with_edge(packing: Packing, advice: str = "") -> Packing:
         f"contacts do not balance {off.sum()} of {len(off)} grains: what is left over counts as a "
         f"load on them, which makes the residual 0{advice}"
     )
-    notes = [*packing.info.get("notes", []), note]
-    return packing._replace(info=packing.info | {"notes": notes})
+    return with_notes(packing, [note])
 
 
 def refuse_idle_reverse(forces: Floats, reverse: bool) -> None:
@@ -119,7 +119,7 @@ def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
     # Without this, noise on grains that carry nothing could not be balanced.
     carrying = forces[:, :1] > CARRYING * np.abs(forces[:, 0]).mean()
     forces = np.where(carrying, forces, 0.0)
-    return adopt(
+    return with_given_forces(
         packing._replace(
             x=packing.x[:count] / unit,
             r=packing.r[:count] / unit,
@@ -131,7 +131,7 @@ def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
     )
 
 
-def find(packing: Packing, **info: Any) -> Packing:
+def with_nearest_network(packing: Packing, **info: Any) -> Packing:
     """The packing with the admissible force network nearest to equal normal forces.
 
     Needs a pressure, or loads in an open box; rounding errors in the balance of the loads are

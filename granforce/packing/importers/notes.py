@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
-from granforce.records import InputWarning
+from granforce.records import InputWarning, Packing
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -27,6 +27,13 @@ def noted(info: Callable[[Any], Mapping[str, Any]]) -> Callable[[Callable[P, T]]
         return read
 
     return wrapped
+
+
+def with_notes(packing: Packing, notes: Sequence[str]) -> Packing:
+    """The packing with more notes in its info."""
+    if not notes:
+        return packing
+    return packing._replace(info=packing.info | {"notes": [*packing.info.get("notes", []), *notes]})
 
 
 packing_noted = noted(lambda packing: packing.info)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
 from granforce.fields import record
-from granforce.packing.importers.notes import noted
+from granforce.packing.importers.notes import noted, with_notes
 from granforce.records import InputError, Packing, brief_list
 from granforce.types import Floats
 
@@ -62,15 +62,8 @@ class Snapshots(NamedTuple):
         if number is None:
             last = self.numbers[-1]
             notes = [f"{note}; {self.word} {last} is read" for note in self.notes]
-            return _noted(self.read(last), notes)
+            snapshot = self.read(last)
+            return snapshot._replace(packing=with_notes(snapshot.packing, notes))
         if number not in self.numbers:
             raise self.refusal(number)
         return self.read(self.numbers[self.numbers.index(number)])  # 100.0 is 100
-
-
-def _noted(found: Snapshot, more: Sequence[str]) -> Snapshot:
-    """The snapshot with more notes on its packing."""
-    info = found.packing.info
-    notes = [*info.get("notes", []), *more]
-    info = {**info, "notes": notes} if notes else info
-    return found._replace(packing=found.packing._replace(info=info))

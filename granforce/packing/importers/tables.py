@@ -10,8 +10,18 @@ import numpy.typing as npt
 
 from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
-from granforce.packing.importers.geometry import check_disks, doubtful, listed, touching
-from granforce.packing.importers.network import adopt, find, refuse_idle_reverse, with_edge
+from granforce.packing.importers.geometry import (
+    check_disks,
+    listed_contacts,
+    touching_contacts,
+    with_doubts_noted,
+)
+from granforce.packing.importers.network import (
+    refuse_idle_reverse,
+    with_edge,
+    with_given_forces,
+    with_nearest_network,
+)
 from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.text import (
     Source,
@@ -129,7 +139,7 @@ def read_table(
     if not pairs:
         if forces:
             raise InputError("forces need a table of contacts with columns i, j, f_n, f_t")
-        joined, given = touching(x, r, cell, tolerance), None
+        joined, given = touching_contacts(x, r, cell, tolerance), None
     else:
         joined, given = _joined(pairs[0], table, x, r, cell, forces, mu)
     closed = bool(np.all(np.isfinite(cell.box)))
@@ -150,21 +160,21 @@ def read_table(
         {"source": "table"},
         cell.tilt,
     )
-    packing = doubtful(packing, None if pairs else tolerance)
+    packing = with_doubts_noted(packing, None if pairs else tolerance)
     if given is None:
         packing = enclosed(packing, walls, gravity, tolerance)
         if reverse:
             raise InputError(
                 "--reverse (reverse=True) applies to tables with forces (f_n, f_t): leave it out"
             )
-        return find(packing, forces="found")
+        return with_nearest_network(packing, forces="found")
     if walls is not None or gravity:
         raise InputError(
             "walls and gravity (--walls and --gravity, or walls=, gravity=) apply to tables "
             "without forces: leave out f_n and f_t"
         )
     refuse_idle_reverse(packing.forces, reverse)
-    found = adopt(packing, reverse=reverse, forces="given")
+    found = with_given_forces(packing, reverse=reverse, forces="given")
     if closed or load.any():
         return found
     return with_edge(
@@ -234,7 +244,7 @@ def _listed(table: Table, grains: Table, x: Floats, r: Floats, cell: Cell) -> Co
 
     def counted(index: Mapping[Any, int]) -> Contacts:
         i, j = table.lookup("i", index), table.lookup("j", index)
-        return listed(x, r, cell, i, j, table.place, _given_branches(table))
+        return listed_contacts(x, r, cell, i, j, table.place, _given_branches(table))
 
     if "id" in grains.header:
         return counted(grains.index("id"))
