@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import outside
 from granforce.records import InputError
 
 DATA = Path(__file__).resolve().parents[2] / "data"
-PEAKS = ("eta1-peak", "eta2-peak", "eta3-peak")  # claims
+Claim = dict[str, Any]
 
 _reading = threading.Lock()
 
@@ -35,25 +35,24 @@ def _study() -> tables.StudyTable | None:
 
 
 @cache
-def claims(figure: int | None = None) -> list[dict[str, Any]]:
-    """The claims on a figure of the paper, or all: dicts with statement, value, low, verdict, …
-
-    Values that could not be measured are NaN, null in the file.
-    """
+def claims(figure: int | None = None) -> list[Claim]:
+    """The claims on a figure of the paper, or all: dicts with text, range, verdict, …"""
     path = DATA / "claims.json"
     if not path.exists():
         return []
-    claims_read = json.loads(path.read_text())["claims"]
-    return [
-        {name: math.nan if value is None else value for name, value in claim.items()}
-        for claim in claims_read
-        if figure in (None, claim["figure"])
-    ]
+    claims_read = json.loads(path.read_text(), object_hook=_with_nan)["claims"]
+    return [one for one in claims_read if figure in (None, one["figure"])]
+
+
+def _with_nan(fields: dict[str, Any]) -> dict[str, Any]:
+    """Numbers that could not be measured are null in the file."""
+    return {name: math.nan if value is None else value for name, value in fields.items()}
 
 
 def maxima() -> list[dict[str, Any]]:
-    """The claims about the μ at which each η is largest, as nearest-network walks have it."""
-    return [claim for claim in claims(1) if claim["id"] in PEAKS and claim["sampler"] == "nearest"]
+    """The μ at which each η is largest, as nearest-network walks have it: value, low and high."""
+    peaks = (claim["by"]["nearest"]["cases"] for claim in claims(1) if claim["id"] == "peak")
+    return next(peaks, [])
 
 
 def rows(*parts: str) -> pd.DataFrame:

@@ -33,21 +33,6 @@ def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float,
     return mean, float(mean - reach), float(mean + reach)
 
 
-def proportion_interval(
-    values: Iterable[float], level: float = LEVEL
-) -> tuple[float, float, float]:
-    """Fraction of ones among values 0 or 1 and its exact interval (Clopper and Pearson).
-
-    Unlike Student's, the interval has a length if all values are equal. NaN without values.
-    """
-    values = _finite(values)
-    if not len(values):
-        return (float("nan"),) * 3
-    test = stats.binomtest(int(values.sum()), len(values))
-    low, high = test.proportion_ci(level, "exact")
-    return float(values.mean()), float(low), float(high)
-
-
 def difference_interval(
     values: Floats, others: Floats, level: float = LEVEL
 ) -> tuple[float, float, float]:
@@ -86,6 +71,29 @@ def jackknife_error(statistic: Callable[[list[T]], float], items: Sequence[T]) -
         return float("nan")
     without = np.array([statistic(items[:k] + items[k + 1 :]) for k in range(count)])
     return float(np.sqrt((count - 1) * without.var()))
+
+
+def stratified_interval(
+    groups: Iterable[Iterable[float]], level: float = LEVEL
+) -> tuple[float, float, float]:
+    """Mean of the means of several groups and its interval: (mean, low, high).
+
+    Differences between groups, such as a trend with μ, are not part of the error. The degrees of
+    freedom are Welch's and Satterthwaite's. groups: one number per packing; a group of a single
+    packing leaves no interval.
+    """
+    arrays = [values for values in map(_finite, groups) if len(values)]
+    if not arrays:
+        return (float("nan"),) * 3
+    mean = float(np.mean([values.mean() for values in arrays]))
+    if min(map(len, arrays)) < 2:
+        return mean, float("nan"), float("nan")
+    squares = np.array([values.var(ddof=1) / len(values) for values in arrays]) / len(arrays) ** 2
+    if not squares.any():
+        return mean, mean, mean
+    freedom = squares.sum() ** 2 / np.sum(squares**2 / [len(values) - 1 for values in arrays])
+    reach = float(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(squares.sum()))
+    return mean, mean - reach, mean + reach
 
 
 def grouped(rows: Table, name: str, by: str = "mu") -> dict[float, Floats]:
@@ -167,16 +175,11 @@ def drawn_means(groups: Sequence[npt.ArrayLike], seed: int = 0, draws: int = RES
     return np.stack(drawn, axis=1)
 
 
-def percentile_ends(drawn: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Percentile interval of draws, (low, high), and the range in which chance may put its ends.
-
-    With other draws from the same distribution an end would have another rank among these; with 99
-    % confidence it is within this range.
-    """
-    drawn, tail = np.sort(drawn), (1 - LEVEL) / 2
-    rank = int(stats.binom.ppf(0.01, len(drawn), tail))
-    low, high = np.percentile(drawn, [100 * tail, 100 * (1 - tail)])
-    return (float(low), float(high)), (float(drawn[rank]), float(drawn[-1 - rank]))
+def percentile_interval(drawn: Floats, level: float = LEVEL) -> tuple[float, float]:
+    """The ends (low, high) of the middle part of draws."""
+    tail = 50 * (1 - level)
+    low, high = np.percentile(drawn, [tail, 100 - tail])
+    return float(low), float(high)
 
 
 def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:

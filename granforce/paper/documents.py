@@ -2,19 +2,16 @@
 
 A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. Names: "measures" (η
 against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
-"score" (how many claims are reproduced, in a sentence), "highlights" (findings, one sentence each),
-"headlines" (the first few of them), "verdicts" (how many claims have which verdict, by each
-sampler), "outcomes" (how many claims on each figure have which outcome), "claims_1" to "claims_6"
-(a figure of the paper, and each claim on it with its verdict, those by other samplers, and the
-number behind it), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's
-walk, and its excess over S), "preparation" (how results depend on the packing), "resting" (how h
-and η3 depend on when drag sets in), "counts" (number of packings of each kind of result),
-"certificates" (largest gap of the exact bounds, convergence of uniform samples).
+"highlights" (findings, one sentence each), "headlines" (the first few of them), "claims" (each
+claim of the paper with its verdict, and the numbers behind it), "ranges" (why a claim has its
+range), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's walk, and its
+excess over S), "preparation" (how results depend on the packing), "resting" (how h and η3 depend on
+when drag sets in), "counts" (number of packings of each kind of result), "certificates" (largest
+gap of the exact bounds, convergence of uniform samples).
 """
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,8 +21,6 @@ from scipy import stats
 
 from granforce.measures import statistics
 from granforce.paper import plan as plans
-from granforce.paper.claims import TOPICS
-from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import (
     RANGES,
     SAMPLERS,
@@ -34,19 +29,9 @@ from granforce.paper.claims.groups import (
     excesses,
     outside,
     positive,
+    skipped,
 )
-from granforce.paper.claims.outcomes import (
-    OUTCOMES,
-    SYMBOLS,
-    by_claim,
-    counted,
-    decided,
-    decisive,
-    score,
-)
-from granforce.paper.claims.verdicts import FEW, MISSING, PRL, UNMEASURED
-from granforce.paper.drawings import CAPTIONS, paper_sampler
-from granforce.paper.findings import DEPARTURE
+from granforce.paper.claims.verdicts import DEPENDS, SYMBOLS
 from granforce.paper.formatting import (
     NOTHING,
     between,
@@ -66,15 +51,10 @@ _SWEPT_EXTENT = "paper's walk 0.15 η3"
 _OUTSIDE = "outside S"
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
-SHOWN = ("figure1", "figure2", "figure4", "figure5", "figure6")  # with captions, among claims
 TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
-HEADLINES = 5  # highlights in the README
-# Claims that the README names if they are contradicted.
-NAMED = ("small-friction-dynamic", "eta3-of-samples", "correlation-vanishes")
-_CLAIM_HEADS = ("claim, and the number judged", "verdict", "value", "range", "others")
+HEADLINES = 3  # highlights in the README
+LISTED = 3  # cases of a claim that are listed with their numbers; of more, the one that decides
 UNBROKEN = "\u00a0…\u00a0"  # of a range, in narrow columns
-_NOTHING = (MISSING, UNMEASURED)  # verdicts without a number
-_SCARCE = (FEW, *_NOTHING)  # verdicts for want of data
 _HEADS = {
     "gauss_seidel": "paper's walk, to 10⁻³",
     "gauss_seidel_1e-4": "paper's walk, to 10⁻⁴",
@@ -84,7 +64,6 @@ _HEADS = {
     "exact": "exact",
     "": "packings alone",
 }
-_OTHERS = ("nearest", "uniform", "exact")  # samplers beside the one that decides a claim
 # What the parts contain whose names begin like this; see `plan`.
 _CONTENTS = {
     "exact": "exact intervals",
@@ -131,19 +110,17 @@ _VARIANTS = {
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
     """Write the study's tables, judged claims and findings into files with marks.
 
-    claims, findings: dicts of `claims.Claim`.
+    claims: as `claims.judged` returns them; findings: dicts of `findings.Finding`.
     """
     known: dict[str, Callable[[], str]] = {
         "measures": lambda: measures(table),
         "walks": lambda: walks(table),
         "others": lambda: others(table),
         "further": lambda: further(table),
-        "score": lambda: f"{score(claims)}\n",
         "highlights": lambda: highlighted(table, claims, findings),
         "headlines": lambda: headlines(table, claims, findings),
-        "verdicts": lambda: verdict_counts(claims),
-        "outcomes": lambda: outcome_counts(claims),
-        **{f"claims_{k}": partial(claim_table, table, claims, k) for k in TOPICS},
+        "claims": lambda: claim_table(claims),
+        "ranges": lambda: range_table(claims),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "resting": lambda: resting(table),
@@ -456,18 +433,9 @@ def _apart(apart: Floats) -> _Apart | None:
 
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
-    """The first highlights as a list, and those claims of NAMED that are contradicted."""
-    chosen = [one.sentence for one in highlights(table, claims, findings)[:HEADLINES]]
-    known = {
-        claim["id"]: claim["statement"].replace(": ", ", ")
-        + " (the letter)" * (claim["source"] == PRL)
-        for claim in decided(claims)
-        if claim["verdict"] in OUTCOMES["contradicted"]
-    }
-    words = "; ".join(known[name] for name in NAMED if name in known)
-    if words:
-        chosen.append(f"Among the claims that the study contradicts are (in our words): {words}.")
-    return "".join(f"- {_led(sentence)}\n" for sentence in chosen)
+    """The first highlights as a list."""
+    chosen = highlights(table, claims, findings)[:HEADLINES]
+    return "".join(f"- {_led(one.sentence)}\n" for one in chosen)
 
 
 def _led(sentence: str) -> str:
@@ -494,8 +462,7 @@ def finding_table(findings: Rows) -> str:
     """Findings, topic by topic: those at three ranges of μ in one row, all others below."""
     topics: dict[str, list[dict[str, Any]]] = {}
     for finding in findings:
-        if finding["id"] != DEPARTURE:
-            topics.setdefault(finding["source"], []).append(finding)
+        topics.setdefault(finding["topic"], []).append(finding)
     return "\n".join(f"**{topic}**\n\n{_topic(rows)}" for topic, rows in topics.items())
 
 
@@ -505,7 +472,6 @@ def _topic(findings: Rows) -> str:
     others = []
     for finding in findings:
         statement, word, number = finding["statement"], finding["span"], _number(finding)
-        number += f": {FEW}" if number and finding["verdict"] == FEW else ""
         if word:
             ranged.setdefault(statement.removesuffix(f", {word} μ"), {})[word] = number
         else:
@@ -585,103 +551,55 @@ def certificates(table: StudyTable) -> str:
     return text + "\n"
 
 
-def verdict_counts(claims: Rows) -> str:
-    """How many claims have which verdict, and how many by each sampler, as a table."""
-    heads = _used(claims)
-    columns = [
-        [claim["verdict"] for claim in decided(claims)],
-        *(
-            [c["verdict"] for c in claims if c["sampler"] == name and c["verdict"] != UNMEASURED]
-            for name in heads
-        ),
-    ]
-    lines = [
-        [f"{symbol} {word}", *(str(verdicts.count(word)) for verdicts in columns)]
-        for word, symbol in SYMBOLS.items()
-        if any(word in verdicts for verdicts in columns)
-    ]
-    lines.append(["all", *(str(len(verdicts)) for verdicts in columns)])
-    return markdown.table(["verdict", "claims", *(_HEADS[name] for name in heads)], lines)
-
-
-def outcome_counts(claims: Rows) -> str:
-    """How many claims on each figure have which outcome, as a table; below, where walks leave S."""
+def claim_table(claims: Rows) -> str:
+    """Each claim with its place in the paper, its number and range, and its verdict by case."""
+    heads = ("id, place", "claim, and the number judged", "range", "cases", "verdict")
     lines = []
-    for figure, topic in TOPICS.items():
-        count = counted([claim for claim in claims if claim["figure"] == figure])
-        anchor = f"figure-{figure}-{topic.lower().replace(' ', '-')}"
-        lines.append([f"[Figure {figure}: {topic.lower()}](#{anchor})", *map(str, count.values())])
-    lines.append(["all", *map(str, counted(claims).values())])
-    return "\n".join([markdown.table(["claims", *OUTCOMES], lines), *_beyond_notes(claims)])
+    for claim in claims:
+        networks = f"; {_HEADS[claim['sampler']]}" if claim["sampler"] else ""
+        words = (
+            f"{claim['text']}<br><small>{claim['number']}{networks}</small>",
+            claim["range"].replace("; ", "<br>"),
+            "<br>".join(case_texts(claim["by"][claim["sampler"]]["cases"])),
+            f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}<br>{prepared(claim)}",
+        )
+        place = f"`{claim['id']}`<br>{claim['place']}"
+        lines.append([place, *(text.replace(" … ", UNBROKEN) for text in words)])
+    return markdown.table(heads, lines)
 
 
-def claim_table(table: StudyTable, claims: Rows, figure: int) -> str:
-    """A figure of the paper with its caption, and each claim on it with the number that decides.
-
-    Claims of the letter are marked, and verdicts that a single μ or chance may have changed.
-    `claims.json` contains the numbers of all samplers.
-    """
-    of_figure = [claim for claim in claims if claim["figure"] == figure]
-    lines, above = [], ("", "")
-    for by_sampler in by_claim(of_figure).values():
-        claim = decisive(by_sampler)
-        lines.append(_claim_line(claim, by_sampler, above))
-        above = _main(claim), claim["number"]
-    name, made = f"figure{figure}", markdown.table(_CLAIM_HEADS, lines)
-    if name not in SHOWN:
-        return made
-    caption = CAPTIONS[name].format(walk=_HEADS[paper_sampler(table)])
-    return f"![Figure {figure}]({FIGURES}/{name}.png)\n\n*Figure {figure}.* {caption}\n\n{made}"
-
-
-def _main(claim: dict[str, Any]) -> str:
-    """The statement of a claim, without its variant."""
-    return str(claim["statement"].removesuffix(claim["variant"]))
+def case_texts(cases: Rows) -> list[str]:
+    """The verdict of each case, with its number; of many cases, with the one that decides."""
+    if len(cases) <= LISTED:
+        return [
+            f"{case['label']} {SYMBOLS[case['verdict']]} {_number(case)}".strip() for case in cases
+        ]
+    listed_cases = []
+    for verdict, symbol in SYMBOLS.items():
+        for span in dict.fromkeys(case["span"] for case in cases):
+            alike = [c for c in cases if (c["verdict"], c["span"]) == (verdict, span)]
+            if alike:
+                farthest = max(alike, key=lambda case: case["beyond"])
+                where = ", ".join(case["label"].removeprefix("μ = ") for case in alike)
+                at = farthest["label"].removeprefix("μ = ")
+                number = _number(farthest) + (f" at {at}" if len(alike) > 1 else "")
+                listed_cases.append(f"{symbol} μ = {where}: {number}")
+    return listed_cases
 
 
-def _claim_line(
-    claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]], above: tuple[str, str]
-) -> list[str]:
-    """A claim in the columns of _CLAIM_HEADS, without what repeats the line above it."""
-    statement, number = _main(claim), claim["number"]
-    letter = f" ({PRL})" if claim["source"] == PRL else ""
-    words = claim["statement"] + letter
-    if statement == above[0]:
-        words = f"↳ {claim['variant'].lstrip(',: ')}"
-    place = f"μ = {claim['mu']:g}, " if claim["mu"] is not None else ""
-    size = f"{place}n = {claim['packings']}" if claim["packings"] else ""
-    lowered = f" ({SYMBOLS[claim['before']]}†)" if claim["before"] else ""
-    cells = [
-        words if (statement, number) == above else f"{words}<br><small>{number}</small>",
-        f"{SYMBOLS[claim['verdict']]}\u00a0{claim['verdict']}{lowered}",
-        f"{_number(claim)}<br><small>{size}</small>",
-        claim["good"] + (f"<br><small>({claim['fair']})</small>" if claim["fair"] else ""),
-        "<br>".join(_by_others(claim, by_sampler)),
+def prepared(claim: dict[str, Any]) -> str:
+    """In which preparations a claim about large friction was judged, as HTML."""
+    if claim["one_preparation"]:
+        return "<small>default preparation only</small>"
+    if claim["verdict"] == DEPENDS:
+        return f"<small>late drag: {claim['late']}</small>"
+    return "<small>both preparations</small>" if claim["late"] else ""
+
+
+def range_table(claims: Rows) -> str:
+    """Why each claim has its range, and whether it was chosen before results were known."""
+    lines = [
+        [f"`{claim['id']}`", claim["range"].replace("; ", "<br>"), claim["why"], claim["chosen"]]
+        for claim in claims
     ]
-    return [cell.replace(" … ", UNBROKEN) for cell in cells]
-
-
-def _by_others(claim: dict[str, Any], by_sampler: dict[str, dict[str, Any]]) -> list[str]:
-    """The verdicts by other samplers than a claim's, as "symbol sampler"."""
-    return [
-        f"{SYMBOLS[other['verdict']]}\u00a0{name}"
-        for name, other in by_sampler.items()
-        if name in _OTHERS and name != claim["sampler"] and other["verdict"] not in _NOTHING
-    ]
-
-
-def _beyond_notes(claims: Rows) -> list[str]:
-    """Where the networks of each sampler leave S, in sentences."""
-    beyond = {c["sampler"]: [f"{mu:g}" for mu in c["outside"]] for c in claims}
-    return [
-        f"At μ = {listed(beyond[name])}, networks ({_HEADS[name]}) are not judged: "
-        "they leave S by more than the length of the exact intervals.\n"
-        for name in _used(claims)
-        if beyond.get(name)
-    ]
-
-
-def _used(claims: Rows) -> list[str]:
-    """The samplers by which any claim is judged, in the order of columns."""
-    known = {claim["sampler"] for claim in claims if claim["verdict"] not in _SCARCE}
-    return [name for name in _HEADS if name in known]
+    return markdown.table(("id", "range", "why this range", "chosen"), lines)

@@ -1,45 +1,31 @@
 """Beyond the paper: dependence of its results on sampler, solver and definition.
 
 Numbers with 95 % confidence intervals over packings, without a verdict; ratios are from the same
-packing. They explain why a claim holds or fails. All packings of a range of μ are one sample, with
-Student's interval of their mean; for other numbers see `_trend` and `_finding`.
+packing. They explain why a claim holds or fails. A number for a range of μ is the mean of the means
+at its μ, so that its error has no part of the trend with μ; for other numbers see `_trend` and
+`_finding`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper import tails
-from granforce.paper.claims.figure3 import relative_extents
-from granforce.paper.claims.figure4 import departure
+from granforce.paper.claims.contacts import relative_extents
 from granforce.paper.claims.groups import (
-    LEAST_DYNAMIC,
     RANGES,
     SAMPLERS,
-    SMALL,
-    Ends,
     drawn,
-    each,
     items,
     positive,
     sampled,
     within,
 )
-from granforce.paper.claims.verdicts import (
-    ANY,
-    CORRELATION,
-    FEW,
-    FRACTION,
-    POSITIVE,
-    Claim,
-    peak,
-    slope,
-    too_wide,
-)
+from granforce.paper.claims.verdicts import peak, slope
 from granforce.paper.tables import StudyTable
 from granforce.types import Floats
 
@@ -53,27 +39,48 @@ WORDS = {
     "exact": "exact",
 }
 WALKS = ("nearest", "gauss_seidel")
-DEPARTURE = "departure"  # the id of findings that are too numerous for a table
+LONGER = {"gauss_seidel": "repeat_sweeps_long", "nearest": "repeat_walk_long"}
+# Below 10⁻⁴ η is proportional to μ; packings are made by contact dynamics from 10⁻³ on.
+DECADES = ((1e-5, 1e-4), (1e-4, 1e-3), (1e-3, 1e-2))
 
 
-def measured(table: StudyTable) -> list[Claim]:
+class Finding(NamedTuple):
+    """A number of ours with its interval, NaN if unknown."""
+
+    id: str  # the same at all ranges of μ
+    statement: str
+    value: float
+    low: float
+    high: float
+    span: str = ""  # word of RANGES, if it has one value for each
+    topic: str = ""
+
+
+def measured(table: StudyTable) -> list[Finding]:
     """All findings about a `tables.StudyTable`, without those that lack data."""
     return [
-        finding._replace(source=topic)
+        finding._replace(topic=topic)
         for topic, families in TOPICS.items()
         for family in families
         for finding in family(table)
     ]
 
 
-def sampled_part(table: StudyTable) -> Iterator[Claim]:
+def sampled_part(table: StudyTable) -> Iterator[Finding]:
     """The fraction of the exact extent that sampled states see."""
     for sampler in (*WALKS, "uniform"):
         ratios = _ratios(drawn(table, sampler), table.part("exact"), "eta3")
         yield from _by_range(f"coverage-{sampler}", ratios, f"η3 of {WORDS[sampler]} over exact η3")
+    for sampler, part in LONGER.items():
+        ratios = _ratios(table.part(part), drawn(table, sampler), "eta3")
+        if ratios:
+            statement = f"η3 of {WORDS[sampler]} if four times as long, over that of the usual one"
+            frictions = ", ".join(f"{mu:g}" for mu in ratios)
+            interval = statistics.stratified_interval(ratios.values())
+            yield _measured(f"longer-{sampler}", f"{statement}, μ = {frictions}", interval)
 
 
-def measure(table: StudyTable) -> Iterator[Claim]:
+def measure(table: StudyTable) -> Iterator[Finding]:
     """The difference between the walks' measures and the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         for sampler in WALKS:
@@ -89,7 +96,7 @@ def measure(table: StudyTable) -> Iterator[Claim]:
         yield from _by_range(name, statistics.grouped(rows, name), statement)
 
 
-def correlations(table: StudyTable) -> Iterator[Claim]:
+def correlations(table: StudyTable) -> Iterator[Finding]:
     """Whether strong contacts have long intervals: in absolute terms, and relative to f_n."""
     lengths = items(drawn(table, "exact"), "correlation")
     _, ranks = relative_extents(table, "exact")
@@ -98,29 +105,22 @@ def correlations(table: StudyTable) -> Iterator[Claim]:
         ("relative-correlation", ranks, "rank correlation of f_n with the exact ΔF_n/f_n"),
     ):
         values = {mu: [v for _, v in group] for mu, group in groups.items()}
-        yield from _by_range(id, values, statement, CORRELATION)
+        yield from _by_range(id, values, statement)
 
 
-def exact_shape(table: StudyTable) -> Iterator[Claim]:
+def exact_shape(table: StudyTable) -> Iterator[Finding]:
     """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in statistics.grouped(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
-            yield _trend(f"{part}-peak", f"μ where {label} is largest", peak, groups, POSITIVE)
+            yield _trend(f"{part}-peak", f"μ where {label} is largest", peak, groups)
         yield from _growth(f"{part}-slope", groups, label)
 
 
-def distribution(table: StudyTable) -> Iterator[Claim]:
-    """Departure of P(ΔF_n) from a falling density at each μ, and its width."""
+def distribution(table: StudyTable) -> Iterator[Finding]:
+    """Width of P(ΔF_n)."""
     for sampler in SAMPLERS:
         groups = sampled(table, sampler)
-        for mu, values in each(groups, lambda values: values / values.mean()).items():
-            if mu > 0:
-                statement = (
-                    f"departure of P(ΔF_n/⟨ΔF_n⟩) from a falling density, {sampler}, μ = {mu:g}"
-                )
-                interval = departure([v for _, v in values], statistics.LEVEL)
-                yield _measured(DEPARTURE, statement, *interval)
         for word, span in RANGES:
             moments = {
                 mu: [(v.mean(), np.mean(v**2)) for _, v in group]
@@ -129,26 +129,26 @@ def distribution(table: StudyTable) -> Iterator[Claim]:
             if moments:
                 statement = f"standard deviation of ΔF_n in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
                 id = f"width-{sampler}"
-                yield _trend(id, statement, _mean_width, moments, POSITIVE)._replace(span=word)
+                yield _trend(id, statement, _mean_width, moments)._replace(span=word)
 
 
-def opened(table: StudyTable) -> Iterator[Claim]:
+def opened(table: StudyTable) -> Iterator[Finding]:
     """Growth of η with the friction of the cones alone, in frictionless packings."""
     groups = statistics.grouped(table.part("opened_exact"), "eta3")
     yield from _growth("opened-slope", groups, "exact η3, packings made at μ = 0,")
 
 
-def _growth(id: str, groups: Values, label: str) -> Iterator[Claim]:
-    """Slopes on both sides of the crossover at 0.001."""
-    for side, low, high in (("below", 0, LEAST_DYNAMIC), ("above", LEAST_DYNAMIC, SMALL[1])):
-        few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
+def _growth(id: str, groups: Values, label: str) -> Iterator[Finding]:
+    """Slopes in the decades around the crossover."""
+    for low, high in DECADES:
+        few = {mu: groups[mu] for mu in groups if low <= mu <= high}
         if len(few) > 1:
             ends = f"μ = {min(few):g} … {max(few):g}"
             statement = f"slope of log {label} against log μ, {ends}"
-            yield _trend(f"{id}-{side}", statement, slope, few)
+            yield _trend(f"{id}-{low:g}", statement, slope, few)
 
 
-def size(table: StudyTable) -> Iterator[Claim]:
+def size(table: StudyTable) -> Iterator[Finding]:
     """Whether exact η3 depends on N."""
     rows = table.part("size_exact", "exact")
     for mu in sorted(table.part("size_exact")["mu"].unique()):
@@ -158,7 +158,7 @@ def size(table: StudyTable) -> Iterator[Claim]:
             yield _trend(f"exact-size-{mu:g}", statement, slope, groups)
 
 
-def strength(table: StudyTable) -> Iterator[Claim]:
+def strength(table: StudyTable) -> Iterator[Finding]:
     """The critical force relative to the limit load, and its dependence on the protocol."""
     usual = table.part("response")
     rows = positive(usual, "limit_load")
@@ -180,13 +180,13 @@ def strength(table: StudyTable) -> Iterator[Claim]:
     yield from _by_range("excluded-pair", values, statement)
 
 
-def shear(table: StudyTable) -> Iterator[Claim]:
+def shear(table: StudyTable) -> Iterator[Finding]:
     """The shear stress that the contacts can carry, and the fraction that networks have."""
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = statistics.grouped(rows, "friction")
     if len(groups) > 2:
         statement = "μ where the largest shear stress is largest"
-        yield _trend("shear-peak", statement, peak, groups, POSITIVE)
+        yield _trend("shear-peak", statement, peak, groups)
     statement = "shear stress over pressure"
     yield from _by_range("largest-shear", groups, f"largest {statement}")
     own = statistics.grouped(rows, "own_shear")
@@ -198,15 +198,15 @@ def shear(table: StudyTable) -> Iterator[Claim]:
     ):
         parts = _quotients(statistics.paired(some, rows), name, "friction_other")
         statement = f"{word}, as a fraction of the largest possible"
-        yield from _by_range(f"{name}-part", parts, statement, FRACTION)
+        yield from _by_range(f"{name}-part", parts, statement)
 
 
-def volume(table: StudyTable) -> Iterator[Claim]:
+def volume(table: StudyTable) -> Iterator[Finding]:
     """The width of S, and whether ln V per grain depends on N; it is not comparable between μ."""
     rows = table.part("volume")
     groups = statistics.grouped(rows, "extent")
     if len(groups) > 2:
-        yield _trend("volume-peak", "μ where S is widest", peak, groups, POSITIVE)
+        yield _trend("volume-peak", "μ where S is widest", peak, groups)
     yield from _by_range("volume-width", groups, "width of S, in ⟨f_n⟩")
     walked = statistics.paired(positive(rows, "extent"), table.part("walk"))
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
@@ -233,10 +233,10 @@ def volume(table: StudyTable) -> Iterator[Claim]:
                 f"ln V per grain of {largest} disks minus that of smaller packings, μ = {mu:g}"
             )
             interval = statistics.difference_interval(large, small)
-            yield _measured(f"volume-size-{mu:g}", statement, *interval)
+            yield _measured(f"volume-size-{mu:g}", statement, interval)
 
 
-def forces(table: StudyTable) -> Iterator[Claim]:
+def forces(table: StudyTable) -> Iterator[Finding]:
     """The decay of P(f_n) of uniform states, compared with an exponential and a Gaussian."""
     for word, known in tails.counts(table).items():
         for mu, packings in known.items():
@@ -291,21 +291,16 @@ def _mean_width(_: Floats, moments: Floats) -> float:
     return float(np.mean(np.sqrt(moments[:, 1] - moments[:, 0] ** 2)))
 
 
-def _by_range(
-    id: str, groups: Values, statement: str, possible: Ends = POSITIVE
-) -> Iterator[Claim]:
-    """The mean over all packings of a range of μ, one sample, with Student's interval."""
+def _by_range(id: str, groups: Values, statement: str) -> Iterator[Finding]:
+    """The mean of the means at the μ of each range."""
     for word, (low, high) in RANGES:
-        values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
+        values = [group for mu, group in groups.items() if low <= mu <= high]
         if values:
-            interval = statistics.mean_interval(values)
-            finding = _measured(id, f"{statement}, {word} μ", *interval, possible)
-            yield finding._replace(span=word)
+            interval = statistics.stratified_interval(values)
+            yield _measured(id, f"{statement}, {word} μ", interval)._replace(span=word)
 
 
-def _trend(
-    id: str, statement: str, statistic: Callable[..., float], groups: Values, possible: Ends = ANY
-) -> Claim:
+def _trend(id: str, statement: str, statistic: Callable[..., float], groups: Values) -> Finding:
     """A number of all means over packings: statistic(keys, means).
 
     Its interval comes from drawn means; it has none if there is a single packing at some μ.
@@ -313,34 +308,19 @@ def _trend(
     keys, values = np.array(list(groups), dtype=float), list(map(np.array, groups.values()))
     value = float(statistic(keys, np.array([group.mean(axis=0) for group in values])))
     if min(map(len, values)) < 2:
-        return _measured(id, statement, value, np.nan, np.nan)
+        return _measured(id, statement, (value, np.nan, np.nan))
     with np.errstate(invalid="ignore"):
         numbers = np.array([statistic(keys, means) for means in statistics.drawn_means(values)])
-    ends, _ = statistics.percentile_ends(numbers[np.isfinite(numbers)])
-    return _measured(id, statement, value, *ends, possible)
+    ends = statistics.percentile_interval(numbers[np.isfinite(numbers)])
+    return _measured(id, statement, (value, *ends))
 
 
 def _finding(
     id: str, statement: str, statistic: Callable[..., float], groups: Sequence[Any]
-) -> Claim:
+) -> Finding:
     """A number of single packings, which are resampled for its interval (bootstrap)."""
-    return _measured(id, statement, *statistics.bootstrap(statistic, list(groups)))
+    return _measured(id, statement, statistics.bootstrap(statistic, list(groups)))
 
 
-def _measured(
-    id: str, statement: str, value: float, low: float, high: float, possible: Ends = ANY
-) -> Claim:
-    """The finding, with too few data if its interval spans orders of magnitude."""
-    low, high = np.clip([low, high], *possible).tolist()
-    return Claim(
-        id=id.replace("_", "-"),
-        statement=statement,
-        sampler="",
-        source="",
-        measured=statement,
-        value=value,
-        low=low,
-        high=high,
-        criterion="",
-        verdict=FEW if too_wide(low, high, possible) else "measured",
-    )
+def _measured(id: str, statement: str, interval: tuple[float, float, float]) -> Finding:
+    return Finding(id.replace("_", "-"), statement, *interval)

@@ -19,7 +19,7 @@ from granforce.study.store import open_store
 from granforce.system import markdown
 from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
-from granforce.system.terminal import Bar, print_list, table
+from granforce.system.terminal import Bar, print_list
 from granforce.system.wording import integer, json_text, number
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
@@ -68,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
     results: dict[str, Any] = {
-        "claims": [claim._asdict() for claim in claims.judged(reduced)],
+        "claims": claims.judged(reduced),
         "findings": [finding._asdict() for finding in findings.measured(reduced)],
         "skipped": reduced.skipped,
     }
@@ -185,24 +185,9 @@ def print_claims(results: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print(json_text(results))
         return
-    for word, names in (
-        ("claims", ("claim", "sampler", "from", "measured", "95 %", "criterion", "verdict")),
-        ("findings", ("finding", "measured", "95 %")),
-    ):
-        lines = [
-            {
-                names[0]: claim["statement"],
-                "sampler": claim["sampler"],
-                "from": claim["source"],
-                "measured": f"{claim['value']:.3g}",
-                "95 %": f"{claim['low']:.3g} … {claim['high']:.3g}",
-                "criterion": claim["criterion"],
-                "verdict": claim["verdict"],
-            }
-            for claim in results[word]
-        ]
-        table(lines, names, {})
-        print()
+    print_list(results["claims"], ("id", "sampler", "verdict", "late", "range"), as_json=False)
+    print()
+    print_list(results["findings"], ("statement", "value", "low", "high"), as_json=False)
     if results["skipped"]["missing_cells"]:
         print(
             f"{results['skipped']['missing_cells']} cells of the plan are missing", file=sys.stderr

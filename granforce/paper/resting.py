@@ -5,30 +5,29 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.packing.compaction import NEARLY_BALANCED
 from granforce.paper import plan as plans
-from granforce.paper.formatting import listed, with_error
+from granforce.paper.formatting import with_error
 from granforce.paper.tables import StudyTable, packings_at_each
 from granforce.system import markdown
 
 _MEASURED = (("h", "dimension"), ("exact η3", "eta3"))
+_FRICTIONS = (1.0, 10.0)
 
 
 def resting(table: StudyTable) -> str:
-    """A table for each number, with a line for each preparation; empty without such packings."""
+    """A table with a line for each preparation; empty without such packings."""
     known = [part for part in plans.RESTING if part in table.parts()]
-    text = ""
-    for word, name in _MEASURED:
-        groups = {part: statistics.grouped(table.part(part), name) for part in known}
-        frictions = sorted(set().union(*groups.values()))
-        lines = [
-            [_below(part), *(with_error(group[mu]) if mu in group else "" for mu in frictions)]
-            for part, group in groups.items()
-        ]
-        heads = [f"{word}, drag below, ⟨f_n⟩", *(f"μ = {mu:g}" for mu in frictions)]
-        text += f"{markdown.table(heads, lines)}\n" if lines else ""
-    if not text:
-        return text
-    numbers = [f"{packings_at_each(table.part(part))} for {_below(part)}" for part in known]
-    return f"{text}Packings at each μ: {listed(numbers)}.\n"
+    if not known:
+        return ""
+    columns = [(f"{word}, μ = {mu:g}", name, mu) for word, name in _MEASURED for mu in _FRICTIONS]
+    lines = []
+    for part in known:
+        rows = table.part(part)
+        line = [_below(part), packings_at_each(rows[rows["mu"].isin(_FRICTIONS)])]
+        for _, name, mu in columns:
+            values = statistics.grouped(rows, name)
+            line.append(with_error(values[mu]) if mu in values else "")
+        lines.append(line)
+    return markdown.table(["drag below, ⟨f_n⟩", "packings", *(head for head, *_ in columns)], lines)
 
 
 def _below(part: str) -> str:

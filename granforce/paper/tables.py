@@ -29,7 +29,10 @@ from granforce.types import Floats, Integers
 VERSION = 1
 
 # Parts with samples of single contacts, and walks that are compared with exact intervals.
-SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6", "walk", "exact", "uniform")
+SAMPLED = (
+    *("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6", "walk", "exact", "uniform"),
+    *("prepared_late_drag", "prepared_late_drag_exact"),
+)
 WALKED = (*plans.SWEEPS, "walk")
 # Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
 TAILED = ("tails", "tails_stress")

@@ -365,7 +365,7 @@ def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(lasting):
     page.get_by_text("Are the strong contacts the undetermined ones?").wait_for()
     page.wait_for_function(f"() => {MODEL}('indeterminacy_marks')?.get_length() === 3")
     page.wait_for_function(f"() => {MODEL}('coordination_marks')?.get_length() === 1")
-    page.get_by_role("cell", name="η1(μ) is not monotonic").wait_for()
+    page.get_by_role("cell", name="η(μ) is not monotonic").wait_for()
     verdicts = page.get_by_role("cell").filter(has_text="✓")
     assert verdicts.count() >= 5 and "largest" in verdicts.first.inner_text()
 

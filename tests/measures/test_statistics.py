@@ -18,14 +18,6 @@ def test_mean_intervals_cover_as_often_as_they_say(rng):
     assert np.isnan(statistics.mean_interval([])).all()
 
 
-def test_a_fraction_of_equal_values_has_an_interval():
-    value, low, high = statistics.proportion_interval([1.0, 1.0, 1.0])
-    assert (value, high) == (1, 1) and low == pytest.approx(0.025 ** (1 / 3))
-    value, low, high = statistics.proportion_interval([0.0, 1.0, 1.0, 0.0])
-    assert value == 0.5 and low + high == pytest.approx(1)
-    assert np.isnan(statistics.proportion_interval([np.nan])).all()
-
-
 def test_bootstrap_resamples_each_group(rng):
     groups = [rng.normal(5, 1, 30), rng.normal(2, 1, 30)]
 
@@ -78,10 +70,9 @@ def test_drawn_means_have_the_percentiles_of_students_interval(rng):
     groups = [rng.normal(5, 2, 3), rng.normal(0, 1, 50)]
     drawn = statistics.drawn_means(groups, draws=20_000)
     for means, group in zip(drawn.T, groups, strict=True):
-        (low, high), (lowest, highest) = statistics.percentile_ends(means)
+        low, high = statistics.percentile_interval(means)
         value, *ends = statistics.mean_interval(group)
         np.testing.assert_allclose([low, high], ends, atol=0.05 * (ends[1] - ends[0]))
-        assert lowest < low < high < highest
         assert means.mean() == pytest.approx(value, abs=0.1 * (ends[1] - ends[0]))
     # Components of one item are drawn jointly; a single packing does not vary.
     values = rng.normal(size=(10, 1)) * [1.0, -2.0]
@@ -90,14 +81,15 @@ def test_drawn_means_have_the_percentiles_of_students_interval(rng):
     assert (both[:, 1] == values[0]).all()
 
 
-def test_other_draws_leave_the_ends_within_the_farthest(rng):
-    groups = [rng.normal(0, 1, 50)]
-    drawn = statistics.drawn_means(groups, draws=4000)
-    (low, high), (lowest, highest) = statistics.percentile_ends(drawn[:, 0])
-    for seed in range(1, 9):
-        ends, _ = statistics.percentile_ends(statistics.drawn_means(groups, seed, 4000)[:, 0])
-        assert lowest < ends[0] + 0.2 * (low - lowest)
-        assert ends[1] - 0.2 * (highest - high) < highest
+def test_a_stratified_mean_has_no_part_of_the_differences_between_groups(rng):
+    values = rng.normal(0, 1, (3, 8))
+    one = statistics.stratified_interval(values[:1])
+    np.testing.assert_allclose(one, statistics.mean_interval(values[0]))
+    apart = statistics.stratified_interval(values + np.array([[0.0], [50.0], [100.0]]))
+    together = statistics.stratified_interval(values)
+    np.testing.assert_allclose(np.subtract(apart, together), 50)
+    assert together[0] == pytest.approx(values.mean())
+    assert np.isnan(statistics.stratified_interval([[1.0], [2.0, 3.0]])[1:]).all()
 
 
 def test_the_departure_from_a_falling_density_needs_no_bins(rng):

@@ -21,7 +21,8 @@ from granforce.forces.build import ensemble
 from granforce.measures import statistics
 from granforce.paper import claims, documents, drawings, findings, formatting, tables
 from granforce.paper import plan as plans
-from granforce.paper.claims import groups, outcomes, verdicts
+from granforce.paper.claims import groups, verdicts
+from granforce.paper.claims.table import CLAIMS
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import load
@@ -265,11 +266,12 @@ def test_a_table_survives_its_store(done, table, tmp_path):
         assert np.array_equal(counted, counts)
         assert counts.sum(axis=1).max() == TINY.states  # all of them
     assert found.packings.keys() == table.packings.keys()
-    for family in (claims.maximum, claims.correlation, claims.counts, claims.pairs):
-        told = (family(each, "nearest") for each in (found, table))
-        for one, other in zip(*told, strict=True):
-            assert one.verdict == other.verdict
-            assert one.value == pytest.approx(other.value, rel=1e-5, nan_ok=True)
+    for claim in CLAIMS:
+        if claim.id in ("peak", "weaker", "equal-counts", "pair-distances"):
+            told = (list(claim.measure(each, "nearest")) for each in (found, table))
+            for one, other in zip(*told, strict=True):
+                value = other.interval(0.95)[0]
+                assert one.interval(0.95)[0] == pytest.approx(value, rel=1e-5, nan_ok=True)
     with pytest.raises(InputError, match="no reduced study"):
         tables.load(done / "cells.zarr")
 
@@ -346,7 +348,7 @@ def test_the_command_computes_and_judges(commanded, tmp_path, capsys):
     folder, printed = commanded
     told = json.loads(printed, parse_constant=pytest.fail)
     assert told["skipped"]["missing_cells"] == 0
-    assert [claim["statement"] for claim in told["claims"]]
+    assert [claim["text"] for claim in told["claims"]]
     assert json.loads((folder / "claims.json").read_text()) == told
     # The store alone, reduced, tells the same, and so does the reduced study.
     words = [*WORDS, "--reduce", f"{folder}/cells.zarr", "--out", str(tmp_path / "beside")]
@@ -387,20 +389,12 @@ def test_a_study_tells_what_is_left_and_ends_in_time(commanded, tmp_path, capsys
 
 
 def test_tables_in_documents_are_renewed(table, tmp_path):
-    told = [claim._asdict() for claim in claims.judged(table)]
+    told = claims.judged(table)
     found = [finding._asdict() for finding in findings.measured(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
-    names += (
-        *(f"claims_{figure}" for figure in claims.TOPICS),
-        "outcomes",
-        "findings",
-        "score",
-        "headlines",
-        "verdicts",
-        "certificates",
-    )
+    names += ("claims", "ranges", "findings", "headlines", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = markdown.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
@@ -409,8 +403,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     assert text.endswith("<!-- end -->\nafter\n")
     assert "\nold\n" not in text
     for claim in told:
-        words = claim["variant"].lstrip(",: ") or claim["statement"]
-        assert words.replace("|", "\\|") in text
+        assert claim["text"].replace("|", "\\|") in text and claim["why"] in text
     documents.renew([path], table, told, found)
     assert page.read_text() == text
     page.write_text(blocks.format("everything"))
@@ -453,10 +446,6 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     assert set(more.values()) >= {"outside S"}
     assert line["paper's walk η2 (n = 1)"] == "outside S"
     assert set(groups.drawn(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
-    told = {(c.id, c.sampler): c for c in claims.judged(table)}
-    vanishing = told["vanishing", "gauss_seidel"]
-    assert vanishing.verdict == verdicts.UNMEASURED
-    assert "outside S, and not judged, at 0" in vanishing.why and 0 in vanishing.outside
 
 
 def test_sweeps_tell_how_far_outside_of_s_they_end(table):
@@ -532,69 +521,34 @@ def table_of(text):
     return [[cell.strip() for cell in line] for line in lines]
 
 
-def test_a_variant_of_a_claim_shows_only_what_differs():
-    one = {"source": "PRE", "good": "≥ 1", "fair": "≥ 0.5", "sampler": "", "figure": 4}
-    one |= {"value": 2.0, "low": 1.5, "high": 2.5, "mu": 0.1, "packings": 3, "number": "b"}
-    first = {"id": "median", "statement": "it falls, beyond the median", "before": ""}
-    first |= {"variant": ", beyond the median"}
-    second = {"id": "decile", "statement": "it falls, beyond the decile", "before": "reproduced"}
-    second |= {"variant": ", beyond the decile"}
-    judged = [
-        one | first | {"verdict": verdicts.REPRODUCED},
-        one | second | {"verdict": verdicts.UNDECIDED},
-    ]
-    above, below = table_of(documents.claim_table(EMPTY, judged, 4))[2:]
-    assert above[0] == "it falls, beyond the median<br><small>b</small>"
-    assert below[0] == "↳ beyond the decile"
-    assert below[1] == "?\u00a0undecided (✓†)" and "†" not in above[1]
-    assert above[2].endswith("<small>μ = 0.1, n = 3</small>") and "(≥ 0.5)" in above[3]
+def case(label, verdict, value, span=""):
+    numbers = {"value": value, "low": value - 0.1, "high": value + 0.1, "beyond": abs(value - 1)}
+    return {"label": label, "packings": 3, "span": span, "verdict": verdict} | numbers
 
 
-def test_the_papers_walk_decides_a_claim_wherever_it_was_measured():
-    def claim(statement, sampler, verdict, value=1.0):
-        words = {"id": statement, "statement": statement, "source": "PRE", "good": "≥ 0"}
-        words |= {"sampler": sampler, "verdict": verdict, "number": "x", "fair": "", "before": ""}
-        numbers = {"value": value, "low": value, "high": value, "mu": None, "packings": 3}
-        return words | numbers | {"figure": 3, "variant": "", "outside": []}
+def test_few_cases_are_listed_and_of_many_the_one_that_decides():
+    few = [case("η1", verdicts.REPRODUCED, 1.0), case("η2", verdicts.UNDECIDED, 2.0)]
+    assert documents.case_texts(few) == ["η1 ✓ 1.00 (0.900 … 1.10)", "η2 ? 2.00 (1.90 … 2.10)"]
+    many = [case(f"μ = {mu}", verdicts.REPRODUCED, 1 + mu) for mu in (0.1, 1, 3)]
+    many += [case("μ = 10", verdicts.CONTRADICTED, 5.0)]
+    assert documents.case_texts(many) == [
+        "✓ μ = 0.1, 1, 3: 4.00 (3.90 … 4.10) at 3",
+        "✗ μ = 10: 5.00 (4.90 … 5.10)",
+    ]
 
-    judged = [
-        claim("a", "gauss_seidel", verdicts.REPRODUCED),
-        claim("a", "exact", verdicts.CONTRADICTED),
-        claim("b", "gauss_seidel", verdicts.FEW),
-        claim("b", "exact", verdicts.REPRODUCED),
-        claim("c", "gauss_seidel", verdicts.UNMEASURED),
-        claim("c", "nearest", verdicts.REPRODUCED),
-        claim("c", "exact", verdicts.STRONGLY),
-        claim("c", "uniform", verdicts.MISSING, float("nan")),
-        claim("d", "", verdicts.CONTRADICTED) | {"source": "PRL"},
-    ]
-    rows = table_of(documents.claim_table(EMPTY, judged, 3))
-    assert rows[0] == ["claim, and the number judged", "verdict", "value", "range", "others"]
-    verdicts_shown = [
-        "✓ reproduced",
-        "… too few data",
-        "✗✗ strongly contradicted",
-        "✗ contradicted",
-    ]
-    assert [row[1].replace("\u00a0", " ") for row in rows[2:]] == verdicts_shown
-    assert [row[0].partition("<br>")[0] for row in rows[2:]] == ["a", "b", "c", "d (PRL)"]
-    assert [row[4] for row in rows[2:]] == [
-        *("✗\u00a0exact", "✓\u00a0exact", "✓\u00a0nearest", "")  # uniform has no number
-    ]
-    lines = table_of(documents.outcome_counts(judged))
-    assert lines[-1] == ["all", "2", "1", "1"]
-    assert "(#figure-3-networks-of-one-packing)" in lines[4][0] and lines[4][1:] == ["2", "1", "1"]
-    assert "tests 4 claims" in outcomes.score(judged)
-    assert "1 are reproduced, 2 contradicted (1 strongly) and 1 open" in outcomes.score(judged)
-    assert "2 of them are judged with the paper's own random walk" in outcomes.score(judged)
-    lines = [
-        line.strip("| ").split(" | ") for line in documents.verdict_counts(judged).splitlines()
-    ]
-    counted = {word: [int(n) for n in numbers] for word, *numbers in lines[2:]}
-    assert counted["✓ reproduced"] == [1, 1, 1, 1, 0] and "? undecided" not in counted
-    assert counted["✗✗ strongly contradicted"] == [1, 0, 0, 1, 0]
-    # The paper's walk decides as many claims as it has judged.
-    assert "– not measured" not in counted and counted["all"] == [4, 2, 1, 3, 1]
+
+def test_a_claim_says_by_whose_networks_and_in_which_preparations_it_was_judged():
+    one = {"id": "a", "place": "Fig. 4", "text": "It falls.", "number": "b", "why": "so"}
+    one |= {"range": "small: ≤ 1; large: ≥ 2", "sampler": "exact", "chosen": "before", "late": ""}
+    one |= {"by": {"exact": {"cases": [case("", verdicts.REPRODUCED, 0.5)]}}}
+    usual = one | {"verdict": verdicts.REPRODUCED, "one_preparation": True}
+    other = one | {"verdict": verdicts.DEPENDS, "one_preparation": False, "late": "contradicted"}
+    first, second = table_of(documents.claim_table([usual, other]))[2:]
+    assert first[:2] == ["`a`<br>Fig. 4", "It falls.<br><small>b; exact</small>"]
+    assert first[2] == "small: ≤ 1<br>large: ≥ 2"
+    assert first[4] == "✓\u00a0reproduced<br><small>default preparation only</small>"
+    assert second[4].endswith("<small>late drag: contradicted</small>")
+    assert table_of(documents.range_table([usual]))[2][2:] == ["so", "before"]
 
 
 @pytest.mark.parametrize(

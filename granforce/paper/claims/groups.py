@@ -62,6 +62,11 @@ def enough(rows: pd.DataFrame) -> Any:
     return rows["reached_part"].fillna(1.0) >= WHOLE_WALK
 
 
+def skipped(rows: pd.DataFrame) -> Any:
+    """Which rows have states that are the only point of S, without any relaxation."""
+    return rows["skipped_part"].fillna((rows["dimension"] == 0).astype(float)) > 0
+
+
 def dynamic(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of packings made by contact dynamics."""
     return rows[rows["mu"] >= LEAST_DYNAMIC]
@@ -83,14 +88,18 @@ def items(rows: pd.DataFrame, *names: str, by: str = "mu") -> Groups:
 
 
 def over_contacts(
-    table: StudyTable, sampler: str, measure: Callable[[pd.DataFrame], Any]
+    table: StudyTable,
+    sampler: str,
+    measure: Callable[[pd.DataFrame], Any],
+    span: Ends = (0.0, np.inf),
 ) -> Groups:
     """{μ: [(disks, measure(contacts))]} of packings that may be judged, without NaN.
 
     contacts: a table with the f_n, least f_n and ΔF_n (normal, least, extent) of each, in ⟨f_n⟩.
     """
     groups: Groups = {}
-    judged = set(drawn(table, sampler).index)
+    rows = drawn(table, sampler)
+    judged = set(rows.index[rows["mu"].between(*span)])
     for row, contacts in table.contacts(SAMPLERS[sampler]):
         if row.Index in judged and len(contacts):
             value = measure(contacts)
@@ -124,11 +133,3 @@ def within(groups: Groups, span: Ends) -> Groups:
 def positive_friction(groups: Groups) -> Groups:
     """The groups except that of μ = 0."""
     return {mu: group for mu, group in groups.items() if mu > 0}
-
-
-def span_text(span: Ends) -> str:
-    """A range of μ in words."""
-    low, high = span
-    if not np.isfinite(high):
-        return f"μ ≥ {low:g}"
-    return f"μ = {low:g} … {high:g}" if low > 0 else f"μ ≤ {high:g}"

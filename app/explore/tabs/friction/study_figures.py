@@ -8,7 +8,7 @@ from bokeh.models import DataRange1d
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
-from granforce.paper.claims.figure1 import PAPERS_PEAK
+from granforce.paper.claims.table import PAPERS_PEAK
 from granforce.paper.tables import packings_at_each
 
 from ....results import distributions, study_data

@@ -1,0 +1,397 @@
+"""The claims of the paper and of an earlier letter: what they say, and what is measured."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.paper.claims import contacts, numbers
+from granforce.paper.claims.groups import Ends
+from granforce.paper.claims.verdicts import Case, range_text
+from granforce.paper.tables import StudyTable
+
+# When a range was chosen: before the packings of this study were made, though the results of its
+# earlier versions were known, or after.
+BEFORE, AFTER = "before", "after"
+BY_WALKS = ("gauss_seidel", "nearest")
+BY_STATES = (*BY_WALKS, "uniform")  # these have η1 and η2
+BY_ALL = (*BY_STATES, "exact")
+PACKINGS = ("",)  # no states are needed
+PAPERS_PEAK = 0.1  # μ at which the paper finds the largest η
+_NEAR = {"": (PAPERS_PEAK / 2, PAPERS_PEAK * 2)}
+_NEAR_WHY = "Near means within a factor of two."
+_SIGN = "The sign alone is claimed."
+
+# The paper's figures, and what the claims about each are about.
+TOPICS = {
+    1: "Indeterminacy against friction",
+    2: "Response to a local force",
+    3: "Networks of one packing",
+    4: "Lengths of the intervals",
+    5: "Strong and undetermined contacts",
+    6: "Correlation of force and interval",
+}
+
+
+class Claim(NamedTuple):
+    """A claim in our words, the number that it is judged by, and the range that it states."""
+
+    id: str
+    figure: int  # of the paper, to which it belongs
+    place: str  # in the paper, or in the letter
+    text: str
+    number: str
+    ranges: Mapping[str, Ends]  # by the span of a case; a single one has no name
+    why: str  # this range
+    chosen: str
+    measure: Callable[[StudyTable, str], Iterator[Case]]
+    samplers: tuple[str, ...] = BY_ALL  # the first that is measured decides
+
+    def range(self) -> str:
+        """The range in words."""
+        named = ((span, range_text(good)) for span, good in self.ranges.items())
+        return "; ".join(f"{span}: {words}" if span else words for span, words in named)
+
+
+def _at_most(end: float) -> dict[str, Ends]:
+    return {"": (-np.inf, end)}
+
+
+def _at_least(end: float) -> dict[str, Ends]:
+    return {"": (end, np.inf)}
+
+
+LETTER = "letter"  # PRL 94, 178001, before the paper
+CLAIMS = (
+    Claim(
+        "alike",
+        1,
+        "Fig. 1, text",
+        "η1, η2 and η3 depend on μ in the same way: they are equal up to constant factors.",
+        "largest ratio over the smallest at μ ≥ 0.001",
+        {"": (1, 1.5)},
+        "Much less than η itself varies, by a factor of three or more.",
+        BEFORE,
+        numbers.constancy,
+        BY_STATES,
+    ),
+    Claim(
+        "factors",
+        1,
+        "Fig. 1, text",
+        "The constant factors are η1 ≈ η2 ≈ 0.15 η3.",
+        "geometric mean of the ratio over μ ≥ 0.001",
+        {"η2/η1": (1 / 1.5, 1.5), "η1/η3": (0.12, 0.18), "η2/η3": (0.12, 0.18)},
+        "The factor 0.15 is given, and taken within a fifth; that of η2 and η1 is not, and taken "
+        "within a half.",
+        BEFORE,
+        numbers.factors,
+        BY_STATES,
+    ),
+    Claim(
+        "turns",
+        1,
+        "Fig. 1, text",
+        "η(μ) is not monotonic: it rises, and then falls.",
+        "the smaller of the rise to the maximum and of the fall from it, over the maximum",
+        _at_least(0),
+        _SIGN,
+        BEFORE,
+        numbers.turns,
+    ),
+    Claim(
+        "peak",
+        1,
+        "Fig. 1, text",
+        "η(μ) is largest near μ = 0.1.",
+        "μ at the top of a parabola in log μ",
+        _NEAR,
+        _NEAR_WHY,
+        BEFORE,
+        numbers.peaks,
+    ),
+    Claim(
+        "linear",
+        1,
+        LETTER,
+        "η vanishes in proportion to μ as μ → 0.",
+        "slope of log exact η3 against log μ, μ = 10⁻⁵ … 10⁻⁴",
+        {"": (0.9, 1.1)},
+        "The limit is judged at the smallest μ, after slopes at larger μ were known.",
+        AFTER,
+        numbers.smallest,
+        ("exact", "nearest", "uniform"),
+    ),
+    Claim(
+        "reproducible",
+        1,
+        "text",
+        "η is well reproducible: other walks in the same packing give the same value.",
+        "standard deviation of η2 over three walks, over its mean",
+        _at_most(0.05),
+        "Small compared with the differences between packings.",
+        BEFORE,
+        numbers.repeated,
+        BY_WALKS,
+    ),
+    Claim(
+        "size",
+        1,
+        "text",
+        "η hardly depends on the number N of disks.",
+        "slope of log η2 (exact: η3) against log N",
+        {"": (-0.1, 0.1)},
+        "Less than 15 % for four times as many disks.",
+        BEFORE,
+        numbers.sizes,
+        (*BY_WALKS, "exact"),
+    ),
+    Claim(
+        "coordination",
+        1,
+        "Fig. 1, inset",
+        "The coordination z depends strongly on μ, and falls.",
+        "z at μ = 0.001 minus z at the largest μ",
+        _at_least(0.5),
+        "Half of the way from 4 to 3, where packings without and with friction are isostatic.",
+        AFTER,
+        numbers.coordination,
+        PACKINGS,
+    ),
+    Claim(
+        "fewer-contacts",
+        1,
+        LETTER,
+        "With the same μ in Coulomb's law, η is smaller in packings that were made with more "
+        "friction, and have fewer contacts.",
+        "rank correlation of mean exact η3 with the μ of preparation, for the largest μ in "
+        "Coulomb's law",
+        {"": (-1, -0.95)},
+        "Monotonic, but for noise.",
+        BEFORE,
+        numbers.fewer_contacts,
+        ("exact",),
+    ),
+    Claim(
+        "response-peak",
+        2,
+        "Fig. 2, text",
+        "The critical force F_crit and the exponent α are largest near μ = 0.1, as η is.",
+        "μ at the top of a parabola in log μ",
+        _NEAR,
+        _NEAR_WHY,
+        BEFORE,
+        numbers.answer_peaks,
+        PACKINGS,
+    ),
+    Claim(
+        "response",
+        2,
+        "Fig. 2, text",
+        "F_crit and α are strongly related to η: they are not unique functions of it, but similar "
+        "at similar η.",
+        "distance of means at equal η, one at smaller and one at larger μ than the maximum of η, "
+        "over the whole range of the means",
+        _at_most(0.5),
+        "Responses at equal η are similar if they differ by less than half as much as all do.",
+        AFTER,
+        numbers.answers,
+    ),
+    Claim(
+        "power-law",
+        2,
+        "Fig. 2, text",
+        "The first motion |u|(r) decays as a power law.",
+        "misfit of the best power law over that of the best exponential, rms of ln |u|",
+        _at_most(1),
+        "The power law fits better.",
+        BEFORE,
+        numbers.law,
+        PACKINGS,
+    ),
+    Claim(
+        "pair-distances",
+        3,
+        "text",
+        "Distances between pairs of networks are sharply peaked.",
+        "standard deviation over mean, μ ≥ 0.001",
+        _at_most(0.2),
+        "A peak is sharp if it is narrow compared with its distance from zero.",
+        BEFORE,
+        numbers.pair_distances,
+        BY_STATES,
+    ),
+    Claim(
+        "centre",
+        3,
+        LETTER,
+        "The original network lies closer to the centre of S than sampled ones.",
+        "its distance from the centre over their mean distance, μ ≥ 0.001",
+        _at_most(1),
+        _SIGN,
+        BEFORE,
+        numbers.centre,
+        BY_STATES,
+    ),
+    Claim(
+        "relative-turns",
+        3,
+        "Fig. 3",
+        "The relative extent ΔF_n/F_orig of a contact is not monotonic in μ: it rises, and then "
+        "falls.",
+        "as for η, of the median over contacts",
+        _at_least(0),
+        _SIGN,
+        BEFORE,
+        contacts.relative_turns,
+    ),
+    Claim(
+        "relative-weak",
+        3,
+        "Fig. 3",
+        "Weak contacts have the largest relative extents ΔF_n/F_orig.",
+        "rank correlation of ΔF_n/F_orig with F_orig, μ ≥ 0.001",
+        _at_most(-0.3),
+        "More than a trend that many contacts make significant.",
+        BEFORE,
+        contacts.relative_weak,
+    ),
+    Claim(
+        "shape",
+        4,
+        "Fig. 4, text",
+        "P(ΔF_n) falls monotonically at small and at large μ, and has a peak at intermediate μ.",
+        "departure from a falling density",
+        {"small": (-np.inf, 0.05), "intermediate": (0.1, np.inf), "large": (-np.inf, 0.05)},
+        "0.05 and 0.1 are those of Weibull distributions with exponents 1.5 and 2.",
+        BEFORE,
+        contacts.shape,
+    ),
+    Claim(
+        "tail",
+        4,
+        "Fig. 4, text",
+        "The tail of P(ΔF_n) is exponential at small μ, falls faster at intermediate, and more "
+        "slowly at large μ.",
+        "b of exp(−(λ ΔF_n)^b) beyond the upper quartile",
+        {"small": (0.85, 1.15), "intermediate": (1, np.inf), "large": (-np.inf, 1)},
+        "b = 1 is exponential. Of three quantiles that were judged, this is that of Figure 4.",
+        AFTER,
+        contacts.tails,
+    ),
+    Claim(
+        "width",
+        4,
+        "Fig. 4, text",
+        "P(ΔF_n) is broadest at intermediate μ.",
+        "μ at the top of a parabola in log μ, for the standard deviation of ΔF_n",
+        {"": (0.05, 0.3)},
+        "Our range of intermediate μ.",
+        BEFORE,
+        contacts.width,
+    ),
+    Claim(
+        "elongation",
+        4,
+        "Fig. 4, text",
+        "S is more elongated at small and at large than at intermediate μ.",
+        "mean of std/mean of ΔF_n over that at intermediate μ",
+        _at_least(1),
+        _SIGN,
+        BEFORE,
+        contacts.elongation,
+    ),
+    Claim(
+        "equal-counts",
+        5,
+        "Fig. 5, text",
+        "At μ = 0.1, f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about equally many contacts.",
+        "number of the former over that of the latter",
+        {"": (0.8, 1.25)},
+        "About equally many means within a fifth.",
+        BEFORE,
+        contacts.counts,
+    ),
+    Claim(
+        "patterns",
+        5,
+        "Fig. 5, text",
+        "At μ = 10, these two kinds of contacts form seemingly different patterns.",
+        "share of the former among the latter, on a scale from 0 (as of all contacts) to 1",
+        _at_most(0.5),
+        "Closer to unrelated patterns than to the same one.",
+        AFTER,
+        contacts.patterns,
+    ),
+    Claim(
+        "everywhere",
+        5,
+        "Fig. 5, text",
+        "With only the pressure prescribed, indeterminacy is everywhere, and not in clusters.",
+        "undetermined fraction of the force-carrying contacts, μ > 0",
+        _at_least(0.9),
+        "At most one contact in ten is determined.",
+        BEFORE,
+        numbers.everywhere,
+        ("exact",),
+    ),
+    Claim(
+        "frozen",
+        5,
+        LETTER,
+        "With frozen boundary forces, indeterminacy is everywhere at small μ, and in small "
+        "clusters at large μ.",
+        "fraction of the contacts inside that are undetermined (μ ≤ 0.05), or in the largest "
+        "cluster (μ ≥ 0.5)",
+        {"small": (0.75, np.inf), "large": (-np.inf, 0.25)},
+        "Three quarters of the contacts are most of them, a quarter is a small part.",
+        BEFORE,
+        numbers.frozen,
+        ("exact",),
+    ),
+    Claim(
+        "significant",
+        6,
+        "Fig. 6, text",
+        "The correlation of f_n with ΔF_n is significant at intermediate μ.",
+        "corr(f_n, ΔF_n), mean over packings",
+        _at_least(0.1),
+        "More than two standard deviations of its values for shuffled f_n.",
+        BEFORE,
+        numbers.significant,
+    ),
+    Claim(
+        "weaker",
+        6,
+        "Fig. 6, text",
+        "The correlation of f_n with ΔF_n is weaker at small and at large than at intermediate μ.",
+        "mean of corr(f_n, ΔF_n) minus that at intermediate μ",
+        _at_most(0),
+        _SIGN,
+        BEFORE,
+        numbers.weaker,
+    ),
+    Claim(
+        "vanishing",
+        6,
+        "Fig. 6, text",
+        "The correlation of f_n with ΔF_n vanishes at large μ.",
+        "corr(f_n, ΔF_n), mean over packings",
+        {"": (-0.1, 0.1)},
+        "The complement of a significant one.",
+        BEFORE,
+        numbers.vanishing,
+    ),
+    Claim(
+        "origin",
+        6,
+        "footnote on Fig. 6",
+        "This correlation is of statistical origin: the position of f_n in its interval does not "
+        "matter.",
+        "corr(f_n, ΔF_n) minus its mean if positions are shuffled among contacts, intermediate μ",
+        {"": (-0.1, 0.1)},
+        "Small compared with the correlation.",
+        BEFORE,
+        contacts.origin,
+    ),
+)
