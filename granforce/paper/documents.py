@@ -4,10 +4,10 @@ A document contains <!-- study: NAME -->, the generated text, and <!-- end -->. 
 against μ), "walks" (the paper's walk against μ), "others" and "further" (other measures at each μ),
 "highlights" (findings, one sentence each), "headlines" (the first few of them), "claims" (each
 claim of the paper with its verdict, and the numbers behind it), "ranges" (why a claim has its
-range), "findings" (numbers beyond the claims), "sweeps" (the residual of the paper's walk, and its
-excess over S), "preparation" (how results depend on the packing), "resting" (how h and η3 depend on
-when drag sets in), "counts" (number of packings of each kind of result), "certificates" (largest
-gap of the exact bounds, convergence of uniform samples).
+range), "figures" (the paper's, with captions), "findings" (numbers beyond the claims), "sweeps"
+(the residual of the paper's walk, and its excess over S), "preparation" (how results depend on the
+packing), "resting" (how h and η3 depend on when drag sets in), "counts" (number of packings of each
+kind of result), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
 from collections import Counter
@@ -32,6 +32,7 @@ from granforce.paper.claims.groups import (
     skipped,
 )
 from granforce.paper.claims.verdicts import DEPENDS, SYMBOLS
+from granforce.paper.drawings import CAPTIONS, paper_sampler
 from granforce.paper.formatting import (
     NOTHING,
     between,
@@ -51,6 +52,7 @@ _SWEPT_EXTENT = "paper's walk 0.15 η3"
 _OUTSIDE = "outside S"
 _NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on, the main table gives the excess
 FIGURES = "../../../data/figures"  # relative to the results page
+SHOWN = (1, 2, 4, 5, 6)  # figures among the claims; the third is on the first page
 TABLE = "results-in-detail.md#dependence-on-friction"  # of z, h and η
 HEADLINES = 3  # highlights in the README
 LISTED = 3  # cases of a claim that are listed with their numbers; of more, the one that decides
@@ -121,6 +123,7 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
         "headlines": lambda: headlines(table, claims, findings),
         "claims": lambda: claim_table(claims),
         "ranges": lambda: range_table(claims),
+        "figures": lambda: captioned(table),
         "sweeps": lambda: sweeps(table),
         "preparation": lambda: preparation(table),
         "resting": lambda: resting(table),
@@ -603,3 +606,13 @@ def range_table(claims: Rows) -> str:
         for claim in claims
     ]
     return markdown.table(("id", "range", "why this range", "chosen"), lines)
+
+
+def captioned(table: StudyTable) -> str:
+    """The figures of the paper with their captions."""
+    walk = _HEADS[paper_sampler(table)]
+    return "\n".join(
+        f"![Figure {k}]({FIGURES}/figure{k}.png)\n\n*Figure {k}.* "
+        f"{CAPTIONS[f'figure{k}'].format(walk=walk)}\n"
+        for k in SHOWN
+    )

@@ -394,7 +394,7 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
-    names += ("claims", "ranges", "findings", "headlines", "certificates")
+    names += ("claims", "ranges", "figures", "findings", "headlines", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = markdown.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
