@@ -10,14 +10,12 @@ packing), "resting" (how h and η3 depend on when drag sets in), "counts" (numbe
 kind of result), "certificates" (largest gap of the exact bounds, convergence of uniform samples).
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from granforce.measures import statistics
 from granforce.paper import plan as plans
@@ -349,18 +347,19 @@ def _excess(excess: float, length: float) -> str:
 
 
 def preparation(table: StudyTable) -> str:
-    """Dependence on the preparation: a table of paired differences for each number, and a summary.
+    """Dependence on the preparation: a table of paired differences for each number, and a sentence.
 
     First the mean of the default options over all seeds of the variants; then, for each variant,
-    the mean difference from the default in the same seeds, bold if it is significant. z is left
-    out, as it follows from h.
+    the mean difference from the default in the same seeds, bold if it is significant although there
+    are so many. z is left out, as it follows from h.
     """
     names = [part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")]
     variants = list(dict.fromkeys(names))
     varied = table.part(*variants)[["mu", "seed"]].drop_duplicates()
     frictions = sorted(varied["mu"].unique())
     heads = ["options", *(f"μ = {mu:g}" for mu in frictions)]
-    text, differences = "", []
+    tests = len(_PREPARED) * len(variants) * len(frictions)
+    text = ""
     for quantity, suffix, measure in _PREPARED:
         usual = table.part("exact" if suffix else "walk", n=table.plan["n"])
         usual = statistics.paired(usual, varied).dropna(subset=[measure])[usual.columns]
@@ -371,68 +370,29 @@ def preparation(table: StudyTable) -> str:
         for variant in variants:
             pairs = statistics.paired(table.part(variant + suffix), usual)
             pairs = pairs.assign(apart=pairs[measure] - pairs[f"{measure}_other"])
-            differences_at = statistics.grouped(pairs, "apart")
-            apart = {mu: _apart(differences_at.get(mu, np.zeros(0))) for mu in frictions}
-            differences += [(_word(variant), one) for one in apart.values() if one is not None]
-            cells = [one.text if one else "" for one in apart.values()]
-            lines.append([_word(variant), *cells])
+            apart = statistics.grouped(pairs, "apart")
+            word = _VARIANTS.get(variant, variant.removeprefix("prepared_").replace("_", " "))
+            cells = (_difference(apart[mu], tests) if mu in apart else "" for mu in frictions)
+            lines.append([word, *cells])
         text += f"**{quantity}**\n\n{markdown.table(heads, lines)}\n"
-    return text + _tested(differences) if differences else text
-
-
-def _word(variant: str) -> str:
-    """How the packings of a variant were made, in words."""
-    return _VARIANTS.get(variant, variant.removeprefix("prepared_").replace("_", " "))
-
-
-class _Apart(NamedTuple):
-    """A mean difference of paired packings."""
-
-    text: str  # with its standard error, bold if it is significant
-    p: float  # of Student's t; NaN without scatter
-    packings: int
-
-
-def _tested(differences: Sequence[tuple[str, _Apart]]) -> str:
-    """How many differences (options in words, difference) are significant, in sentences."""
-    p = np.array([apart.p for _, apart in differences])
-    same, level = int(np.isnan(p).sum()), 1 - statistics.LEVEL
-    tests = len(p) - same
-    alone, together = (
-        Counter(word for word, apart in differences if apart.p < most)
-        for most in (level, level / max(1, tests))
-    )
-    text = (
-        "Each difference is the mean over "
-        f"{_span([apart.packings for _, apart in differences])} pairs of packings. By Student's t, "
-        f"{alone.total()} of {tests} are significant at the level {level:.2g} (bold; "
-        f"{level * tests:.1f} expected by chance)"
-    )
-    if same:
-        text += f"; {same} left out, as all pairs differ by the same amount"
-    if together:
-        words = listed([f"{times} for *{word}*" for word, times in together.most_common()])
-        return f"{text}. After Bonferroni correction, these remain significant: {words}.\n"
-    text += f". None of the {tests} remains significant after Bonferroni correction"
-    if stats.binom.sf(alone.total() - 1, tests, level) > level:
-        return f"{text}: so few packings show no dependence on the options.\n"
-    ((word, times),) = alone.most_common(1)
+    if not text:
+        return text
+    pairs_each = varied.groupby("mu").size()
     return (
-        f"{text}. They are not independent: the tables are of the same packings. Of the "
-        f"{alone.total()}, {times} are for *{word}*.\n"
+        f"{text}Each difference is the mean over up to {pairs_each.max()} pairs of packings; it is "
+        f"bold if Student's t is significant at the level 0.05, corrected for {tests} differences "
+        "(Bonferroni).\n"
     )
 
 
-def _apart(apart: Floats) -> _Apart | None:
-    """The mean of the differences of some pairs; None for fewer than two."""
+def _difference(apart: Floats, tests: int) -> str:
+    """The mean difference of some pairs with its error, bold if it is significant."""
     if len(apart) < 2:
-        return None
+        return ""
     text = f"{'+' if apart.mean() > 0 else ''}{with_error(apart)}"
-    error = apart.std(ddof=1) / np.sqrt(len(apart))
-    if error <= NOTHING * np.abs(apart).max():
-        return _Apart(text, np.nan, len(apart))
-    p = float(2 * stats.t.sf(abs(apart.mean() / error), len(apart) - 1))
-    return _Apart(f"**{text}**" if p < 1 - statistics.LEVEL else text, p, len(apart))
+    _, low, high = statistics.mean_interval(apart, 1 - (1 - statistics.LEVEL) / tests)
+    scattered = high > low  # else there is no error to compare with
+    return f"**{text}**" if scattered and (low > 0 or high < 0) else text
 
 
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:

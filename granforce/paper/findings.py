@@ -18,25 +18,18 @@ from granforce.paper import tails
 from granforce.paper.claims.contacts import relative_extents
 from granforce.paper.claims.groups import (
     RANGES,
-    SAMPLERS,
     drawn,
     items,
     positive,
-    sampled,
-    within,
 )
 from granforce.paper.claims.verdicts import peak, slope
 from granforce.paper.tables import StudyTable
-from granforce.types import Floats
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
 WORDS = {
     "gauss_seidel": "the paper's walk",
-    "gauss_seidel_1e-4": "the paper's walk to 10⁻⁴",
-    "gauss_seidel_1e-6": "the paper's walk to 10⁻⁶",
     "nearest": "the nearest-network walk",
     "uniform": "uniform networks",
-    "exact": "exact",
 }
 WALKS = ("nearest", "gauss_seidel")
 LONGER = {"gauss_seidel": "repeat_sweeps_long", "nearest": "repeat_walk_long"}
@@ -115,21 +108,6 @@ def exact_shape(table: StudyTable) -> Iterator[Finding]:
         if len(groups) > 2:
             yield _trend(f"{part}-peak", f"μ where {label} is largest", peak, groups)
         yield from _growth(f"{part}-slope", groups, label)
-
-
-def distribution(table: StudyTable) -> Iterator[Finding]:
-    """Width of P(ΔF_n)."""
-    for sampler in SAMPLERS:
-        groups = sampled(table, sampler)
-        for word, span in RANGES:
-            moments = {
-                mu: [(v.mean(), np.mean(v**2)) for _, v in group]
-                for mu, group in within(groups, span).items()
-            }
-            if moments:
-                statement = f"standard deviation of ΔF_n in ⟨f_n⟩, {WORDS[sampler]}, {word} μ"
-                id = f"width-{sampler}"
-                yield _trend(id, statement, _mean_width, moments)._replace(span=word)
 
 
 def opened(table: StudyTable) -> Iterator[Finding]:
@@ -265,7 +243,7 @@ def _part(packings: Any, name: str) -> float:
 # Topic, which takes the place of a source, → its findings.
 TOPICS = {
     "Samples of S": (sampled_part, measure),
-    "Lengths of intervals": (correlations, distribution),
+    "Lengths of intervals": (correlations,),
     "Dependence of η on μ and N": (exact_shape, opened, size),
     "Local perturbation": (strength,),
     "Shear stress": (shear,),
@@ -284,11 +262,6 @@ def _quotients(pairs: pd.DataFrame, above: str, below: str) -> Values:
     """{μ: one number over another}, where both exist."""
     pairs = pairs[pairs[below] != 0]
     return statistics.grouped(pairs.assign(quotient=pairs[above] / pairs[below]), "quotient")
-
-
-def _mean_width(_: Floats, moments: Floats) -> float:
-    """Mean of the standard deviations, from mean and mean square at each μ, moments (k, 2)."""
-    return float(np.mean(np.sqrt(moments[:, 1] - moments[:, 0] ** 2)))
 
 
 def _by_range(id: str, groups: Values, statement: str) -> Iterator[Finding]:

@@ -55,7 +55,7 @@ def _judge(claim: Claim, table: StudyTable, usual: StudyTable, late: StudyTable)
     return {
         "id": claim.id,
         "figure": claim.figure,
-        "place": claim.place,
+        "place": claim.place or f"Fig. {claim.figure}, text",
         "text": claim.text,
         "number": claim.number,
         "range": claim.range(),
