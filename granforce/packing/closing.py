@@ -64,7 +64,7 @@ class Margin(NamedTuple):
 
     @property
     def certain(self) -> bool:
-        """Whether every gap is either rounding or clearly open.
+        """Whether contacts are closed to rounding, 10⁻¹¹, and other pairs open by more than 10⁻⁹.
 
         Otherwise it is not certain that some pair without force touches.
         """
