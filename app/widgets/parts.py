@@ -1,6 +1,6 @@
 """Features shared by the tabs: they compute only while visible, and their plots can be saved."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import panel as pn
@@ -8,6 +8,7 @@ import panel_material_ui as pmui
 from bokeh.models import CustomAction, CustomJS, GlyphRenderer, SaveTool, TapTool
 from bokeh.plotting import figure as Figure
 
+from ..background.notifications import observe
 from ..browser.bundle import SHARED
 from ..browser.panel_patches import together
 from ..state.app_state import AppState
@@ -43,21 +44,16 @@ setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 class TabView:
     """A tab's view, which calls `update` after a change of something watched, if it is on screen.
 
-    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks, work:
-    parameters of these.
+    Subclasses have a `name`, that of their tab. watched: parameters, as for `observe`.
     """
 
     name: str
     update: Callable[[], None]
 
-    def __init__(
-        self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, state: AppState, *watched: str) -> None:
         self.state, self.looks = state, state.looks
         self._stale = True
-        state.param.watch(self._changed, [*watched])
-        self.looks.param.watch(self._changed, ["tab", "wide", *looks])
-        state.work.param.watch(self._changed, [*work])
+        observe(self._changed, state, "looks.tab", "looks.wide", *watched)
 
     @property
     def visible(self) -> bool:

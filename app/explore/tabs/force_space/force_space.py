@@ -33,7 +33,7 @@ class View(TabView):
     name = "plane"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "shown", looks=["contact", "pair"], work=["fourfold"])
+        super().__init__(state, "shown", "looks.contact", "looks.pair", "work.fourfold")
         self.drawing = SpaceFigure(self.name, self._choose)
         self.planes = question("Plane", PLANES, self.looks, "axes", width=310, margin=(4, 8))
         self.task, self.placing = state.work.task(), state.work.task(reading)

@@ -42,8 +42,8 @@ class View(TabView):
 
     def __init__(self, state: AppState) -> None:
         super().__init__(
-            state, "shown", "exact", looks=["drawn", "sort", "scale", "contact", "dark"],
-            work=["arriving"],
+            state, "shown", "exact", "looks.drawn", "looks.sort", "looks.scale", "looks.contact",
+            "looks.dark", "work.arriving", "knowledge.narrowed", "knowledge.known",
         )  # fmt: skip
         self.drawing = BarsFigure(self._choose)
         self.growth = GrowthFigure()
@@ -58,7 +58,6 @@ class View(TabView):
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.lead, self.details = note(), note()
         self.exact.on_click(lambda event: state.compute_exact())
-        observe(self.refresh, state, "knowledge.narrowed", "knowledge.known")
         running = "work.computation.running"
         observe(self._explain, state, "hand.pulls", "missing", running, "work.reader.running")
         observe(self._offer, state, "shown", "exact", running, "knowledge.task.running")

@@ -43,7 +43,7 @@ class View(TabView):
     name = "perturb"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "replay", looks=["contact"])
+        super().__init__(state, "replay", "looks.contact", "knowledge.known")
         self.what = question("Push", PUSHES, self.looks, "pushing", width=320, margin=(4, 8))
         self.load = LoadSlider(self._push, self._give_way)
         self.every = pmui.Button(label="Compute for all contacts", margin=(4, 8), **PRIMARY)
@@ -62,7 +62,6 @@ class View(TabView):
         self.every.on_click(lambda event: self._find_loads())
         self.task.param.watch(lambda event: self.load.param.update(running=event.new), "running")
         self.looks.param.watch(self._animate, "tab")
-        state.knowledge.param.watch(self.refresh, "known")
         self.catch_up()
 
     def panel(self) -> pn.Column:
