@@ -8,81 +8,107 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from granforce.bench.conditions import knowledge
+from granforce.bench import packings
+from granforce.bench.conditions import inference, knowledge
+from granforce.bench.exact import REFERENCES, interval_methods
 from granforce.bench.frames import frames
-from granforce.bench.inference import inference
 from granforce.bench.kernel import growth, kernel, pushes, starts
-from granforce.bench.masonry import masonry
+from granforce.bench.masonry import SMALL, masonry
 from granforce.bench.packings import (
     compaction,
     compaction_frictions,
     compaction_growth,
 )
-from granforce.bench.report import environment, note, table
+from granforce.bench.report import environment, table
+from granforce.bench.runner import note
 from granforce.bench.skips import skips
-from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
-from granforce.bench.states import batches, interval_methods, intervals, walks
+from granforce.bench.solvers import contact_updates, relaxation, scaling
+from granforce.bench.states import batches, intervals, walks
 from granforce.bench.uniform import uniform, uniform_growth
 from granforce.system.files import make_folder, written
 from granforce.system.wording import json_text
+from granforce.types import Rows
 
-__all__ = [
-    "PARTS",
-    "batches",
-    "compaction",
-    "compaction_frictions",
-    "compaction_growth",
-    "contact_updates",
-    "draw",
-    "environment",
-    "frames",
-    "growth",
-    "inference",
-    "interval_methods",
-    "intervals",
-    "kernel",
-    "knowledge",
-    "main",
-    "masonry",
-    "pushes",
-    "relaxation",
-    "run",
-    "scaling",
-    "skips",
-    "starts",
-    "tile",
-    "uniform",
-    "uniform_growth",
-    "walks",
-]
 
-# Part → what it measures, and its heading.
-Parts = Mapping[str, tuple[Callable[..., list[dict[str, Any]]], str]]
-PARTS: Parts = {
-    "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
-    "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
-    "scaling": (scaling, "One relaxation against the number of disks"),
-    "kernel": (kernel, "Factorisation: part of what the machine can do"),
-    "starts": (starts, "Nearest networks: PIQP, one at a time, and in lanes"),
-    "pushes": (pushes, "Critical forces: one contact at a time, and in lanes"),
-    "growth": (growth, "Set-up, relaxation and exact bound against the number of disks"),
-    "batches": (batches, "Chains of one packing on one and two threads"),
-    "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
-    "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
-    "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
-    "skips": (skips, "What skipping is worth"),
-    "intervals": (intervals, "Intervals seen by walks against exact ones"),
-    "interval_methods": (interval_methods, "Exact intervals against other tools"),
-    "uniform": (uniform, "Uniform sampling of S"),
-    "uniform_growth": (uniform_growth, "Uniform sampling against the number of disks"),
-    "inference": (inference, "The likeliest network of a measurement"),
-    "frames": (frames, "Photoelastic frames of known forces: distance from the truth in ⟨f_n⟩"),
-    "knowledge": (knowledge, "What is prescribed and known, beside HiGHS and PIQP"),
-    "masonry": (masonry, "Dry-stone walls beside HiGHS"),
-    "walks": (walks, "Random walks by solver"),
-}
+class Part(NamedTuple):
+    """A part of the benchmark."""
+
+    measure: Callable[..., Rows]
+    heading: str
+    quick: Mapping[str, Any]  # its arguments with --quick; by default it is full
+
+
+def _part(measure: Callable[..., Rows], heading: str, **quick: Any) -> tuple[str, Part]:
+    return measure.__name__, Part(measure, heading, quick)
+
+
+PARTS = dict(
+    [
+        _part(contact_updates, "One contact update of Gauss–Seidel", n=100),
+        _part(
+            relaxation,
+            "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts",
+            n=100,
+            repeats=3,
+            sweeps=100_000,
+        ),
+        _part(scaling, "One relaxation against the number of disks", tiles=(1, 2, 4), patience=2.0),
+        _part(kernel, "Factorisation: part of what the machine can do", tiles=(1, 2)),
+        _part(starts, "Nearest networks: PIQP, one at a time, and in lanes", n=100, repeats=2),
+        _part(pushes, "Critical forces: one contact at a time, and in lanes", n=60, contacts=10),
+        _part(
+            growth,
+            "Set-up, relaxation and exact bound against the number of disks",
+            tiles=(1, 2, 4),
+        ),
+        _part(batches, "Chains of one packing on one and two threads", n=100, states=100),
+        _part(
+            compaction,
+            "Compaction: run time and overlap by time step and sweeps",
+            n=100,
+            steps=(0.05, 0.1),
+            accuracies=(0.1, 0.01),
+            seeds=2,
+        ),
+        _part(
+            compaction_frictions,
+            "Compaction at each μ",
+            n=100,
+            frictions=packings.FRICTIONS[::3],
+            seeds=2,
+        ),
+        _part(
+            compaction_growth,
+            "Compaction against the number of disks",
+            sizes=(50, 100, 200),
+            seeds=2,
+        ),
+        _part(skips, "What skipping is worth", n=100),
+        _part(
+            intervals,
+            "Intervals seen by walks against exact ones",
+            n=100,
+            frictions=(0.1,),
+            states=(30, 100),
+        ),
+        _part(interval_methods, "Exact intervals against other tools", names=REFERENCES[:2]),
+        _part(uniform, "Uniform sampling of S", n=100, frictions=(0.1, 1.0), rounded=0),
+        _part(uniform_growth, "Uniform sampling against the number of disks", n=100, tiles=(1, 2)),
+        _part(inference, "The likeliest network of a measurement", n=100, frictions=(0.1,)),
+        _part(
+            frames,
+            "Photoelastic frames of known forces: distance from the truth in ⟨f_n⟩",
+            n=100,
+            packings=2,
+        ),
+        _part(knowledge, "What is prescribed and known, beside HiGHS and PIQP", n=100, every=1),
+        _part(masonry, "Dry-stone walls beside HiGHS", size=SMALL),
+        _part(walks, "Random walks by solver", n=100, packings=3, states=50),
+    ]
+)
+Parts = Mapping[str, Part]
 
 
 def run(
@@ -99,12 +125,12 @@ def run(
     """
     folder = None if folder is None else make_folder(folder)
     results: dict[str, Any] = {"environment": environment(), "quick": bool(quick), "seconds": {}}
-    for name, (measure, heading) in parts.items():
+    for name, part in parts.items():
         begin = time.perf_counter()
-        results[name] = measure(quick)
+        results[name] = part.measure(**(part.quick if quick else {}))
         results["seconds"][name] = time.perf_counter() - begin
         note(f"{name}: {results['seconds'][name]:.1f} s")
-        show(table(heading, results[name]))
+        show(table(part.heading, results[name]))
         if folder is not None:
             with written(folder / "bench.json") as file:
                 file.write(json_text(results, ascii_only=False).encode())

@@ -1,21 +1,24 @@
 """Benchmark of the exact bounds against a plain loop over linear programs, and other tools."""
 
-import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from granforce.bench.report import table
-from granforce.explore.intervals import intervals
+from granforce.bench.runner import Row, compared, note
+from granforce.explore.intervals import Intervals, intervals
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
-from granforce.system.clock import timed
 from granforce.types import Floats
+
+# Packings with exact intervals, in a clone of the repository.
+FOLDER = Path("tests/reference")
+REFERENCES = ("n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13")
 
 
 def read_reference(path: str | Path) -> tuple[Ensemble, Any]:
@@ -56,80 +59,35 @@ def linprog_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
     return tuple(ensemble.to_forces(np.array(value) * ensemble.force_scale))
 
 
-def cobra_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
-    """All bounds by cobra's flux variability analysis, contacts as reactions on grains."""
-    from cobra import Metabolite, Model, Reaction
-    from cobra.flux_analysis import flux_variability_analysis
-
-    A, T = ensemble.cone_form
-    A, b = A.tocsc(), ensemble.b / ensemble.force_scale
-    model = Model("packing")
-    balances = [Metabolite(f"row{k}") for k in range(A.shape[0])]
-    generators = []
-    for k in range(A.shape[1]):
-        reaction = Reaction(f"y{k}", lower_bound=0.0, upper_bound=1e6)
-        column = A[:, [k]]
-        entries = zip(column.indices, column.data, strict=True)
-        reaction.add_metabolites({balances[row]: float(value) for row, value in entries})
-        generators.append(reaction)
-    model.add_reactions(generators)
-    for k, balance in enumerate(balances):
-        model.constraints[balance.id].ub = float(b[k])
-        model.constraints[balance.id].lb = float(b[k])
-    forces = [Reaction(f"x{k}", lower_bound=-1e6, upper_bound=1e6) for k in range(A.shape[1])]
-    links = [Metabolite(f"link{k}") for k in range(A.shape[1])]
-    for k, (force, row) in enumerate(zip(forces, T.toarray(), strict=True)):
-        force.add_metabolites({links[k]: -1.0})
-        for g in np.flatnonzero(row):
-            generators[g].add_metabolites({links[k]: float(row[g])})
-    model.add_reactions(forces)
-    ranges = flux_variability_analysis(model, forces, fraction_of_optimum=0.0, processes=1)
-    value = np.stack([ranges["minimum"].to_numpy(), ranges["maximum"].to_numpy()])
-    return tuple(ensemble.to_forces(value * ensemble.force_scale))
-
-
-def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict[str, Any]]:
+def interval_methods(names: Sequence[str] = REFERENCES, folder: str | Path = FOLDER) -> list[Row]:
     """Rows: times (s), their ratios to the plain loop's, and errors (⟨f_n⟩), by file and method.
 
-    quick: only the 100-disk files; otherwise 400 disks at μ = 0.1 as well (two minutes).
+    Errors are against the reference bounds; rows of granforce also have the largest duality gap and
+    counts. Two minutes for 400 disks. A single row with a note if the files are missing.
     """
-    names = ["n100_mu0.1_s11", "n100_mu1_s12"] + ([] if quick else ["n400_mu0.1_s13"])
-    compared: list[dict[str, Any]] = []
+    if not any(Path(folder).glob("*.npz")):
+        return [{"packing": None, "note": f"reference packings not found in {folder}"}]
+    rows: list[Row] = []
     for name in names:
-        system, data = read_reference(Path(folder) / f"{name}.npz")
-        intervals(system, system.index[:1])  # compiles
-        rows = {"plain loop": _timed(plain_loop, system, data)}
-        for workers in (1, 2):
-            threads = f"{workers} thread{'s' if workers > 1 else ''}"
-            rows[f"granforce, {threads}"] = _ours(system, data, workers)
+        note(f"intervals against other tools: {name}")
+        S, data = read_reference(Path(folder) / f"{name}.npz")
+        intervals(S, S.index[:1])  # compiles
+        methods: dict[str, Callable[[], Any]] = {
+            "plain loop": partial(plain_loop, S),
+            "granforce, 1 thread": partial(intervals, S, workers=1),
+            "granforce, 2 threads": partial(intervals, S, workers=2),
+        }
         if name.startswith("n100"):
-            rows["scipy linprog"] = _timed(linprog_loop, system, data)
-            if importlib.util.find_spec("cobra"):
-                rows["cobra FVA"] = _timed(cobra_loop, system, data)
-        plain = rows["plain loop"]["seconds"]
-        for method, row in rows.items():
-            timing = {"packing": name, "method": method, "seconds": row["seconds"]}
-            compared.append(timing | {"ratio": plain / row["seconds"]} | row)
-    return compared
+            methods["scipy linprog"] = partial(linprog_loop, S)
+
+        rows += compared({"packing": name}, methods, partial(_errors, S, data), "plain loop")
+    return rows
 
 
-def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
-    seconds, exact = timed(intervals, system, workers=workers)
-    error = _error(system, data, exact.low, exact.high)
-    return {"seconds": seconds, "error": error, "gap": exact.max_gap, "counts": str(exact.counts)}
-
-
-def _timed(method: Callable[..., Any], system: Ensemble, data: Any) -> dict[str, Any]:
-    seconds, (lower, upper) = timed(method, system)
-    return {"seconds": seconds, "error": _error(system, data, lower, upper)}
-
-
-def _error(system: Ensemble, data: Any, lower: Floats, upper: Floats) -> float:
-    off = np.abs(lower - data["lo"][system.index]), np.abs(upper - data["hi"][system.index])
-    return float(np.max(off) / system.force_scale)
-
-
-if __name__ == "__main__":
-    import sys
-
-    print(table("Exact intervals against other tools", run(quick="--full" not in sys.argv)))
+def _errors(S: Ensemble, data: Any, method: str, results: Row) -> Row:
+    found = results[method]
+    ours = isinstance(found, Intervals)
+    low, high = (found.low, found.high) if ours else found
+    off = np.abs(low - data["lo"][S.index]), np.abs(high - data["hi"][S.index])
+    counts = {"gap": found.max_gap, "counts": str(found.counts)} if ours else {}
+    return {"error": float(np.max(off) / S.force_scale)} | counts

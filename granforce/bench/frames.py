@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import note
+from granforce.bench.runner import Row, means, note
 from granforce.experiment.pegs import read_pegs
 from granforce.experiment.regions import REGIONS
 from granforce.experiment.remeasured import remeasured
@@ -28,13 +28,11 @@ _SPOILT, _BY = 5, 3.0
 
 
 def frames(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    packings: int | None = None,
+    n: int = 400,
+    packings: int = 6,
     cases: Sequence[tuple[float, ...]] = CASES,
     mu: float = MU,
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Rows: mean error in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage of error bars.
 
     raw: as measured; likeliest: of `remeasured`, and of all contacts; mean: of its draws; stress:
@@ -44,21 +42,18 @@ def frames(
     suspected: fraction of contacts changed by 3 ⟨f_n⟩ that are reported; told: fraction of the
     reported contacts that were changed.
     """
-    n, packings = n or (100 if quick else 400), packings or (2 if quick else 6)
     rows = []
     for sigma, missed, wrong in cases:
+        note(f"frames: σ = {sigma:g}, missed {missed:g}, μ × {wrong:g}")
         seeds = range(1, packings + 1)
         samples = [_one(pack(n, mu, seed), sigma, missed, wrong, seed) for seed in seeds]
-        note(f"frames: σ = {sigma:g}, missed {missed:g}, μ × {wrong:g}")
-        row: dict[str, Any] = {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong}
-        for name in samples[0]:
-            values = np.array([one[name] for one in samples], dtype=float)
-            row[name] = float(np.nanmean(values)) if np.isfinite(values).any() else None
-        rows.append(row)
+        rows.append(
+            {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong, **means(samples)}
+        )
     return rows
 
 
-def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int) -> dict[str, Any]:
+def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int) -> Row:
     frame = synthetic_frame(packing, noise=sigma, missed=missed, seed=seed)
     options: dict[str, Any] = {
         "mu": wrong * packing.mu,
@@ -109,9 +104,7 @@ def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
     return np.abs(of - exact).mean() / exact.mean()
 
 
-def _spoilt(
-    S: Ensemble, m: Floats, s: Floats, measured: Mask, unit: float, seed: int
-) -> dict[str, Any]:
+def _spoilt(S: Ensemble, m: Floats, s: Floats, measured: Mask, unit: float, seed: int) -> Row:
     """How well changed contacts are detected."""
     rng = np.random.default_rng(seed)
     chosen = rng.choice(np.flatnonzero(measured), _SPOILT, replace=False)

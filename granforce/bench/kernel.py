@@ -1,7 +1,6 @@
 """The solver on S compared with the machine's limits and PIQP, and against the number of disks."""
 
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -10,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note
-from granforce.bench.solvers import FRICTIONS, kicked, tile
+from granforce.bench.runner import Row, growth_of, kicked, packings, peak_megabytes, tilings
+from granforce.bench.solvers import FRICTIONS
 from granforce.explore.intervals import intervals, limit_loads
 from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_problem
@@ -40,30 +39,19 @@ print(2 * 1200**3 / best / 1e9)
 """
 
 
-def kernel(
-    quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
-) -> list[dict[str, Any]]:
+def kernel(n: int = 100, mu: float = 0.1, tiles: Sequence[int] = (1, 2, 4, 8)) -> list[Row]:
     """Rows: Gflop/s of one factorisation, single and in lanes, and the ratio to a dense product."""
     dense = _dense_product()
-    base = ensemble(pack(n, mu, 1))
     rows = []
-    for k in tiles or ((1, 2) if quick else (1, 2, 4, 8)):
-        problem, _ = make_problem(ensemble(tile(base, k), prune=False))
+    for case, S in tilings("kernel", ensemble(pack(n, mu, 1)), tiles):
+        problem, _ = make_problem(S)
         for lanes in (ONE, MANY):
-            seconds = _factorisation(problem, lanes)
+            each = _factorisation(problem, lanes) / len(lanes)
             below = np.diff(problem.network.layout.start) - 1
-            products = np.sum(below * (below + 1) // 2)
-            flops = _PRODUCT * int(products) * len(lanes) / seconds / 1e9
-            rows.append(
-                {
-                    "n": n * k * k,
-                    "lanes": len(lanes),
-                    "ms_per_matrix": 1e3 * seconds / len(lanes),
-                    "gflops": flops,
-                    "dense_gflops": dense,
-                    "part": flops / dense,
-                }
-            )
+            products = int(np.sum(below * (below + 1) // 2))
+            flops = _PRODUCT * products / each / 1e9
+            row = case | {"lanes": len(lanes), "ms_per_matrix": 1e3 * each, "gflops": flops}
+            rows.append(row | {"dense_gflops": dense, "part": flops / dense})
     return rows
 
 
@@ -87,22 +75,13 @@ def _factorisation(problem: Problem, lanes: Any) -> float:
     return best
 
 
-def starts(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    frictions: Sequence[float] = FRICTIONS,
-    repeats: int | None = None,
-) -> list[dict[str, Any]]:
+def starts(n: int = 400, frictions: Sequence[float] = FRICTIONS, repeats: int = 5) -> list[Row]:
     """Rows: milliseconds per nearest network by PIQP, one at a time, and by 16 chains in lanes.
 
     All use the same starts, interleaved, so that a slow phase of the machine affects all of them.
     """
-    n, repeats = n or (100 if quick else 400), repeats or (2 if quick else 5)
     rows = []
-    for mu in frictions:
-        note(f"starts: N = {n}, μ = {mu:g}")
-        S = ensemble(pack(n, mu, 1))
+    for case, S in packings("starts", n, frictions):
         ways: dict[str, Callable[..., Any]] = {
             "PIQP": lambda given, S=S: [nearest_piqp(S, start) for start in given],
             "one at a time": lambda given, S=S: [nearest(S, start) for start in given],
@@ -118,31 +97,22 @@ def starts(
                 networks[name] = np.stack([one.forces for one in reached])
                 spent[name].append(seconds / len(given))
             worst = max(worst, *(np.abs(one - networks["PIQP"]).max() for one in networks.values()))
-        piqp = np.median(spent["PIQP"][1:])
-        for name in ways:
-            each = float(np.median(spent[name][1:]))  # the first run compiles
-            row = {"n": n, "mu": mu, "solver": name, "ms_per_state": 1e3 * each}
-            rows.append(row | {"ratio_to_piqp": piqp / each, "differ": worst / S.force_scale})
+        each = {name: float(np.median(times[1:])) for name, times in spent.items()}  # [0] compiles
+        for name, seconds in each.items():
+            row = case | {"solver": name, "ms_per_state": 1e3 * seconds}
+            ratio = {"ratio_to_piqp": each["PIQP"] / seconds}
+            rows.append(row | ratio | {"differ": worst / S.force_scale})
     return rows
 
 
-def pushes(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    frictions: Sequence[float] = (0.1, 1),
-    contacts: int | None = None,
-) -> list[dict[str, Any]]:
+def pushes(n: int = 400, frictions: Sequence[float] = (0.1, 1), contacts: int = 30) -> list[Row]:
     """Rows: processor seconds of critical forces, one contact at a time and in lanes.
 
     The same loads on the same contacts, with known limit loads; F_crit must agree.
     """
-    n, count = n or (60 if quick else 400), contacts or (10 if quick else 30)
     rows = []
-    for mu in frictions:
-        note(f"pushes: N = {n}, μ = {mu:g}")
-        S = ensemble(pack(n, mu, 1))
-        some = S.index[:: max(1, len(S.index) // count)][:count]
+    for case, S in packings("pushes", n, frictions):
+        some = S.index[:: max(1, len(S.index) // contacts)][:contacts]
         loads = limit_loads(S, some)
         ways: dict[str, Callable[..., Any]] = {
             "one at a time": lambda which, given, S=S: [
@@ -158,35 +128,28 @@ def pushes(
             way(some[:3], loads[:3])  # compiles
             seconds[name], results[name] = timed(way, some, loads, clock=time.process_time)
         alone, in_lanes = ([one.low for one in each] for each in results.values())
-        for name in ways:
+        apart = np.abs(np.subtract(alone, in_lanes)).max() / S.force_scale
+        for name, spent in seconds.items():
             systems = sum(one.counts["linear_systems"] for one in results[name])
-            row = {"n": n, "mu": mu, "way": name, "seconds_per_contact": seconds[name] / len(some)}
-            row |= {"ms_per_system": 1e3 * seconds[name] / systems}
-            row |= {"ratio": seconds["one at a time"] / seconds[name]}
-            apart = np.abs(np.subtract(alone, in_lanes)).max() / S.force_scale
-            rows.append(row | {"differ": float(apart)})
+            row = case | {"way": name, "seconds_per_contact": spent / len(some)}
+            row |= {"ms_per_system": 1e3 * spent / systems}
+            row |= {"ratio": seconds["one at a time"] / spent, "differ": float(apart)}
+            rows.append(row)
     return rows
 
 
-def growth(
-    quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
-) -> list[dict[str, Any]]:
+def growth(n: int = 100, mu: float = 0.1, tiles: Sequence[int] = (1, 2, 4, 8, 16)) -> list[Row]:
     """Rows: seconds of set-up, one relaxation and one exact bound against N, and exponents."""
     base = ensemble(pack(n, mu, 1))
     intervals(base, base.index[:1])  # compiles
     rows = []
-    for k in tiles or ((1, 2, 4) if quick else (1, 2, 4, 8, 16)):
-        note(f"growth: N = {n * k * k}")
-        S = ensemble(tile(base, k), prune=False)
-        row = {"n": n * k * k, "setup": timed(make_problem, S)[0]}
+    for case, S in tilings("growth", base, tiles):
+        row = case | {"setup": timed(make_problem, S)[0]}
         start = kicked(S, 1, 0)[0]
         nearest(S, start, max_iterations=1)
         row["relaxation"] = nearest(S, start).seconds
         seconds, exact = timed(intervals, S, S.index[:LANES])
-        row["bound"] = seconds / exact.counts["programs"]
-        row["max_gap"] = exact.max_gap
-        row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        rows.append(row)
-    names = ("setup", "relaxation", "bound")
-    fits = {name: exponent([(row["n"], row[name]) for row in rows]) for name in names}
+        row |= {"bound": seconds / exact.counts["programs"], "max_gap": exact.max_gap}
+        rows.append(row | {"peak_MB": peak_megabytes()})
+    fits = {name: growth_of(rows, name) for name in ("setup", "relaxation", "bound")}
     return [*rows, {"n": "exponent", **fits}]

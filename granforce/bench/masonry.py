@@ -1,5 +1,6 @@
 """Benchmark of dry-stone walls: bounds and load factors against HiGHS, and uniform states."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from granforce.bench.exact import plain_loop
+from granforce.bench.runner import Row, compared
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.build import ensemble, with_idle
@@ -20,14 +22,14 @@ CONTACTS, STATES = 16, 100
 SMALL, LARGE = {"courses": 10, "blocks": 5}, {"courses": 26, "blocks": 38}
 
 
-def masonry(quick: bool = True) -> list[dict[str, Any]]:
+def masonry(size: Mapping[str, int] = LARGE) -> list[Row]:
     """Rows: seconds of each method, their ratio to the baseline, and the difference of the results.
 
     Bounds of 16 contacts against one HiGHS model that starts each program from the last basis
     (differences in ⟨f_n⟩), the horizontal load factor against `linprog` (difference relative to
-    it), and 100 uniform states. quick: 55 bodies instead of 1014.
+    it), and 100 uniform states. size: options of the scene of a wall.
     """
-    wall = ensemble(scene("wall", **(SMALL if quick else LARGE)))
+    wall = ensemble(scene("wall", **size))
     small = ensemble(scene("wall", **SMALL))
     _bounds(small)
     _factors(small)  # these two compile
@@ -38,21 +40,34 @@ def masonry(quick: bool = True) -> list[dict[str, Any]]:
     return [sizes | row for row in (*_bounds(wall), *_factors(wall), states)]
 
 
-def _bounds(wall: Ensemble) -> list[dict[str, Any]]:
+def _bounds(wall: Ensemble) -> list[Row]:
     spaced = np.linspace(0, len(wall.index) - 1, CONTACTS).astype(int)
     contacts = wall.index[spaced]
-    ours, exact = timed(intervals, wall, contacts, workers=1)
-    plain, (low, high) = timed(plain_loop, wall, contacts)
-    apart = max(np.abs(low - exact.low).max(), np.abs(high - exact.high).max())
-    times = {"granforce, certified": ours, "HiGHS": plain}
-    return _compared(f"bounds of {CONTACTS} contacts", times, apart / wall.force_scale)
+    methods = {
+        "granforce, certified": lambda: intervals(wall, contacts, workers=1),
+        "HiGHS": lambda: plain_loop(wall, contacts),
+    }
+
+    def measure(name: str, results: Row) -> Row:
+        exact, (low, high) = results.values()
+        apart = max(np.abs(low - exact.low).max(), np.abs(high - exact.high).max())
+        return {"difference": float(apart / wall.force_scale)}
+
+    return compared({"what": f"bounds of {CONTACTS} contacts"}, methods, measure, "HiGHS")
 
 
-def _factors(wall: Ensemble) -> list[dict[str, Any]]:
-    ours, found = timed(load_factor, wall)
-    plain, factor = timed(_by_linprog, with_idle(wall), found.load)
-    times = {"granforce, certified": ours, "scipy linprog": plain}
-    return _compared("load factor", times, abs(factor - found.factor) / factor)
+def _factors(wall: Ensemble) -> list[Row]:
+    idle, load = with_idle(wall), load_factor(wall).load
+    methods = {
+        "granforce, certified": lambda: load_factor(wall).factor,
+        "scipy linprog": lambda: _by_linprog(idle, load),
+    }
+
+    def measure(name: str, results: Row) -> Row:
+        ours, factor = results.values()
+        return {"difference": float(abs(factor - ours) / factor)}
+
+    return compared({"what": "load factor"}, methods, measure, "scipy linprog")
 
 
 def _by_linprog(wall: Ensemble, load: Any) -> float:
@@ -62,13 +77,3 @@ def _by_linprog(wall: Ensemble, load: Any) -> float:
     columns = sparse.hstack([A, sparse.csr_matrix(action)]).tocsr()
     cost = np.append(np.zeros(A.shape[1]), -1.0)
     return -linprog(cost, A_eq=columns, b_eq=wall.b / unit, method="highs").fun
-
-
-def _compared(what: str, times: dict[str, float], apart: float) -> list[dict[str, Any]]:
-    """Rows of methods with their seconds, the baseline last."""
-    baseline = list(times.values())[-1]
-    return [
-        {"what": what, "method": method, "seconds": seconds, "ratio": baseline / seconds}
-        | {"difference": float(apart)}
-        for method, seconds in times.items()
-    ]

@@ -1,24 +1,15 @@
-"""Output of the benchmark: progress on stderr, aligned tables on stdout."""
+"""The environment of a benchmark, and its rows as tables on stdout."""
 
 import os
 import platform
-import sys
-from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from granforce import __version__
 from granforce.types import Rows
 
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
-
-
-def note(message: str) -> None:
-    """One line of progress on stderr."""
-    print(message, file=sys.stderr, flush=True)
 
 
 def environment() -> dict[str, Any]:
@@ -48,14 +39,6 @@ def _version(name: str) -> str | None:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
-
-
-def exponent(points: Sequence[tuple[float, float]]) -> float | None:
-    """Slope of log y over log x of points (x, y), or None for fewer than two."""
-    if len(points) < 2:
-        return None
-    x, y = np.log(points).T
-    return float(np.polyfit(x, y, 1)[0])
 
 
 def table(title: str, rows: Rows) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from granforce.bench.report import note
+from granforce.bench.runner import note
 from granforce.forces.ensemble import Ensemble
 from granforce.motion.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.motion.gauss_seidel import from_rest

@@ -2,10 +2,8 @@
 
 import tempfile
 from collections.abc import Callable
-from typing import Any
 
-from granforce.bench.report import note
-from granforce.bench.solvers import kicked
+from granforce.bench.runner import Row, kicked, packings
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
@@ -20,24 +18,21 @@ from granforce.study.store import open_store
 from granforce.system.clock import timed
 
 
-def skips(quick: bool = True, *, n: int | None = None, mu: float = 0.1) -> list[dict[str, Any]]:
+def skips(n: int = 400, mu: float = 0.1) -> list[Row]:
     """Rows: what is skipped, how often, seconds with and without the shortcut, and their ratio."""
-    n = n or (100 if quick else 400)
-    note(f"skips: N = {n}, μ = {mu:g}")
-    packing = pack(n, mu, 1)
-    S = ensemble(packing)
+    ((case, S),) = packings("skips", n, [mu])
     rows = [
-        _rattlers(packing, S),
+        _rattlers(S),
         _tangential(pack(n, 0.0, 1)),
         _finish(S),
         _neighbour_lists(n, mu),
         _programs(S),
         _cells(n, mu),
     ]
-    return [{"n": n, "mu": mu, **row} for row in rows]
+    return [case | row for row in rows]
 
 
-def _row(what: str, count: int, seconds: float, without: float) -> dict[str, Any]:
+def _row(what: str, count: int, seconds: float, without: float) -> Row:
     ratio = without / seconds
     return {"skipped": what, "count": count, "seconds": seconds, "without": without, "ratio": ratio}
 
@@ -48,9 +43,9 @@ def _seconds(action: Callable[[], object], repeats: int = 5) -> float:
     return min(timed(action)[0] for _ in range(repeats))
 
 
-def _rattlers(packing: Packing, S: Ensemble) -> dict[str, Any]:
+def _rattlers(S: Ensemble) -> Row:
     """A relaxation of all contacts of all grains, as in an unpruned import."""
-    whole = ensemble(packing, prune=False)
+    whole = ensemble(S.packing, prune=False)
     start = kicked(whole, 1, 0)[0]
     few = _seconds(lambda: nearest(S, start[S.index]))
     every = _seconds(lambda: nearest(whole, start))
@@ -58,7 +53,7 @@ def _rattlers(packing: Packing, S: Ensemble) -> dict[str, Any]:
     return _row("rattlers and unloaded contacts, one relaxation", count, few, every)
 
 
-def _tangential(packing: Packing) -> dict[str, Any]:
+def _tangential(packing: Packing) -> Row:
     """The balance of a frictionless packing with the unknowns f_t kept (at μ = 1e-6) or not."""
     without = ensemble(packing, mu=1e-6)
     S = ensemble(packing)
@@ -68,7 +63,7 @@ def _tangential(packing: Packing) -> dict[str, Any]:
     return _row(what, S.skipped["tangential_unknowns"], few, every)
 
 
-def _finish(S: Ensemble) -> dict[str, Any]:
+def _finish(S: Ensemble) -> Row:
     """Sweeps saved by the exact finish of Gauss–Seidel, at the same tolerance 1e-6."""
     start = kicked(S, 1, 0)[0]
     short = gauss_seidel(S, start, tolerance=1e-6)
@@ -79,7 +74,7 @@ def _finish(S: Ensemble) -> dict[str, Any]:
     return _row(what, long.iterations - short.iterations, few, every)
 
 
-def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
+def _neighbour_lists(n: int, mu: float) -> Row:
     """Compaction with its neighbour list, and with a list rebuilt in every step."""
     pack(n, mu, 1)  # compile and load kernels
     seconds, rebuilds, usual = [], [], pair_list.MOVED
@@ -94,7 +89,7 @@ def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
     return _row("new neighbour lists, one compaction", rebuilds[1] - rebuilds[0], *seconds)
 
 
-def _programs(S: Ensemble) -> dict[str, Any]:
+def _programs(S: Ensemble) -> Row:
     exact = intervals(S)
     few = _seconds(lambda: intervals(S), 1)
     every = _seconds(lambda: intervals(S, skip=False), 1)
@@ -102,7 +97,7 @@ def _programs(S: Ensemble) -> dict[str, Any]:
     return _row("linear programs for a minimum f_n already known to be 0", count, few, every)
 
 
-def _cells(n: int, mu: float) -> dict[str, Any]:
+def _cells(n: int, mu: float) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(folder)
         of = kinds.PACKING.parameters

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note
+from granforce.bench.runner import Row, growth_of, kicked, packings, tilings
 from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
@@ -14,7 +14,7 @@ from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.motion.gauss_seidel import SideBySide, gauss_seidel
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
-from granforce.records import Packing, Relaxation, make_contacts, make_packing
+from granforce.records import Relaxation
 from granforce.system.clock import timed
 from granforce.types import Floats, Rows
 
@@ -39,44 +39,21 @@ def solvers(sweeps: int = LONGEST) -> dict[str, tuple[Callable[..., Relaxation],
 
 
 def relaxation(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    frictions: Sequence[float] = FRICTIONS,
-    repeats: int | None = None,
-    sweeps: int | None = None,
-) -> list[dict[str, Any]]:
-    """Rows (dicts) per μ and solver: median time of one relaxation, residual, ratio to BASELINE.
+    n: int = 400, frictions: Sequence[float] = FRICTIONS, repeats: int = 9, sweeps: int = LONGEST
+) -> list[Row]:
+    """Rows per μ and solver: median time of one relaxation, residual, ratio to BASELINE.
 
     All solvers get the same starts, the packing's own network kicked as in the random walk. If the
     baseline did not reach GOAL within its sweeps the ratio is a lower bound, which is marked.
     """
-    n = n or (100 if quick else 400)
-    repeats = repeats or (3 if quick else 9)
-    sweeps = sweeps or (LONGEST // 3 if quick else LONGEST)
     rows = []
-    for mu in frictions:
-        note(f"relaxation: N = {n}, μ = {mu:g}")
-        S = ensemble(pack(n, mu, 1))
+    for case, S in packings("relaxation", n, frictions):
         starts = kicked(S, repeats, 0)
         runs = {name: runs_of(S, starts, *solver) for name, solver in solvers(sweeps).items()}
-        baseline = runs[BASELINE]
         for name, run in runs.items():
-            rows.append(
-                {"n": n, "mu": mu, "contacts": len(S.index), "solver": name, **summary(run)}
-                | _ratio(baseline, run)
-            )
+            row = case | {"contacts": len(S.index), "solver": name} | summary(run)
+            rows.append(row | _ratio(runs[BASELINE], run))
     return rows
-
-
-def kicked(S: Ensemble, count: int, seed: int) -> list[Floats]:
-    """Starts of the random walk from the original network, a list of (N_c, 2)."""
-    rng = np.random.default_rng(seed)
-    amplitude = np.mean(S.original[:, 0])
-    kicks = rng.uniform(-amplitude, amplitude, (count, *S.original.shape))
-    if S.mu == 0:
-        kicks[..., 1] = 0.0
-    return list(S.original + kicks)
 
 
 def runs_of(
@@ -100,7 +77,7 @@ def _undisturbed(
     return min(runs, key=lambda run: run.seconds)
 
 
-def summary(run: list[Relaxation]) -> dict[str, Any]:
+def summary(run: list[Relaxation]) -> Row:
     """Times, and how many runs reached the GOAL, as a row."""
     reached = [r.residual <= GOAL for r in run]
     return {
@@ -128,25 +105,21 @@ def _verdict(run: list[Relaxation], reached: list[bool]) -> str:
     return "; ".join(parts)
 
 
-def _ratio(baseline: list[Relaxation], run: list[Relaxation]) -> dict[str, Any]:
+def _ratio(baseline: list[Relaxation], run: list[Relaxation]) -> Row:
     ratio = np.median([r.seconds for r in baseline]) / np.median([r.seconds for r in run])
     bound = any(r.residual > GOAL for r in baseline) and all(r.residual <= GOAL for r in run)
     return {"ratio": float(ratio), "ratio_is_lower_bound": bool(bound)}
 
 
-def contact_updates(
-    quick: bool = True, *, n: int | None = None, mu: float = 0.1, sweeps: int = 2000
-) -> list[dict[str, Any]]:
+def contact_updates(n: int = 400, mu: float = 0.1, sweeps: int = 2000) -> list[Row]:
     """Rows: nanoseconds per contact update of granforce's sweep, alone and against Siconos.
 
     Both start from the same forces in a box of fixed size and do the same number of sweeps.
     """
-    n = n or (100 if quick else 400)
-    S = ensemble(pack(n, mu, 1))
+    ((row, S),) = packings("contact updates", n, [mu])
     options: dict[str, Any] = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
     runs = runs_of(S, kicked(S, 5, 0), gauss_seidel, options)
     each = float(np.median([1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]))
-    row = {"n": n, "mu": mu}
     remark = f"{runs[0].iterations} sweeps, box free to dilate"
     alone = {**row, "solver": "granforce sweep", "ns_per_update": each, "note": remark}
     searches = SideBySide(S, LANES, **options)
@@ -172,66 +145,24 @@ def contact_updates(
     return rows
 
 
-def tile(S: Ensemble, k: int) -> Packing:
-    """The packing of an ensemble repeated k × k times: N k² disks, exactly as balanced.
-
-    Only the ensemble's contacts are kept; build the new ensemble with ``prune=False``.
-    """
-    packing, contacts = S.packing, S.contacts
-    i, j, count = contacts.i, contacts.j, len(packing.r)
-    # Number of cells between i and the touching image of j.
-    reach = packing.x[i] + contacts.length[:, None] * contacts.normal - packing.x[j]
-    image = np.rint(packing.cell.parts(reach)).astype(np.int64)
-    column, row = (part.ravel() for part in np.meshgrid(np.arange(k), np.arange(k)))
-    x = packing.x[None] + (np.column_stack([column, row]) @ packing.cell.vectors)[:, None]
-    to = (column[:, None] + image[:, 0]) % k + k * ((row[:, None] + image[:, 1]) % k)
-    tiles = k * k
-    r = np.tile(packing.r, tiles)
-    repeated = make_contacts(
-        (np.arange(tiles)[:, None] * count + i).ravel(),
-        (to * count + j).ravel(),
-        np.tile(contacts.normal, (tiles, 1)),
-        np.tile(contacts.length, tiles),
-        r,
-    )
-    arms = {name: np.tile(getattr(contacts, name), tiles) for name in ("gap", "arm_i", "arm_j")}
-    return make_packing(
-        x.reshape(-1, 2),
-        r,
-        k * packing.box,
-        repeated._replace(**arms),
-        np.tile(S.original, (tiles, 1)),
-        packing.mu,
-        packing.pressure,
-        tilt=k * packing.tilt,
-    )
-
-
 def scaling(
-    quick: bool = True,
-    *,
     n: int = 100,
     mu: float = 0.1,
-    tiles: Sequence[int] | None = None,
+    tiles: Sequence[int] = (1, 2, 4, 8, 16),
     repeats: int = 3,
-    patience: float | None = None,
-) -> list[dict[str, Any]]:
+    patience: float = 60.0,
+) -> list[Row]:
     """Rows: time per relaxation against N by tiling, and the exponent of time with N per solver.
 
     A solver is left out at sizes above the one where it first needed `patience` seconds. The
     exponent is the slope of log time over log N, over the sizes at which GOAL was reached.
     """
-    tiles = tiles or ((1, 2, 4) if quick else (1, 2, 4, 8, 16))
-    patience = patience or (2.0 if quick else 60.0)
-    base = ensemble(pack(n, mu, 1))
     rows, tired = [], set()
-    for k in tiles:
-        S = ensemble(tile(base, k), prune=False)
+    for case, S in tilings("scaling", ensemble(pack(n, mu, 1)), tiles):
         starts = kicked(S, repeats if repeats == 1 else 5 * repeats, 0)
         for name, (solver, options) in solvers().items():
             if name in tired:
                 continue
-            note(f"scaling: N = {n * k * k}, {name}")
             setup, _ = timed(solver, S, starts[0], **{**options, "max_iterations": 1})
             run = [solver(S, starts[0], **options)]
             if run[0].seconds > patience:
@@ -240,21 +171,17 @@ def scaling(
                 # Short runs are repeated more often: a few milliseconds are easily disturbed.
                 enough = 1 + int(min(len(starts) - 1, max(repeats - 1, 0.5 / run[0].seconds)))
                 run += [solver(S, start, **options) for start in starts[1:enough]]
-            row = {"n": n * k * k, "mu": mu, "contacts": len(S.index), "solver": name}
+            row = case | {"mu": mu, "contacts": len(S.index), "solver": name}
             rows.append(row | summary(run) | {"first_call": setup})
     return rows + exponents(rows, mu)
 
 
-def exponents(rows: Rows, mu: float) -> list[dict[str, Any]]:
+def exponents(rows: Rows, mu: float) -> list[Row]:
     """A row for each solver: b of seconds ~ N^b over the sizes at which it reached GOAL."""
     fits = []
     for name in solvers():
-        points = [
-            (row["n"], row["seconds"])
-            for row in rows
-            if row["solver"] == name and row["reached"] == row["runs"]
-        ]
-        slope = exponent(points)
-        sizes = f"N = {points[0][0]} … {points[-1][0]}" if points else "goal never reached"
+        reached = [r for r in rows if r["solver"] == name and r["reached"] == r["runs"]]
+        sizes = f"N = {reached[0]['n']} … {reached[-1]['n']}" if reached else "goal never reached"
+        slope = growth_of(reached, "seconds")
         fits.append({"n": "fit", "mu": mu, "solver": name, "exponent": slope, "note": sizes})
     return fits

@@ -5,13 +5,13 @@ import multiprocessing
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from granforce import measures
-from granforce.bench.report import note
+from granforce.bench.runner import Row, means, note
+from granforce.bench.runner import packings as cases_of
 from granforce.explore.intervals import intervals as exact_intervals
 from granforce.explore.random_walk import walk
 from granforce.forces.build import ensemble
@@ -41,19 +41,15 @@ FRICTIONS = (0.01, 0.1, 1.0)
 # Attempts per state after which a walk has failed: Gauss–Seidel alone, which seldom ends in
 # equilibrium at large μ, would take hours.
 ATTEMPTS = 4
-# Packings with exact intervals for `granforce.bench.exact`, in a clone of the repository.
-REFERENCES = Path("tests/reference")
 
 
 def walks(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    packings: int | None = None,
-    states: int | None = None,
+    n: int = 400,
+    packings: int = 10,
+    states: int = 60,
     frictions: Sequence[float] = FRICTIONS,
     ways: Ways = WALKS,
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Rows: η1, η2, η3 and distance from the centre, mean ± standard error over packings.
 
     Every solver walks on the same packings with the same seeds. The distance is ⟨|F − C|⟩/|C|, C
@@ -62,24 +58,21 @@ def walks(
     such a row is a mean over fewer packings and cannot be compared with the others. ways: {name of
     a solver: options of `walk`}.
     """
-    n = n or (100 if quick else 400)
-    packings = packings or (3 if quick else 10)
-    states = states or (50 if quick else 60)
     rows = []
     for mu in frictions:
-        results: dict[Any, list[Any]] = {name: [] for name in ways}
+        results: dict[str, list[Row]] = {name: [] for name in ways}
         for seed in range(1, packings + 1):
             note(f"walks: N = {n}, μ = {mu:g}, packing {seed} of {packings}")
             S = ensemble(pack(n, mu, seed))
             for name, values in _walked(S, states, seed, ways).items():
                 results[name].append(values)
-        for name, values in results.items():
+        for name, samples in results.items():
             row = {"n": n, "mu": mu, "solver": name, "packings": packings, "states": states}
-            rows.append(row | _over_packings(values))
+            rows.append(row | _over_packings(samples))
     return rows
 
 
-def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, dict[str, float]]:
+def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, Row]:
     """Measures by solver on one packing; an empty dict for a walk that failed."""
     done, seconds = {}, {}
     for name, options in ways.items():
@@ -107,46 +100,35 @@ def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, dict[s
     return results
 
 
-def _over_packings(values: Sequence[dict[str, float]]) -> dict[str, Any]:
-    complete = [one for one in values if one]
-    row: dict[str, Any] = {"failed": len(values) - len(complete)}
-    for key in complete[0] if complete else ():
-        numbers = np.array([one[key] for one in complete])
-        row[key] = float(numbers.mean())
-        if key.startswith(("eta", "distance")) and len(numbers) > 1:
-            row[f"{key}_error"] = float(numbers.std(ddof=1) / np.sqrt(len(numbers)))
+def _over_packings(samples: Sequence[Row]) -> Row:
+    complete = [one for one in samples if one]
+    row: Row = {"failed": len(samples) - len(complete)}
+    for key, mean in means(samples).items():
+        row[key] = mean
+        if key.startswith(("eta", "distance")) and len(complete) > 1:
+            numbers = [one[key] for one in complete]
+            row[f"{key}_error"] = float(np.std(numbers, ddof=1) / np.sqrt(len(numbers)))
     return row
 
 
-def batches(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    states: int | None = None,
-    frictions: Sequence[float] = FRICTIONS,
-) -> list[dict[str, Any]]:
+def batches(n: int = 400, states: int = 400, frictions: Sequence[float] = FRICTIONS) -> list[Row]:
     """Rows: states per second of two chains on one thread and on two, with the default relaxation.
 
     Chains share everything that depends only on the geometry (matrices, the plan of the
     factorisation); `setup` is the time it takes once. Medians of three interleaved runs. `ceiling`
     is the ratio reached by two processes that share only the machine.
     """
-    n = n or (100 if quick else 400)
-    states = states or (100 if quick else 400)
     rows = []
-    for mu in frictions:
-        note(f"batches: N = {n}, μ = {mu:g}")
-        S = ensemble(pack(n, mu, 1))
+    for case, S in cases_of("batches", n, frictions):
         walk(ensemble(S.packing), 1, 0)  # compiles
         setup, _ = timed(walk, S, 1, 0)
-        seconds: dict[Any, list[Any]] = {1: [], 2: []}
+        seconds: dict[int, list[float]] = {1: [], 2: []}
         for _ in range(3):
             for workers, times in seconds.items():
                 times.append(timed(walk, S, states, 0, chains=2, workers=workers)[0])
         one, two = (states / np.median(times) for times in seconds.values())
-        row = {"n": n, "mu": mu, "states": states, "setup": setup, "per_second": one}
-        ceiling = _ceiling(S, states)
-        rows.append({**row, "per_second_2": two, "ratio": two / one, "ceiling": ceiling})
+        row = case | {"states": states, "setup": setup, "per_second": one, "per_second_2": two}
+        rows.append(row | {"ratio": two / one, "ceiling": _ceiling(S, states)})
     return rows
 
 
@@ -165,35 +147,27 @@ def _speed(packing: Packing, states: int) -> float:
 
 
 def intervals(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    frictions: Sequence[float] | None = None,
-    states: Sequence[int] | None = None,
-) -> list[dict[str, Any]]:
+    n: int = 400,
+    frictions: Sequence[float] = (0.1, 1.0),
+    states: Sequence[int] = (100, 300, 1000),
+) -> list[Row]:
     """Rows: η3 and mean ΔF_n seen by walks of growing length, against the exact intervals.
 
     Exact bounds come with their run time, so that the costs can be compared.
     """
-    n = n or (100 if quick else 400)
-    frictions = frictions or ((0.1,) if quick else (0.1, 1.0))
-    states = states or ((30, 100) if quick else (100, 300, 1000))
     rows = []
-    for mu in frictions:
-        S = ensemble(pack(n, mu, 1))
-        note(f"intervals: N = {n}, μ = {mu:g}, exact")
+    for case, S in cases_of("intervals", n, frictions):
         exact_intervals(S, S.index[:1])  # compiles
         seconds, exact = timed(exact_intervals, S, workers=2)
-        row = {"n": n, "mu": mu}
         eta3, extent = _extents(S, exact.low, exact.high)
-        measured = {"eta3": eta3, "mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}
-        rows.append({**row, "method": "exact", "states": 0, "seconds": seconds, **measured})
+        rows.append(
+            {**case, "method": "exact", "states": 0, "seconds": seconds, "eta3": eta3}
+            | {"mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}
+        )
         for name in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
-            note(f"intervals: N = {n}, μ = {mu:g}, {name}")
-            rows += [
-                {**row, "method": name, **numbers}
-                for numbers in _growing(S, name, states, eta3, extent)
-            ]
+            note(f"intervals: {name}")
+            growing = _growing(S, name, states, eta3, extent)
+            rows += [{**case, "method": name, **numbers} for numbers in growing]
     return rows
 
 
@@ -226,18 +200,3 @@ def _growing(
             "eta3_part": seen_eta3 / eta3 if eta3 else None,
             "extent_part": seen_extent / extent if extent else None,
         }
-
-
-def interval_methods(quick: bool = True, *, folder: Path = REFERENCES) -> list[dict[str, Any]]:
-    """Exact intervals against other tools, by `granforce.bench.exact` (needs its packings).
-
-    Rows with time, ratio to a plain loop over programs, and error against the reference bounds in
-    ⟨f_n⟩; those of granforce also with the largest duality gap and counts. A single row with a note
-    if the reference files are missing.
-    """
-    if not any(Path(folder).glob("*.npz")):
-        return [{"packing": None, "note": f"reference packings not found in {folder}"}]
-    from granforce.bench import exact
-
-    note("intervals against other tools")
-    return exact.run(quick, folder)

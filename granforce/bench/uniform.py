@@ -3,7 +3,6 @@
 hopsy (pip install hopsy) is optional: it depends on GLPK, and is used only here.
 """
 
-import resource
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,8 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from granforce.bench.report import exponent, note
-from granforce.bench.solvers import tile
+from granforce.bench.runner import (
+    Row,
+    growth_of,
+    note,
+    packings,
+    peak_megabytes,
+    tile,
+    tilings,
+)
 from granforce.explore.billiard import make_rows, room_for_rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.uniform import (
@@ -48,13 +54,11 @@ ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e
 
 
 def uniform(
-    quick: bool = True,
-    *,
-    n: int | None = None,
-    frictions: Sequence[float] | None = None,
+    n: int = 400,
+    frictions: Sequence[float] = (0.5, 0.3, 0.1, 0.01),
     seed: int = 1,
-    rounded: int | None = None,
-) -> list[dict[str, Any]]:
+    rounded: int = MOST_ROUNDED,
+) -> list[Row]:
     """Rows: seconds of processor time per effective state (bulk, minimum over components).
 
     Four chains in one thread, including warm-up, without set-up (centre, factor, rows of K). ratio:
@@ -64,18 +68,14 @@ def uniform(
     with pivoting), which the billiard avoids, over the whole set-up. two_cores: wall time of one
     thread over that of two.
     """
-    n = n or (100 if quick else 400)
-    frictions = frictions or ((0.1, 1.0) if quick else (0.5, 0.3, 0.1, 0.01))
-    rounded = rounded if rounded is not None else (0 if quick else MOST_ROUNDED)
     rows = []
-    for mu in frictions:
-        S = ensemble(pack(n, mu, seed))
+    for case, S in packings("uniform", n, frictions, seed):
         walls(S)  # compile
         setup, (polytope, stored_rows) = timed(_set_up, S, clock=time.process_time)
         runs = [_ours(S, polytope, stored_rows, method, seed) for method in METHODS]
         runs += _hopsy(S, polytope, stored_rows, rounded)
-        for run in runs:
-            rows.append(_row({"n": n, "mu": mu, "h": polytope.dimension}, S, runs[0], run, setup))
+        case = case | {"h": polytope.dimension}
+        rows += [_row(case, S, runs[0], run, setup) for run in runs]
         rows[-len(runs)]["two_cores"] = _two_cores(polytope, stored_rows, seed)
         rows[-len(runs)]["null_space_ratio"] = _null_space(S, polytope) / setup
     return rows
@@ -90,14 +90,12 @@ class _Run(NamedTuple):
     note: str = ""
 
 
-def _row(
-    start: dict[str, Any], S: Ensemble, first: _Run, run: _Run, setup: float
-) -> dict[str, Any]:
+def _row(case: Row, S: Ensemble, first: _Run, run: _Run, setup: float) -> Row:
     if run.mixing is None or first.mixing is None:
-        return start | {"method": run.method, "note": run.note}
+        return case | {"method": run.method, "note": run.note}
     cost = run.seconds / run.mixing.least_bulk
     least = first.seconds / first.mixing.least_bulk
-    row = start | {"method": run.method, "seconds_per_state": cost, "ratio": cost / least}
+    row = case | {"method": run.method, "seconds_per_state": cost, "ratio": cost / least}
     row |= {"effective": run.mixing.least_bulk, "r_hat": run.mixing.worst_r_hat}
     row |= {"seconds": run.seconds, "setup_seconds": setup + run.setup}
     if run is not first:
@@ -120,14 +118,12 @@ def _ours(S: Ensemble, polytope: Any, rows: Any, method: str, seed: int) -> _Run
 
 
 def uniform_growth(
-    quick: bool = True,
-    *,
-    n: int | None = None,
+    n: int = 400,
     mu: float = 0.1,
-    tiles: Sequence[int] | None = None,
+    tiles: Sequence[int] = (1, 2, 4),
     effective: int = 100,
     seed: int = 1,
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Rows: cost of an effective state against the number of disks, with one packing repeated.
 
     reached: whether `effective` states (bulk and tail, of every component) were drawn, in `seconds`
@@ -136,33 +132,31 @@ def uniform_growth(
     of K are stored, which does not change the states. setup_seconds: centre, factor and, if there
     is room, rows of K; null_space_ratio: a dense null space of the balance over that.
     """
-    n, tiles = n or (100 if quick else 400), tiles or ((1, 2) if quick else (1, 2, 4))
     base = ensemble(pack(n, mu, seed))
     sample_uniform(ensemble(tile(base, 1), prune=False), 8)  # compiles
     rows = []
-    for k in tiles:
-        note(f"uniform: N = {n * k * k}")
-        S = ensemble(tile(base, k), prune=False)
+    for case, S in tilings("uniform", base, tiles):
         setup, (polytope, _) = timed(_set_up, S, clock=time.process_time)
         settings: dict[str, Any] = {"seed": seed, "effective": effective}
         seconds, sample = timed(sample_uniform, S, effective, clock=time.process_time, **settings)
-        row: dict[str, Any] = {
-            "n": n * k * k,
+        row: Row = {
             "h": polytope.dimension,
             "walls": polytope.count,
             "states": len(sample.flat),
+            "effective": sample.effective,
+            "reached": sample.reached,
+            "seconds": seconds,
+            "peak_MB": peak_megabytes(),
+            "setup_seconds": setup,
         }
-        row |= {"effective": sample.effective, "reached": sample.reached}
-        row |= {"seconds": seconds, "peak_MB": _peak(), "setup_seconds": setup}
         if polytope.count <= MOST_DENSE_WALLS:
             row["null_space_ratio"] = _null_space(S, polytope) / setup
         worth = sample.effective / len(sample.flat)
         for place, part in ROOMS.items():
-            each = _going_on(sample, part) / worth
-            cost = {"n": n * k * k, "rows": place, "seconds_per_state": each}
+            cost = case | {"rows": place, "seconds_per_state": _going_on(sample, part) / worth}
             rows.append(cost | row if part == 1.0 else cost)
     fits = {
-        place: exponent([(r["n"], r["seconds_per_state"]) for r in rows if r["rows"] == place])
+        place: growth_of([r for r in rows if r["rows"] == place], "seconds_per_state")
         for place in ROOMS
     }
     return rows + [{"n": "fit", "rows": place, "exponent": fit} for place, fit in fits.items()]
@@ -182,10 +176,6 @@ def _all_rows(polytope: Any, part: float) -> Any:
                 polytope.rows, rows.cache, range(first, min(first + LANES, len(polytope.moving)))
             )
     return rows
-
-
-def _peak() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
 def _going_on(sample: Any, part: float) -> Any:

@@ -7,7 +7,7 @@ import pytest
 from packings import packed
 
 from granforce import bench
-from granforce.bench import report, siconos, solvers, states
+from granforce.bench import report, runner, siconos, solvers, states
 from granforce.forces.build import ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
@@ -21,7 +21,7 @@ def named(rows, key, value):
 
 
 def test_relaxation_compares_all_solvers_on_the_same_starts():
-    rows = bench.relaxation(True, repeats=2, **SMALL)
+    rows = bench.relaxation(repeats=2, **SMALL)
     assert [row["solver"] for row in rows] == list(solvers.solvers())
     for row in rows:
         assert row["runs"] == 2
@@ -32,7 +32,7 @@ def test_relaxation_compares_all_solvers_on_the_same_starts():
 
 
 def test_a_baseline_cut_short_says_so_and_bounds_the_ratio():
-    rows = bench.relaxation(True, repeats=2, sweeps=50, **SMALL)
+    rows = bench.relaxation(repeats=2, sweeps=50, **SMALL)
     base = named(rows, "solver", solvers.BASELINE)
     assert base["reached"] == 0 and base["no_equilibrium"] == 0
     assert base["note"].startswith("2 not converged after ")
@@ -52,7 +52,7 @@ def test_ending_in_motion_is_not_called_converged():
 
 
 def test_contact_updates_tell_whether_siconos_is_there():
-    rows = bench.contact_updates(True, n=30, mu=0.3, sweeps=40)
+    rows = bench.contact_updates(n=30, mu=0.3, sweeps=40)
     assert rows[0]["solver"] == "granforce sweep" and rows[0]["ns_per_update"] > 0
     assert rows[-1]["solver"] == "Siconos NSGS"
     assert ("absent" in rows[-1]["note"]) == (siconos.interpreter() is None)
@@ -61,13 +61,13 @@ def test_contact_updates_tell_whether_siconos_is_there():
 @pytest.mark.skipif(siconos.interpreter() is None, reason=siconos.ABSENT)
 def test_a_sweep_is_that_of_siconos():
     S = ensemble(packed(30, 0.3))
-    found = siconos.against_siconos(S, solvers.kicked(S, 1, 0)[0], 1e-4)
+    found = siconos.against_siconos(S, runner.kicked(S, 1, 0)[0], 1e-4)
     assert found["sweeps"] > 10
     assert found["difference"] < 1e-10
 
 
 def test_scaling_gives_an_exponent_per_solver():
-    rows = bench.scaling(True, n=30, mu=0.3, tiles=(1, 2), repeats=1)
+    rows = bench.scaling(n=30, mu=0.3, tiles=(1, 2), repeats=1)
     sizes = [row["n"] for row in rows if row["solver"] == "nearest"]
     assert sizes == [30, 120, "fit"]
     fits = [row for row in rows if row["n"] == "fit"]
@@ -76,7 +76,7 @@ def test_scaling_gives_an_exponent_per_solver():
 
 
 def test_a_solver_out_of_patience_is_left_out_of_larger_sizes():
-    rows = bench.scaling(True, n=30, mu=0.3, tiles=(1, 2), repeats=1, patience=1e-9)
+    rows = bench.scaling(n=30, mu=0.3, tiles=(1, 2), repeats=1, patience=1e-9)
     assert {row["n"] for row in rows} == {30, "fit"}
     assert all(row["exponent"] is None for row in rows if row["n"] == "fit")
 
@@ -93,14 +93,14 @@ def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
 
 
 def test_walls_of_blocks_agree_with_highs():
-    rows = bench.masonry(True)
+    rows = bench.masonry(bench.SMALL)
     assert {row["bodies"] for row in rows} == {56} and rows[-1]["r_hat"] > 0
     compared = [row for row in rows if "difference" in row]
     assert len(compared) == 4 and all(row["difference"] < 1e-8 for row in compared)
 
 
 def test_compaction_rows():
-    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.05, 1e9), accuracies=(0.01,), seeds=1)
+    rows = bench.compaction(n=30, mu=0.3, steps=(0.05, 1e9), accuracies=(0.01,), seeds=1)
     assert [row["failed"] for row in rows] == [0, 1]
     S = ensemble(pack(30, 0.3, 1, dt=0.05, accuracy=0.01))
     assert rows[0]["z"] == pytest.approx(S.coordination)
@@ -126,33 +126,33 @@ def test_kernels_are_compiled_before_packings_are_timed(monkeypatch):
     monkeypatch.setattr(
         bench.packings, "pack", lambda n, *rest, **_: made.append(n) or packed(30, 0.3)
     )
-    bench.compaction_growth(True, mu=0.3, sizes=(400, 800), seeds=1)
+    bench.compaction_growth(mu=0.3, sizes=(400, 800), seeds=1)
     assert made == [bench.packings.WARM_UP, 400, bench.packings.WARM_UP, 800]
 
 
 def test_compaction_at_each_friction_and_size():
-    rows = bench.compaction_frictions(True, n=30, frictions=(0.3, 1.0), seeds=2)
+    rows = bench.compaction_frictions(n=30, frictions=(0.3, 1.0), seeds=2)
     assert [row["mu"] for row in rows] == [0.3, 1.0]
     assert all(0 < row["seconds"] <= row["slowest"] for row in rows)
-    rows = bench.compaction_growth(True, mu=0.3, sizes=(20, 30), seeds=1)
+    rows = bench.compaction_growth(mu=0.3, sizes=(20, 30), seeds=1)
     assert [row["n"] for row in rows] == [20, 30, "fit"]
     assert np.isfinite(rows[-1]["exponent"])
 
 
 def test_pushed_contacts_are_compared_at_the_same_critical_forces():
-    rows = bench.pushes(True, n=20, frictions=(0.3,), contacts=4)
+    rows = bench.pushes(n=20, frictions=(0.3,), contacts=4)
     assert [row["way"] for row in rows] == ["one at a time", f"{LANES} lanes"]
     assert all(row["seconds_per_contact"] > 0 and row["differ"] == 0 for row in rows)
 
 
 def test_chains_on_two_threads():
-    (row,) = bench.batches(True, states=6, **SMALL)
+    (row,) = bench.batches(states=6, **SMALL)
     assert min(row["per_second"], row["per_second_2"], row["ceiling"]) > 0
     assert row["ratio"] == pytest.approx(row["per_second_2"] / row["per_second"])
 
 
 def test_walks_of_one_optimum_agree_and_others_need_not():
-    rows = bench.walks(True, packings=2, states=4, **SMALL)
+    rows = bench.walks(packings=2, states=4, **SMALL)
     assert [row["solver"] for row in rows] == list(states.WALKS)
     piqp, ours = (named(rows, "solver", s) for s in ("nearest (PIQP)", "nearest"))
     for row in rows:
@@ -165,13 +165,13 @@ def test_walks_of_one_optimum_agree_and_others_need_not():
 def test_a_walk_that_fails_is_counted():
     alone = states.WALKS["Gauss–Seidel alone"] | {"max_iterations": 2}
     ways = {"cut short": alone, "nearest": states.WALKS["nearest"]}
-    rows = bench.walks(True, packings=1, states=2, ways=ways, **SMALL)
+    rows = bench.walks(packings=1, states=2, ways=ways, **SMALL)
     assert [row["failed"] for row in rows] == [1, 0]
     assert "eta3" not in rows[0]
 
 
 def test_intervals_of_walks_grow_towards_the_exact_ones():
-    rows = bench.intervals(True, n=30, frictions=(0.3,), states=(5, 20))
+    rows = bench.intervals(n=30, frictions=(0.3,), states=(5, 20))
     exact = named(rows, "method", "exact")
     for method in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
         few, many = [row for row in rows if row["method"] == method]
@@ -182,13 +182,17 @@ def test_intervals_of_walks_grow_towards_the_exact_ones():
 
 
 def test_missing_references_are_told(tmp_path):
-    (row,) = bench.interval_methods(True, folder=tmp_path)
+    (row,) = bench.interval_methods(folder=tmp_path)
     assert "not found" in row["note"]
 
 
 TWO = {
-    "one": (lambda quick: [{"seconds": 1.5, "quick": quick, "note": ""}], "The first"),
-    "two": (lambda quick: [{"solver": "a", "ratio": None}, {"solver": "b"}], "The second"),
+    "one": bench.Part(
+        lambda quick=False: [{"seconds": 1.5, "quick": quick, "note": ""}],
+        "The first",
+        {"quick": True},
+    ),
+    "two": bench.Part(lambda: [{"solver": "a", "ratio": None}, {"solver": "b"}], "The second", {}),
 }
 
 
@@ -230,7 +234,7 @@ def test_table_aligns_and_leaves_out_empty_columns():
 
 
 def test_knowledge_compares_the_same_programs():
-    rows = bench.knowledge(True, n=30, mu=0.3, pulled=1, repeats=1)
+    rows = bench.knowledge(n=30, mu=0.3, every=1, pulled=1, repeats=1)
     tasks = list(dict.fromkeys(row["task"] for row in rows))
     assert len(tasks) == 5 and len(rows) == 10
     for task in tasks:
@@ -256,7 +260,7 @@ def test_frames_are_nearer_to_the_truth_when_inferred():
 
 
 def test_uniform_states_against_size_reach_what_was_asked_for():
-    rows = bench.uniform_growth(True, n=30, mu=0.3, tiles=(1, 2), effective=60)
+    rows = bench.uniform_growth(n=30, mu=0.3, tiles=(1, 2), effective=60)
     ours = [row for row in rows if "effective" in row]
     assert [row["n"] for row in ours] == [30, 120]
     assert all(row["reached"] and row["effective"] >= 60 for row in ours)

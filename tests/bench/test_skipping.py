@@ -41,6 +41,6 @@ def test_tangential_unknowns_left_out_are_zero_without_friction():
 
 
 def test_the_benchmark_counts_every_skip():
-    rows = bench.skips(True, n=40, mu=0.3)
+    rows = bench.skips(n=40, mu=0.3)
     assert len(rows) == 6
     assert all(row["count"] >= 0 and row["ratio"] > 0 for row in rows)

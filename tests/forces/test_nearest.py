@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from packings import lattice, packed, reference, two_disks
 
-from granforce.bench import tile
+from granforce.bench.runner import tile
 from granforce.explore.random_walk import walk
 from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import problem_of
