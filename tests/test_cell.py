@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from packings import reference, skewed
 
 import granforce as gf
-from granforce.bench import solvers
+from granforce.bench import runner
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import touching_contacts
 from granforce.perturb import decay
 from granforce.records import InputError, make_cell, make_contacts, make_packing
-from granforce.study import kinds, slices
+from granforce.study import kinds
+from granforce.study.kinds import slices
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.tolerances import TOUCHING
 
@@ -207,7 +208,7 @@ def test_an_open_box_has_no_fractions_to_slice():
 def test_a_tilted_packing_is_tiled_by_its_lattice():
     packing = skewed(reference("n100_mu1_s12"))[0]
     S = gf.ensemble(packing)
-    larger = solvers.tile(S, 2)
+    larger = runner.tile(S, 2)
     assert larger.tilt == 2 * packing.tilt and larger.volume == pytest.approx(4 * packing.volume)
     T = gf.ensemble(larger, prune=False)
     assert T.residual(T.original) < 1e-9

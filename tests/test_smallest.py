@@ -8,7 +8,7 @@ import granforce as gf
 from granforce import measures
 from granforce.cli.entry_point import main
 from granforce.records import InputError, NotJammedError, make_contacts, make_packing
-from granforce.study import slices
+from granforce.study.kinds import slices
 
 
 def pair(mu):

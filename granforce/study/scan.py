@@ -6,24 +6,14 @@ interrupted scan, or one that lost a worker, resumes.
 
 from __future__ import annotations
 
-import logging
 import multiprocessing
-import os
-import signal
-import socket
 import sys
-import threading
-import time
-import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from inspect import signature
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +27,6 @@ from granforce.perturb.critical_force import critical_forces
 from granforce.records import (
     InputError,
     Packing,
-    ResultWarning,
     brief,
     choice,
     friction,
@@ -48,27 +37,18 @@ from granforce.records import (
 )
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, entry_name, get, load, row
+from granforce.study.cluster import client_of, over_dask
 from granforce.study.keys import Parameters, canonical
+from granforce.study.processes import TRIES, Calls, Tasks, Waits, lost, one_pool, run_cell
 from granforce.study.relaxations import RELAXATIONS
 from granforce.study.store import open_store
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
-from granforce.system.terminal import one_line
 from granforce.types import Progress
-
-# Time between two queries of dask, and time without workers before a message and before an end, s.
-LOOK, WORKERLESS, GIVEN_UP = 0.2, 5.0, 600.0
 
 CELL_BYTES = 2000  # of memory, per cell that is not yet computed
 
 NO_STORES = (".csv", ".json", ".npz")  # endings of files that a user expects instead
-
-TRIES = 3  # attempts at a cell whose worker died: the cell may be the cause
-
-# Work for workers: path of the store, cell, dtypes.
-Tasks = dict[int, tuple[str, StudyCell, Mapping[str, str] | None]]
-
-_SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def scan(
@@ -259,39 +239,24 @@ def run(
         if scheduler is None:
             store.make()
             waits = Waits(needs, failed)
-            calls = _Calls(finished, tell, enough or (lambda: False))
+            calls = Calls(finished, tell, enough or (lambda: False))
             if worker_count(workers) == 1:
                 _one_after_another(tasks, waits, calls)
             else:
                 _over_processes(tasks, waits, workers, calls)
         else:
-            with _client_of(scheduler) as client:
+            with client_of(scheduler) as client:
                 store.make()  # only once a scheduler has answered
                 first = set(needs.values())
                 for part in (first, tasks.keys() - first):
                     some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
-                    _over_dask(client, some, scheduler, finished)
+                    over_dask(client, some, scheduler, finished)
     except KeyboardInterrupt:
         saved = sum(entry_name(store, *cell) in store for cell in cells) if store.exists else 0
         # Workers of a cluster may still finish the cells they are computing.
         least = "" if scheduler is None else "at least "
         raise KeyboardInterrupt(f"saved {least}{saved} of {len(cells)} cells") from None
     return [(cells[k], failed[k]) for k in sorted(failed)]
-
-
-class Waits(NamedTuple):
-    """Dependencies of cells: {cell: the cell of its packing}, and the failed cells."""
-
-    needs: Mapping[int, int]
-    failed: Mapping[int, str]
-
-    def ready(self, todo: Sequence[int], left: Collection[int]) -> int | None:
-        """The first cell to do whose packing is not among those left; None if all must wait."""
-        return next((k for k in todo if self.needs.get(k) not in left), None)
-
-    def lost(self, k: int) -> bool:
-        """Whether the packing of a cell has failed."""
-        return self.needs.get(k) in self.failed
 
 
 def _needs(cells: Mapping[int, StudyCell]) -> dict[int, int]:
@@ -321,15 +286,7 @@ def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
     return tell
 
 
-class _Calls(NamedTuple):
-    """What running cells calls."""
-
-    finished: Callable[[int, Callable[[], bool]], object]  # a cell, and whether it was stored
-    advanced: Callable[[float], object]  # the number of cells that are done, and parts of them
-    enough: Callable[[], bool]  # whether to start no further cell
-
-
-def _one_after_another(tasks: Tasks, waits: Waits, calls: _Calls) -> None:
+def _one_after_another(tasks: Tasks, waits: Waits, calls: Calls) -> None:
     """Run tasks in this process, which needs no script that workers could import."""
     left = dict(tasks)
     while left and not calls.enough():
@@ -345,7 +302,7 @@ def _from(before: int, advanced: Callable[[float], object]) -> Callable[[float],
     return lambda part: advanced(before + part)
 
 
-def _over_processes(tasks: Tasks, waits: Waits, workers: int, calls: _Calls) -> None:
+def _over_processes(tasks: Tasks, waits: Waits, workers: int, calls: Calls) -> None:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # in a worker that imports a script without a guard: its parent says so
     with cancelling.scope():  # the compiler cannot be interrupted
@@ -353,249 +310,11 @@ def _over_processes(tasks: Tasks, waits: Waits, workers: int, calls: _Calls) -> 
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
-        tasks = _one_pool(tasks, waits, workers, calls, before)
+        tasks = one_pool(tasks, waits, workers, calls, before)
         if not tasks or calls.enough():
             return
     for k in tasks:
-        calls.finished(k, _lost)
-
-
-def _lost() -> NoReturn:
-    raise InputError(f"worker processes died {TRIES} times while computing this cell or others")
-
-
-def _one_pool(tasks: Tasks, waits: Waits, workers: int, calls: _Calls, before: int) -> Tasks:
-    """Run tasks in processes, `before` of which have ended; return those left by a dead worker."""
-    context = multiprocessing.get_context("spawn")
-    counter = context.Value("d", _NONE_BEGAN)
-    left, todo, broken = dict(tasks), list(tasks), False
-    waiting: dict[Future[bool], int] = {}
-    workers = min(workers, len(tasks))
-    pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
-    try:
-        while True:
-            # One for each worker: the pool would start every task it was given.
-            while len(waiting) < workers and not broken and not calls.enough():
-                k = waits.ready(todo, left)
-                if k is None:
-                    break
-                todo.remove(k)
-                if waits.lost(k):
-                    del left[k]
-                    continue
-                with _single_threaded(), _interrupts_blocked():
-                    try:
-                        waiting[pool.submit(run_cell, *tasks[k])] = k
-                    except BrokenProcessPool:
-                        broken = True
-            if not waiting:
-                break
-            ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
-            for future in ended:
-                k = waiting.pop(future)
-                if isinstance(future.exception(), BrokenProcessPool):
-                    broken = True
-                else:
-                    calls.finished(k, future.result)
-                    del left[k]
-            calls.advanced(before + max(0.0, counter.value))
-        if broken and counter.value == _NONE_BEGAN:
-            raise InputError(
-                "worker processes ended before they began: use workers=1, or call this in a script "
-                'that is a file (not read from stdin), under if __name__ == "__main__":'
-            )
-    except BaseException:
-        # Workers would continue the current cell, whose result is lost anyway.
-        for process in list(pool._processes.values()):
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-    return left
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Within, started processes use one thread in linear algebra: cells are shared, not rows."""
-    before = {name: os.environ.get(name) for name in _SINGLE}
-    os.environ.update(dict.fromkeys(_SINGLE, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Within, started processes do not receive Ctrl-C, which goes to the whole process group.
-
-    Otherwise those that still import modules would print tracebacks.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-_counter = None
-_NONE_BEGAN = -1.0  # value of the counter before a worker has begun
-
-
-def _share(counter: Any) -> None:
-    global _counter
-    _counter = counter
-    with counter.get_lock():
-        counter.value = max(0.0, counter.value)
-    # Ctrl-C goes to the whole process group: the parent ends the workers silently.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    warnings.formatwarning = one_line
-    warnings.simplefilter("ignore", ResultWarning)  # the stored results say so
-
-
-def _end_with_parent() -> None:
-    """End a worker whose parent was killed, as nobody needs its results."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(1)
-
-
-def _counting() -> Callable[[float], object]:
-    """A function of the part of a cell that is done, which adds to the workers' counter."""
-    reported = 0.0
-
-    def count(part: float) -> None:
-        nonlocal reported
-        if _counter is not None:
-            with _counter.get_lock():
-                _counter.value += part - reported
-            reported = part
-
-    return count
-
-
-def run_cell(
-    path: str | Path,
-    cell: StudyCell,
-    dtypes: Mapping[str, str] | None = None,
-    advanced: Callable[[float], object] | None = None,
-) -> bool:
-    """Compute one cell into the store at path; return whether it was stored.
-
-    advanced(part): called with the part of it that is done; None: in a worker, which counts for
-    its parent.
-    """
-    if not Path(path, "zarr.json").exists():
-        raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
-    tell = _counting() if advanced is None else advanced
-
-    def count(done: float, total: float | None) -> None:  # None: for a compaction
-        if total:
-            tell(min(done / total, 1.0))
-
-    store = open_store(path)
-    _, cached = get(store, *cell, workers=1, dtypes=dtypes, progress=count)
-    count(1, 1)
-    if store.incomplete:
-        raise InputError("it was computed, but could not be written to the store")
-    return cached
-
-
-def _over_dask(
-    client: Any,
-    tasks: Tasks,
-    scheduler: str,
-    finished: Callable[[int, Callable[[], bool]], object],
-) -> None:
-    """Run tasks on the workers of a dask scheduler, which restarts those of lost workers."""
-    from dask.distributed import KilledWorker, as_completed
-
-    unreachable = InputError(
-        f"the dask scheduler at {scheduler} was lost; finished entries are saved"
-    )
-    waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
-    completed, workers = as_completed(list(waiting)), _Workers(scheduler)
-    try:
-        while waiting:
-            for future in completed.next_batch(block=False):
-                if future.status == "cancelled":  # its fate is unknown
-                    raise unreachable
-                dead = isinstance(future.exception(), KilledWorker)
-                finished(waiting.pop(future), _lost if dead else future.result)
-            try:
-                present = client.nthreads()
-            except OSError:
-                raise unreachable from None
-            workers.count(present)
-            time.sleep(LOOK)
-    except BaseException:
-        client.cancel(list(waiting))
-        raise
-
-
-@contextmanager
-def _client_of(scheduler: str) -> Iterator[Any]:
-    """A client of a dask scheduler; InputError if it cannot be reached."""
-    try:
-        from dask.distributed import Client
-    except ImportError:
-        raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
-    with _without_tracebacks():
-        try:
-            client = Client(scheduler, timeout=10)
-        except Exception as error:  # another service at this address may answer anything
-            words = " ".join(str(error).split())[:200] or type(error).__name__
-            raise InputError(f"no dask scheduler at {scheduler}: {words}") from None
-        with client:
-            yield client
-
-
-@contextmanager
-def _without_tracebacks() -> Iterator[None]:
-    """Within, dask does not log errors that are handled here."""
-    logger = logging.getLogger("distributed.client")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
-
-
-class _Workers:
-    """Reports, once each time, that a scheduler has no workers, and ends after GIVEN_UP."""
-
-    def __init__(self, scheduler: str) -> None:
-        self._scheduler = scheduler
-        self._since, self._reported = time.monotonic(), False
-
-    def count(self, workers: Collection[Any]) -> None:
-        """Update with its present workers; InputError after GIVEN_UP without any."""
-        if workers:
-            self._since, self._reported = time.monotonic(), False
-            return
-        missed, minutes = time.monotonic() - self._since, f"{GIVEN_UP / 60:g} minutes"
-        if missed >= GIVEN_UP:
-            raise InputError(
-                f"the dask scheduler {self._scheduler} had no worker for {minutes}: start one with "
-                f"dask worker {self._scheduler}; finished entries are saved"
-            )
-        if missed >= WORKERLESS and not self._reported:
-            self._reported = True
-            warnings.warn(
-                f"no worker at the dask scheduler {self._scheduler}: waiting up to {minutes} for "
-                "one (Ctrl-C ends)",
-                stacklevel=2,
-            )
+        calls.finished(k, lost)
 
 
 def warm_up(needed: Any = None, packing: Packing | None = None) -> None:

@@ -10,10 +10,10 @@ import granforce
 from granforce.cli.command_table import COMMANDS, FORMATS
 from granforce.cli.report_lines import line
 from granforce.fields import fields
-from granforce.glossary import RELAXATIONS
 from granforce.quantities import QUANTITIES
 from granforce.study import kinds
 from granforce.study.evolution import SCALARS
+from granforce.study.relaxations import RELAXATIONS
 
 pytestmark = pytest.mark.fast
 

@@ -19,7 +19,7 @@ from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
 from granforce.packing.importers import load_packing
 from granforce.records import InputError
-from granforce.study import slices
+from granforce.study.kinds import slices
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
 TESTS = Path(__file__).parents[1]

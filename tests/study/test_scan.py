@@ -17,6 +17,7 @@ from heeding import until_it_left
 from test_cells import cell
 
 from granforce.records import InputError
+from granforce.study import cluster as dask_cluster
 from granforce.study import kinds, scan
 from granforce.study.cells import StudyCell, load
 from granforce.study.store import open_store
@@ -355,8 +356,8 @@ def when_it_waits(monkeypatch, then):
         said.append(message)
         then()
 
-    monkeypatch.setattr(scan, "WORKERLESS", 0)
-    monkeypatch.setattr(scan.warnings, "warn", warn)
+    monkeypatch.setattr(dask_cluster, "WORKERLESS", 0)
+    monkeypatch.setattr(dask_cluster.warnings, "warn", warn)
     return said
 
 
@@ -377,14 +378,14 @@ def test_a_scheduler_that_goes_is_one_line(tmp_path, monkeypatch, empty_cluster)
 
 
 def test_each_time_without_workers_is_told_once(monkeypatch):
-    workers = scan._Workers("tcp://there")
-    monkeypatch.setattr(scan, "WORKERLESS", 0)
+    workers = dask_cluster._Workers("tcp://there")
+    monkeypatch.setattr(dask_cluster, "WORKERLESS", 0)
     for count, told in ([(), 1], [(), 0], ["a", 0], [(), 1], [(), 0]):
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             workers.count(count)
         assert len(said) == told
-    monkeypatch.setattr(scan, "WORKERLESS", 60)
+    monkeypatch.setattr(dask_cluster, "WORKERLESS", 60)
     workers.count("a")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -392,7 +393,7 @@ def test_each_time_without_workers_is_told_once(monkeypatch):
 
 
 def test_a_scheduler_that_stays_without_workers_is_given_up(tmp_path, monkeypatch, empty_cluster):
-    monkeypatch.setattr(scan, "GIVEN_UP", 0)
+    monkeypatch.setattr(dask_cluster, "GIVEN_UP", 0)
     with pytest.raises(InputError, match=r"had no worker for .*start one with dask worker tcp:"):
         scan.run(tmp_path / "s", small_cells()[:1], scheduler=empty_cluster.scheduler_address)
 

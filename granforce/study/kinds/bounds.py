@@ -11,7 +11,6 @@ from granforce.explore.outline import outline
 from granforce.explore.stress_outline import stress_outline
 from granforce.forces.ensemble import Ensemble
 from granforce.records import InputError, positive, whole
-from granforce.study import slices
 from granforce.study.bounds import (
     intervals_dataset,
     limit_loads_dataset,
@@ -20,6 +19,7 @@ from granforce.study.bounds import (
 )
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
+from granforce.study.kinds import slices
 from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
 from granforce.study.store import Store
 from granforce.system import cancelling

@@ -21,11 +21,11 @@ from granforce.packing.compaction import (
 )
 from granforce.packing.scenes import scene
 from granforce.records import InputError, Packing, friction, moderate, positive, random_seed, whole
-from granforce.study import slices
 from granforce.study.cells import Kind, get, load, packing_version, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.keys import Parameters
+from granforce.study.kinds import slices
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.study.store import Store
 from granforce.system import cancelling
