@@ -25,7 +25,7 @@ from granforce.records import (
 )
 from granforce.system.files import written
 from granforce.tolerances import LARGEST_UNIT
-from granforce.types import Floats, Integers
+from granforce.types import Floats, Integers, Mask
 
 
 @record
@@ -33,7 +33,7 @@ class SyntheticFrame(NamedTuple):
     """A frame as if read from files, and the true forces; `gf.read_pegs` accepts it."""
 
     only: Annotated[Listing, "what a reader of the files would return"]
-    pairs: Annotated[Integers, "(k, 2) ids of the grains that touch inside the frame"]
+    pairs: Annotated[Floats, "(k, 2) ids of the grains that touch inside the frame"]
     forces: Annotated[Floats, "(k, 2) their true f_n, f_t"]
     unit: Annotated[float, "mean true normal force"]
 
@@ -126,11 +126,7 @@ def synthetic_frame(
         than disks.
     """
     refuse_shapes(packing, "photoelastic frames are made")
-    for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
-        if not 0 <= real(value, name) <= LARGEST_UNIT or (name == "missed" and value >= 1):
-            raise InputError(
-                f"{name} must be from 0 to {LARGEST_UNIT:g} (missed: below 1), got {value}"
-            )
+    errors = _checked_errors(noise, missed, false, blur)
     for value, name in ((pixels, "pixels"), (newton, "newton")):
         if not 1 / LARGEST_UNIT <= positive(value, name) <= LARGEST_UNIT:
             raise InputError(
@@ -139,54 +135,108 @@ def synthetic_frame(
     if not np.any(packing.forces[:, 0] > 0):
         raise InputError("the packing has no forces to measure")
     rng = np.random.default_rng(random_seed(seed))
-    S = ensemble(packing)
-    c, unit = S.contacts, float(newton)
-    branch = packing.x[c.j] - packing.x[c.i]
-    inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6 * packing.r.max()
-    forces = unit * S.original / S.original[:, 0].mean()
-    count = len(packing.r)
+    true = _true_contacts(packing, float(newton))
+    lines = _listed_pairs(packing, true, errors, rng)
+    if walls:
+        lines = _with_walls(lines, true)
+    c, inside, count = true.contacts, true.inside, len(packing.r)
+    forces = lines.forces + errors.noise * true.unit * rng.standard_normal(lines.forces.shape)
+    x = packing.x + errors.blur * packing.r.mean() * rng.standard_normal(packing.x.shape)
+    r = packing.r * (1 + errors.blur * rng.standard_normal(count)).clip(0.5, 1.5)
     flag = np.zeros(count)
     flag[c.i[~inside]] = flag[c.j[~inside]] = 1.0
-    chance = inside / (forces[:, 0] + unit / 2)
-    order = rng.exponential(size=len(chance)) / np.maximum(chance, 1e-300)
-    absent = np.zeros(len(chance), dtype=bool)
-    absent[np.argsort(order)[: round(missed * inside.sum())]] = True
-    inner = np.flatnonzero(inside & ~absent)
-    ends, values = np.column_stack([c.i, c.j])[inner], forces[inner]
-    wrong = _near_pairs(packing, c, round(false * inside.sum()))
-    guess = np.abs(rng.normal(0, 0.2 * unit, (len(wrong), 2))) * [1.0, packing.mu]
-    ends, values = np.concatenate([ends, wrong]), np.concatenate([values, guess])
-    ends, values = np.concatenate([ends, ends[:, ::-1]]), np.tile(values, (2, 1))
-    beta = np.full(len(ends), np.nan)
-    if walls:
-        out = np.flatnonzero(~inside)
-        angle = np.arctan2(*c.normal[out].T[::-1])
-        sides = np.concatenate([c.i[out], c.j[out]])
-        ends = np.concatenate([ends, np.column_stack([sides, np.full(len(sides), -2)])])
-        values = np.concatenate([values, forces[out], forces[out]])
-        beta = np.concatenate([beta, angle, angle + np.pi])
-    values = values + noise * unit * rng.standard_normal(values.shape)
-    mean = packing.r.mean()
-    x = packing.x + blur * mean * rng.standard_normal(packing.x.shape)
-    r = packing.r * (1 + blur * rng.standard_normal(count)).clip(0.5, 1.5)
-    size = float(pixels)
     listing = Listing(
         ids=np.arange(1.0, count + 1),
-        x=size * x,
-        r=size * r,
+        x=float(pixels) * x,
+        r=float(pixels) * r,
         flag=flag,
-        ends=np.asarray(ends, dtype=np.float64) + 1.0,
-        forces=values,
-        beta=beta,
-        weight=np.ones(len(ends)),
+        ends=np.asarray(lines.ends, dtype=np.float64) + 1.0,
+        forces=forces,
+        beta=lines.beta,
+        weight=np.ones(len(lines.ends)),
         names=("synthetic positions", "synthetic contacts"),
-        lines=(np.arange(1, count + 1), np.arange(1, len(ends) + 1)),
+        lines=(np.arange(1, count + 1), np.arange(1, len(lines.ends) + 1)),
         both_ways=True,
         frame=float(whole(number, "number")),
         description="synthetic frame",
     )
-    true = np.column_stack([c.i, c.j])[inside] + 1.0
-    return SyntheticFrame(listing, true, forces[inside], unit)
+    pairs = np.column_stack([c.i, c.j])[inside] + 1.0
+    return SyntheticFrame(listing, pairs, true.forces[inside], true.unit)
+
+
+class _Errors(NamedTuple):
+    """Errors of a frame, as for `synthetic_frame`."""
+
+    noise: float
+    missed: float
+    false: float
+    blur: float
+
+
+class _TrueContacts(NamedTuple):
+    """The contacts that carry force."""
+
+    contacts: Contacts
+    forces: Floats  # (N_c, 2)
+    unit: float  # mean normal force
+    inside: Mask  # (N_c,) whether they do not cross a side of the box
+
+
+class _Lines(NamedTuple):
+    """Lines of contacts, each from both sides."""
+
+    ends: Integers  # (k, 2) grains from 0; −2: a wall
+    forces: Floats  # (k, 2)
+    beta: Floats  # (k,) direction of contacts with walls, otherwise NaN
+
+
+def _checked_errors(noise: float, missed: float, false: float, blur: float) -> _Errors:
+    errors = _Errors(noise, missed, false, blur)
+    for name, value in errors._asdict().items():
+        if not 0 <= real(value, name) <= LARGEST_UNIT or (name == "missed" and value >= 1):
+            raise InputError(
+                f"{name} must be from 0 to {LARGEST_UNIT:g} (missed: below 1), got {value}"
+            )
+    return errors
+
+
+def _true_contacts(packing: Packing, unit: float) -> _TrueContacts:
+    S = ensemble(packing)
+    c = S.contacts
+    branch = packing.x[c.j] - packing.x[c.i]
+    inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6 * packing.r.max()
+    return _TrueContacts(c, unit * S.original / S.original[:, 0].mean(), unit, inside)
+
+
+def _listed_pairs(
+    packing: Packing, true: _TrueContacts, errors: _Errors, rng: np.random.Generator
+) -> _Lines:
+    """Contacts of two grains without the missed ones, and false ones."""
+    c, inside, unit = true.contacts, true.inside, true.unit
+    chance = inside / (true.forces[:, 0] + unit / 2)
+    order = rng.exponential(size=len(chance)) / np.maximum(chance, 1e-300)
+    absent = np.zeros(len(chance), dtype=bool)
+    absent[np.argsort(order)[: round(errors.missed * inside.sum())]] = True
+    seen = np.flatnonzero(inside & ~absent)
+    false = _near_pairs(packing, c, round(errors.false * inside.sum()))
+    guess = np.abs(rng.normal(0, 0.2 * unit, (len(false), 2))) * [1.0, packing.mu]
+    ends = np.concatenate([np.column_stack([c.i, c.j])[seen], false])
+    forces = np.concatenate([true.forces[seen], guess])
+    ends, forces = np.concatenate([ends, ends[:, ::-1]]), np.tile(forces, (2, 1))
+    return _Lines(ends, forces, np.full(len(ends), np.nan))
+
+
+def _with_walls(lines: _Lines, true: _TrueContacts) -> _Lines:
+    """The lines and those of contacts through the sides of the box, as contacts with walls."""
+    c, out = true.contacts, np.flatnonzero(~true.inside)
+    angle = np.arctan2(*c.normal[out].T[::-1])
+    grain = np.concatenate([c.i[out], c.j[out]])
+    ends = np.column_stack([grain, np.full(len(grain), -2)])
+    return _Lines(
+        np.concatenate([lines.ends, ends]),
+        np.concatenate([lines.forces, true.forces[out], true.forces[out]]),
+        np.concatenate([lines.beta, angle, angle + np.pi]),
+    )
 
 
 def _near_pairs(packing: Packing, contacts: Contacts, count: int) -> Integers:

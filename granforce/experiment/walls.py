@@ -185,49 +185,75 @@ def wall_contacts(
     at_wall (N,): grains at walls. walls: as returned by `read_outline`, or None for angles if they
     are listed. reach: gap in mean radii up to which a grain at a wall touches a side.
     """
-    rows = listing.rows
-    lines = np.flatnonzero((rows == -1).any(axis=1) & (rows >= 0).any(axis=1))
-    grain = np.maximum(rows[lines, 0], rows[lines, 1])
-    beta = np.where(rows[lines, 0] >= 0, listing.beta[lines], listing.beta[lines] + np.pi)
-    forces, factor = listing.forces[lines], 1 / listing.weight[lines]
-    normal = np.column_stack([np.cos(beta), np.sin(beta)])
     if walls == "open":
         return None
+    lines = _wall_lines(listing)
     if walls is None:
-        measured = np.isfinite(beta)
-        if not measured.any():
-            return None
-        which = _occurrence(grain[measured])
-        names = tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(which.max() + 1))
-        return WallContacts(
-            grain=grain[measured],
-            wall=which,
-            normal=normal[measured],
-            forces=forces[measured],
-            factor=factor[measured],
-            names=names,
-            outline=None,
-        )
-    outline = (
-        walls if isinstance(walls, WallOutline) else fitted(walls, x, r, at_wall, listing.flag)
+        return _by_directions(lines)
+    if isinstance(walls, WallOutline):
+        return _by_outline(lines, walls, x, r, at_wall, reach)
+    return _by_outline(lines, fitted(walls, x, r, at_wall, listing.flag), x, r, at_wall, reach)
+
+
+class _WallLines(NamedTuple):
+    """The lines of a listing that join a grain and a wall."""
+
+    grain: Integers  # (k,)
+    normal: Floats  # (k, 2) from the grain to the wall, NaN if not listed
+    forces: Floats  # (k, 2) f_n, f_t
+    factor: Floats  # (k,) of the variance
+
+
+def _wall_lines(listing: Listing) -> _WallLines:
+    rows = listing.rows
+    lines = np.flatnonzero((rows == -1).any(axis=1) & (rows >= 0).any(axis=1))
+    beta = np.where(rows[lines, 0] >= 0, listing.beta[lines], listing.beta[lines] + np.pi)
+    return _WallLines(
+        grain=rows[lines].max(axis=1),
+        normal=np.column_stack([np.cos(beta), np.sin(beta)]),
+        forces=listing.forces[lines],
+        factor=1 / listing.weight[lines],
     )
+
+
+def _by_directions(lines: _WallLines) -> WallContacts | None:
+    """Contacts in the listed directions, with a wall for each contact of one grain; or None."""
+    measured = np.isfinite(lines.normal[:, 0])
+    if not measured.any():
+        return None
+    wall = _occurrence(lines.grain[measured])
+    return WallContacts(
+        grain=lines.grain[measured],
+        wall=wall,
+        normal=lines.normal[measured],
+        forces=lines.forces[measured],
+        factor=lines.factor[measured],
+        names=tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(wall.max() + 1)),
+        outline=None,
+    )
+
+
+def _by_outline(
+    lines: _WallLines, outline: WallOutline, x: Floats, r: Floats, at_wall: Mask, reach: float
+) -> WallContacts:
+    """Contacts of the grains at walls with the sides of an outline, measured where listed."""
     gap, ways = outline.gaps(x, r)
     touching = at_wall[:, None] & (gap <= reach * r.mean())
     touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
-    g, w = np.nonzero(touching)
-    m, f, taken = np.full((len(g), 2), np.nan), np.ones(len(g)), np.zeros(len(g), dtype=bool)
-    for k, of in enumerate(grain):
-        candidates = np.flatnonzero(g == of)
-        if np.isfinite(beta[k]):  # the side to which the angle points
-            best = candidates[np.argmax(ways[g[candidates], w[candidates]] @ normal[k])]
+    grain, wall = np.nonzero(touching)
+    gap, ways = gap[grain, wall], ways[grain, wall]
+    forces, factor = np.full((len(grain), 2), np.nan), np.ones(len(grain))
+    taken = np.zeros(len(grain), dtype=bool)
+    for k, listed_grain in enumerate(lines.grain):
+        candidates = np.flatnonzero(grain == listed_grain)
+        if np.isfinite(lines.normal[k, 0]):  # the side to which the angle points
+            best = candidates[np.argmax(ways[candidates] @ lines.normal[k])]
         else:  # the nearest side; several lines of one grain are contacts with several sides
-            some = candidates[~taken[candidates]] if not taken[candidates].all() else candidates
-            best = some[np.argmin(gap[g[some], w[some]])]
+            left = candidates[~taken[candidates]] if not taken[candidates].all() else candidates
+            best = left[np.argmin(gap[left])]
         taken[best] = True
-        m[best], f[best] = forces[k], factor[k]
-    return WallContacts(
-        grain=g, wall=w, normal=ways[g, w], forces=m, factor=f, names=outline.names, outline=outline
-    )
+        forces[best], factor[best] = lines.forces[k], lines.factor[k]
+    return WallContacts(grain, wall, ways, forces, factor, outline.names, outline)
 
 
 def _occurrence(grain: Integers) -> Integers:
