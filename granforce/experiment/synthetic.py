@@ -160,7 +160,7 @@ def synthetic_frame(
         frame=float(whole(number, "number")),
         description="synthetic frame",
     )
-    pairs = np.column_stack([c.i, c.j])[inside] + 1.0
+    pairs: Floats = np.column_stack([c.i, c.j])[inside].astype(np.float64) + 1.0
     return SyntheticFrame(listing, pairs, true.forces[inside], true.unit)
 
 
