@@ -198,8 +198,8 @@ Look = tuple[T | None, str]
 UNREADABLE = "its metadata cannot be read"
 
 
-def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
-    """look(folder); (None, "") if there is no folder.
+def _read_in_place(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
+    """look(folder), of the folder that has this name at the end; (None, "") if there is none.
 
     A folder that another process removed meanwhile is absent; if it was replaced, it is read again.
     """
@@ -223,7 +223,7 @@ def _identity(folder: Path) -> tuple[int, int, int] | None:
 
 def described(folder: Path) -> Look[dict[str, Any]]:
     """(attributes, "") of an entry; errors as for `checked`."""
-    return _unmoved(folder, _described)
+    return _read_in_place(folder, _described)
 
 
 def _described(folder: Path) -> Look[dict[str, Any]]:
@@ -257,7 +257,7 @@ def _metadata(folder: Path) -> Look[_Metadata]:
 
 def opened(folder: Path) -> Look[xr.Dataset]:
     """As `checked`, but arrays are read later; reading a lost array raises InputError."""
-    return _unmoved(folder, lambda folder: _lazily(folder, *_metadata(folder)))
+    return _read_in_place(folder, lambda folder: _lazily(folder, *_metadata(folder)))
 
 
 def _lazily(folder: Path, metadata: _Metadata | None, reason: str) -> Look[xr.Dataset]:
@@ -303,7 +303,7 @@ class _Whole(LocalStore):
 
 def checked(folder: Path) -> Look[xr.Dataset]:
     """(dataset in memory, "") if intact, (None, reason) if damaged, (None, "") if absent."""
-    return _unmoved(folder, _checked)
+    return _read_in_place(folder, _checked)
 
 
 def _checked(folder: Path) -> Look[xr.Dataset]:

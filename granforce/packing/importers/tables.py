@@ -123,65 +123,77 @@ def read_table(
         raise InputError("tolerance has no effect with a table of contacts: leave it out")
     prescribed = pressure is not None
     pressure = positive(1.0 if pressure is None else pressure, "pressure")
-    given = {"grains": grains} | ({} if contacts is None else {"contacts": contacts})
-    files = [
-        of_frame(source, name) if hasattr(source, "columns") else read_csv(source)
-        for name, source in given.items()
-    ]
-    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *files)
-    pairs = [_with_full_names(one) for one in pairs]
-    _check_columns(table, "x", "y", "r")
-    for one in pairs:
-        _check_columns(one, "i", "j")
+    table, pairs = _tables(grains, contacts, columns)
     check_grains(len(table.rows), most_grains, table.name)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
-    if not pairs:
-        if forces:
-            raise InputError("forces need a table of contacts with columns i, j, f_n, f_t")
-        joined, given = touching_contacts(x, r, cell, tolerance), None
+    if pairs is not None:
+        touching, given = _contacts_and_forces(pairs, table, x, r, cell, forces, mu)
+    elif forces:
+        raise InputError("forces need a table of contacts with columns i, j, f_n, f_t")
     else:
-        joined, given = _joined(pairs[0], table, x, r, cell, forces, mu)
+        touching, given = touching_contacts(x, r, cell, tolerance), None
     closed = bool(np.all(np.isfinite(cell.box)))
     if prescribed and not (closed and given is None):
         raise InputError(
             "pressure applies to periodic boxes without forces (f_n, f_t): leave it out"
         )
-    zero = np.zeros((len(joined.i), 2))
     packing = make_packing(
         x,
         r,
         cell.box,
-        joined,
-        zero if given is None else given,
+        touching,
+        np.zeros((len(touching.i), 2)) if given is None else given,
         mu,
         pressure if closed else np.nan,
         load,
         {"source": "table"},
         cell.tilt,
     )
-    packing = with_doubts_noted(packing, None if pairs else tolerance)
-    if given is None:
-        packing = enclosed(packing, walls, gravity, tolerance)
-        if reverse:
+    packing = with_doubts_noted(packing, tolerance if pairs is None else None)
+    if given is not None:
+        if walls is not None or gravity:
             raise InputError(
-                "--reverse (reverse=True) applies to tables with forces (f_n, f_t): leave it out"
+                "walls and gravity (--walls and --gravity, or walls=, gravity=) apply to tables "
+                "without forces: leave out f_n and f_t"
             )
-        return with_nearest_network(packing, forces="found")
-    if walls is not None or gravity:
+        return _with_forces(packing, reverse)
+    packing = enclosed(packing, walls, gravity, tolerance)
+    if reverse:
         raise InputError(
-            "walls and gravity (--walls and --gravity, or walls=, gravity=) apply to tables "
-            "without forces: leave out f_n and f_t"
+            "--reverse (reverse=True) applies to tables with forces (f_n, f_t): leave it out"
         )
+    return with_nearest_network(packing, forces="found")
+
+
+def _with_forces(packing: Packing, reverse: bool) -> Packing:
+    """The packing with its forces as given, and the pressure or the loads that balance them."""
     refuse_idle_reverse(packing.forces, reverse)
     found = with_given_forces(packing, reverse=reverse, forces="given")
-    if closed or load.any():
+    if np.isfinite(packing.volume) or packing.load.any():
         return found
     return with_edge(
         found,
         "; for walls and weights instead, leave out the forces and give walls and gravity "
         "(--walls and --gravity, or walls=, gravity=)",
     )
+
+
+def _tables(
+    grains: Source | Any, contacts: Source | Any | None, columns: Mapping[str, str] | None
+) -> tuple[Table, Table | None]:
+    """The tables of grains and of contacts, if any, with the columns that they need."""
+    sources = {"grains": grains} | ({} if contacts is None else {"contacts": contacts})
+    files = [
+        of_frame(source, name) if hasattr(source, "columns") else read_csv(source)
+        for name, source in sources.items()
+    ]
+    table, *pairs = renamed(_full({} if columns is None else columns), NAMES, *files)
+    pairs = [_with_full_names(one) for one in pairs]
+    _check_columns(table, "x", "y", "r")
+    for one in pairs:
+        _check_columns(one, "i", "j")
+    return table, pairs[0] if pairs else None
 
 
 def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
@@ -224,11 +236,11 @@ def _loads(table: Table, cell: Cell) -> Floats:
     return load
 
 
-def _joined(
+def _contacts_and_forces(
     table: Table, grains: Table, x: Floats, r: Floats, cell: Cell, forces: bool | None, mu: float
 ) -> tuple[Contacts, Floats | None]:
     """Contacts of a table and their forces (N_c, 2), or None without forces."""
-    joined = _listed(table, grains, x, r, cell)
+    joined = _contacts(table, grains, x, r, cell)
     if forces is None:
         forces = "f_n" in table.header or "f_t" in table.header
     if not forces:
@@ -239,7 +251,7 @@ def _joined(
     return joined, np.column_stack([normal, tangential])
 
 
-def _listed(table: Table, grains: Table, x: Floats, r: Floats, cell: Cell) -> Contacts:
+def _contacts(table: Table, grains: Table, x: Floats, r: Floats, cell: Cell) -> Contacts:
     """The contacts of a table; the InputError for those that count grains from 1 says so."""
 
     def counted(index: Mapping[Any, int]) -> Contacts:
