@@ -27,7 +27,9 @@ GALLERY = HERE / "pages" / "gallery.md"
 DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
-DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/)?(\w+\.(?:png|json))\)")  # as in the sources
+DRAWN = re.compile(
+    r"\((?:\.\./)+data/(?:figures/|tables/)?(\w+\.(?:png|csv))\)"
+)  # as in the sources
 FORMULA = re.compile(r"\$\$(.+?)\$\$", re.S)  # LaTeX, shown as MathML
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
@@ -42,7 +44,7 @@ FIRST = ("pack", "ensemble", "intervals", "walk", "sample_uniform", "plot")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add generated pages, the study's figures and its claims."""
+    """Add generated pages, and the figures and tables of the study."""
     for name, text in (
         ("reference/library.md", library()),
         ("reference/cli.md", command_line()),
@@ -52,8 +54,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, name, content=text))
     for path in (
         *sorted((DATA / "figures").glob("*.png")),
+        *sorted((DATA / "tables").glob("*.csv")),
         DATA / "bench.png",
-        DATA / "claims.json",
     ):
         files.append(File.generated(config, f"figures/{path.name}", abs_src_path=str(path)))
     for name, picture in gallery():

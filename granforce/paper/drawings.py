@@ -24,70 +24,60 @@ ENOUGH = 0.2
 
 FORMATS = ("html", "png", "svg")
 
-_POINTS = "points are means over packings, bars standard errors"
+POINTS = "points are means over packings, bars standard errors"
 _TAILS = (
-    "linear, and semi-logarithmic for three ranges of friction; bars are standard "
-    "errors over packings; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the upper "
-    "quartile"
+    "linear, and semi-logarithmic for three ranges of friction. b is the exponent of tails "
+    f"exp(−(λ ΔF_n)^b), fitted beyond the upper quartile; {POINTS}"
 )
 # Caption of each figure, stored in its file; {walk}: how networks of the walk were relaxed. Figures
 # 1 to 6 are the paper's, by its own relaxation if the study has it at every μ.
 CAPTIONS = {
-    "figure1": "Coordination z of the backbone, and indeterminacy η1, η2 and 0.15 η3 of the random "
-    f"walk's networks ({{walk}}), against the friction coefficient μ; {_POINTS}. The paper finds "
-    "η1 ≈ 0.15 η3.",
+    "figure1": "Coordination z of the backbone, and indeterminacy η1, η2 and 0.15 η3 ({walk}), "
+    f"against μ; {POINTS}. The paper finds η1 ≈ 0.15 η3.",
     "figure2": "Mean critical force of pushed contacts in ⟨f_n⟩, and exponent α of the decay "
-    "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}) in the same packings, joined "
-    "in order of the friction coefficient μ; bars are standard errors over packings.",
-    "figure2_limit": "As Figure 2, with the limit load (dashed) beside the critical force.",
-    "figure3": "Normal forces that contacts can have over those they have in the original "
-    "network: the interval seen (bars), and by its colour which fraction of the "
-    "networks of the random walk ({walk}) has which ratio, for several friction "
-    "coefficients μ; every contact, from weak to strong. The ordinate is cut at 3; "
-    "titles count the contacts that reach beyond.",
-    "figure4": "Distribution of ΔF_n/⟨f_n⟩, with ΔF_n the interval of a normal force seen by the "
-    f"random walk ({{walk}}): {_TAILS}.",
-    "figure5": "Contacts with f_n > 2⟨f_n⟩, drawn on top of those with ΔF_n > ⟨ΔF_n⟩ ({walk}); "
-    "grey, all contacts. Lengths are in largest radii.",
-    "figure6": "Correlation, over the contacts of a packing, between f_n in the original network "
-    "and ΔF_n, against the friction coefficient μ ({walk}). Bars: range of this correlation if f_n "
-    "is taken from any other network of the walk. Dotted: ± two standard deviations of its mean "
-    "for shuffled forces and as many packings.",
-    "samplers": "Indeterminacy η1, η2 and 0.15 η3 of networks drawn in several ways, against the "
-    f"friction coefficient μ; {_POINTS}.",
+    "|u| ~ r^−α of the first motion, against η2 ({walk}) in the same packings, joined in order of "
+    f"μ; {POINTS}.",
+    "figure2_limit": "As Figure 2, with the limit load (dashed).",
+    "figure3": "Normal forces of contacts over those in the original network, from weak to strong: "
+    "the range seen (bars), and the fraction of networks ({walk}) with each ratio (colour). Bars "
+    "are cut at 3; titles count the contacts that reach beyond.",
+    "figure4": f"Distribution of ΔF_n/⟨f_n⟩ ({{walk}}): {_TAILS}.",
+    "figure5": "Contacts with f_n > 2⟨f_n⟩, on top of those with ΔF_n > ⟨ΔF_n⟩ ({walk}). Grey: "
+    "all contacts.",
+    "figure6": "Correlation of f_n in the original network with ΔF_n over the contacts of a "
+    "packing, against μ ({walk}). Bars: its range if f_n is taken from other networks of the walk. "
+    "Dotted: ± two standard deviations of its mean for shuffled forces and as many packings.",
+    "samplers": "Indeterminacy η1, η2 and 0.15 η3 of networks drawn in several ways, against μ; "
+    f"{POINTS}.",
     "effort": "Acceptance rate of the attempts, and sweeps per accepted network, of walks by "
-    f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
-    "figure1_exact": "As Figure 1 for the nearest-network walk; dashed, 0.15 η3 of the exact "
-    "intervals; dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
-    "figure1_uniform": "As Figure 1 for the nearest-network walk; dashed, uniform networks.",
-    "figure4_mean": "Distribution of the extent ΔF_n of normal forces, in units of its mean, that "
-    f"the random walk ({{walk}}) has seen, {_TAILS}.",
-    "figure4_exact": "Distribution of the exact extent ΔF_n of normal forces, in units of ⟨f_n⟩, "
-    f"{_TAILS}.",
+    f"Gauss–Seidel sweeps alone that end at several residuals; {POINTS}.",
+    "figure1_exact": "As Figure 1 for the nearest-network walk. Dashed: 0.15 η3 of the exact "
+    "intervals. Dotted: the width V^(1/h)/√(2πe) of S, from its volume V.",
+    "figure1_uniform": "As Figure 1 for the nearest-network walk. Dashed: uniform networks.",
+    "figure4_mean": f"Distribution of ΔF_n in units of its mean ({{walk}}): {_TAILS}.",
+    "figure4_exact": f"Distribution of the exact ΔF_n/⟨f_n⟩: {_TAILS}.",
     "figure6_exact": "As Figure 6 for the nearest-network walk, with exact intervals and uniform "
     "networks.",
-    "places": "Where the tenth of the contacts with the largest forces f_n is, and the tenth with "
-    "the largest extents ΔF_n ({walk}); grey, all contacts. Lengths are in largest radii.",
+    "places": "Where the tenth of the contacts with the largest f_n is, and the tenth with the "
+    "largest ΔF_n ({walk}). Grey: all contacts.",
     "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the nearest-network walk, and 0.15 η3 of the "
-    f"exact intervals (dashed), against the number N of disks; {_POINTS}.",
+    f"exact intervals (dashed), against the number N of disks; {POINTS}.",
     "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
-    "of packings made with μ; bars are standard errors over packings.",
+    f"of packings made with μ; {POINTS}.",
     "frozen": "Fraction of contacts without a unique force, and number of their clusters, where "
-    "only the pressure is prescribed and where the forces of the surroundings are held; bars are "
-    "standard errors over packings.",
-    "stresses": "Shear stress over pressure against the friction coefficient μ: the largest of any "
-    "network in S (exact), and that of the original network, which was made under pressure alone; "
-    "and this and that of uniform networks as fractions of the largest in the same packing; "
-    f"{_POINTS}.",
-    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, against the friction "
-    "coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V per grain of the backbone "
-    f"against the number N of disks; {_POINTS}.",
+    "only the pressure is prescribed and where the forces of the surroundings are held; "
+    f"{POINTS}.",
+    "stresses": "Shear stress over pressure against μ: the largest in S, and that of the original "
+    "network. The latter, and that of uniform networks, as fractions of the largest in the same "
+    f"packing; {POINTS}.",
+    "volumes": "Width V^(1/h)/√(2πe) of S in ⟨f_n⟩ against μ, from its volume V, and ln V per "
+    f"grain of the backbone against the number N of disks; {POINTS}.",
     "tails": "Distribution of the normal forces of uniform networks, in ⟨f_n⟩, where the "
-    "pressure and where the whole stress is prescribed, semi-logarithmic; grey, exponential and "
+    "pressure and where the whole stress is prescribed, semi-logarithmic. Grey: exponential and "
     "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "
     "the last bin with ten forces or more: {tails}.",
     "distances": "Distance of the original network and of the nearest-network walk from the centre "
-    "of S, in units of that of uniform networks; bars are standard errors over packings.",
+    f"of S, over that of uniform networks; {POINTS}.",
 }
 _SWEPT = {
     "sweeps_1e-3": "paper's walk to 1e-3",

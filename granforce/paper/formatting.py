@@ -12,9 +12,11 @@ _MOST_DIGITS = 6  # after the point; smaller values are written with a power of 
 
 
 def short(value: float) -> str:
-    """Three decimals, or two digits of smaller values."""
+    """Three decimals, none of large values, or two digits of small ones."""
     if abs(value) < NOTHING:
         return "< 10⁻⁹"
+    if abs(value) >= 1000:
+        return f"{value:.0f}"
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
@@ -51,17 +53,18 @@ def listed(words: Sequence[str]) -> str:
 
 
 def with_error(values: Floats) -> str:
-    """Mean ± standard error, to two digits of the error."""
-    mean = float(values.mean())
-    if len(values) < 2 or abs(mean) < NOTHING:
+    """Mean and standard error of some values, as `concise`."""
+    error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else np.nan
+    return concise(float(values.mean()), float(error))
+
+
+def concise(mean: float, error: float) -> str:
+    """A mean with its standard error in units of its last digits: 0.0473(25) is 0.0473 ± 0.0025."""
+    if not error >= NOTHING or abs(mean) < NOTHING:
         return short(mean)
-    error = float(values.std(ddof=1) / np.sqrt(len(values)))
-    if error < NOTHING:
-        return short(mean)
-    digits = 1 - int(f"{error:.1e}".partition("e")[2])  # of the rounded error
+    digits = max(0, 1 - int(f"{error:.1e}".partition("e")[2]))  # two of the rounded error
     if digits <= _MOST_DIGITS:
-        return f"{mean:.{max(0, digits)}f} ± {error:.{max(0, digits)}f}"
+        return f"{mean:.{digits}f}({round(error * 10**digits)})"
     power = int(np.floor(np.log10(abs(mean))))
-    digits = max(0, power + digits)
-    scaled = f"({mean / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})"
+    scaled = concise(mean / 10.0**power, error / 10.0**power)
     return f"{scaled}·10{str(power).translate(RAISED)}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from granforce.packing.compaction import number_of_disks
-from granforce.paper import claims, documents, drawings, findings, tables
+from granforce.paper import claims, csv_tables, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, friction, positive, whole, worker_count
@@ -32,10 +32,10 @@ _NUMBERS = (
 def main(arguments: argparse.Namespace) -> int:
     """Run the study into a folder. Returns 1 if a cell failed.
 
-    The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
-    as claims.json. With --reduce the cells of another store are used unchanged, and rows missing
-    there come from --table; with --table alone nothing is computed or reduced. With --status only
-    the progress is reported.
+    The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, tables (CSV),
+    and the claims as claims.json. With --reduce the cells of another store are used unchanged, and
+    rows missing there come from --table; with --table alone nothing is computed or reduced. With
+    --status only the progress is reported.
     """
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
@@ -74,7 +74,9 @@ def main(arguments: argparse.Namespace) -> int:
     }
     with written(folder / "claims.json") as file:
         file.write(json_text(results, ascii_only=False).encode())
-    documents.renew(renewed, reduced, results["claims"], results["findings"])
+    judged = reduced, results["claims"], results["findings"]
+    csv_tables.save(folder / "tables", *judged)
+    documents.renew(renewed, *judged)
     print_claims(results, arguments.json)
     return 1 if failed else 0
 

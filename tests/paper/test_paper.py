@@ -19,7 +19,15 @@ from granforce.cli.entry_point import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.build import ensemble
 from granforce.measures import statistics
-from granforce.paper import claims, documents, drawings, findings, formatting, tables
+from granforce.paper import (
+    claims,
+    csv_tables,
+    documents,
+    drawings,
+    findings,
+    formatting,
+    tables,
+)
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, verdicts
 from granforce.paper.claims.table import CLAIMS
@@ -393,17 +401,17 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
     found = [finding._asdict() for finding in findings.measured(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
-    names = ("measures", "walks", "others", "further", "sweeps", "preparation", "counts")
-    names += ("claims", "ranges", "figures", "findings", "headlines", "certificates")
+    names = ("friction", "sweeps", "preparation", "resting", "claims", "figures")
+    names += ("headlines", "highlights", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = markdown.named(str(page), documents.KIND)
     documents.renew([path], table, told, found)
     text = page.read_text()
-    assert text.startswith("before\n<!-- study: measures -->\n| μ | packings |")
+    assert text.startswith("before\n<!-- study: friction -->\n| μ | z | h |")
     assert text.endswith("<!-- end -->\nafter\n")
     assert "\nold\n" not in text
     for claim in told:
-        assert claim["text"].replace("|", "\\|") in text and claim["why"] in text
+        assert claim["text"].replace("|", "\\|") in text
     documents.renew([path], table, told, found)
     assert page.read_text() == text
     page.write_text(blocks.format("everything"))
@@ -411,28 +419,17 @@ def test_tables_in_documents_are_renewed(table, tmp_path):
         documents.renew([path], table, told, found)
 
 
-def cells_of(text, mu):
-    """{head: cell} of the line of a table that begins with this friction."""
-    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()]
-    (line,) = [line for line in lines if line[0] == f"{mu:g}"]
-    return dict(zip(lines[0], line, strict=True))
-
-
-def test_a_column_of_fewer_packings_says_of_how_many(table):
-    line = cells_of(documents.measures(table), 0.3)
+def test_numbers_at_each_friction_are_of_packings_with_exact_intervals(table):
+    rows = csv_tables.by_friction(table).set_index(["quantity", "mu"])
     walk = statistics.grouped(table.part("walk"), "eta2")[0.3]
-    assert line["packings"] == "2"
-    error = walk.std(ddof=1) / np.sqrt(2)
-    mean, _, told = line["nearest-network walk η2"].partition(" ± ")
-    assert (float(mean), float(told)) == pytest.approx((walk.mean(), error), rel=0.06)
-    # The paper's walk is of the first one: its ratio is to the other walk in the same packing.
-    more = cells_of(documents.walks(table), 0.3)
-    phi = statistics.grouped(table.part("exact"), "packing_fraction")[0.3].mean()
-    assert more["φ"] == f"{phi:.4f}"
-    ratio = more["paper's walk/nearest-network walk η2 (n = 1)"]
-    assert line["paper's walk η2 (n = 1)"] == more["paper's walk η2 (n = 1)"]
+    told = rows.loc["η2, nearest-network walk", 0.3].to_list()
+    assert told == pytest.approx([walk.mean(), walk.std(ddof=1) / np.sqrt(2), 2])
+    # The paper's walk is of the first packing: its ratio is to the other walk in the same one.
     (swept,) = statistics.grouped(table.part("sweeps_1e-3"), "eta2")[0.3]
-    assert float(ratio.split()[0]) == pytest.approx(swept / walk[0], abs=2e-3)
+    ratio = rows.loc["η2, paper's walk over nearest-network walk", 0.3]
+    assert (ratio["mean"], ratio["packings"]) == pytest.approx((swept / walk[0], 1))
+    for quantity in documents._MEASURES.values():
+        assert quantity in rows.index
 
 
 def test_what_lies_outside_of_s_is_no_value_of_eta(table):
@@ -441,54 +438,35 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     assert 0 in groups.outside(table, "sweeps_1e-3")
     assert (table.part("sweeps_1e-3", "walk")["excess"] >= 0).all()
     assert groups.positive(table.part("walk"), "mu")["excess"].max() < 1e-8
-    line = cells_of(documents.measures(table), 0)
-    more = cells_of(documents.walks(table), 0)
-    assert set(more.values()) >= {"outside S"}
-    assert line["paper's walk η2 (n = 1)"] == "outside S"
+    rows = csv_tables.by_friction(table).set_index(["quantity", "mu"])
+    assert ("η2, paper's walk", 0) not in rows.index
+    assert rows.loc["excess over the exact intervals, paper's walk to 0.001, ⟨f_n⟩", 0]["mean"] > 0
     assert set(groups.drawn(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
 
 
-def test_sweeps_tell_how_far_outside_of_s_they_end(table):
-    text = documents.sweeps(table)
-    heads, _, first, *others = [line for line in text.splitlines() if line.startswith("| ")]
-    assert heads.startswith("| μ | sweeps to 10⁻³ | sweeps to 10⁻⁴ |")
-    assert heads.endswith("| excess, 10⁻³ | η2, 10⁻³ | η2, 10⁻⁴ | η2, 10⁻⁶ |")
-    assert first.startswith("| 0 | ") and "| all | outside S |" in first
-    assert all("outside" not in line for line in others)
+def test_sweeps_are_compared_by_the_residual_at_which_they_end(table):
+    heads, *lines = table_of(documents.sweeps(table))
+    words = ["10⁻³", "10⁻⁴", "10⁻⁶"]
+    assert heads == ["μ", *(f"sweeps to {word}" for word in words), *(f"η2, {w}" for w in words)]
+    (swept,) = statistics.grouped(table.part("sweeps_1e-4"), "mean_sweeps")[0.1]
+    assert lines[-1][:3:2] == ["0.1", f"{swept:.0f}" if swept >= 1000 else f"{swept:.3f}"]
     only = table.rows[~table.rows["part"].isin(("sweeps_1e-4", "sweeps_1e-6"))]
-    assert "| μ | sweeps to 10⁻³ | excess, 10⁻³ |" in documents.sweeps(table._replace(rows=only))
-    swept, exact = (table.part(part)[:1].assign(mu=0.1) for part in ("sweeps_1e-3", "exact"))
-    exact = exact.assign(mean_length=2.0)
-
-    def ends(part, excess, **more):
-        rows = [swept.assign(part=part, excess=excess, **more), exact]
-        return table._replace(rows=pd.concat(rows, ignore_index=True))
-
-    for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "1.1"), (1e-9, "< 0.001")):
-        *_, line = documents.sweeps(ends("sweeps_1e-4", excess)).splitlines()
-        assert told in line
-    part = ends("sweeps_1e-3", 0.5, skipped_part=0.0)
-    assert ", excess 0.25 |" in documents.walks(part)
+    assert "| μ | sweeps to 10⁻³ | η2, 10⁻³ |" in documents.sweeps(table._replace(rows=only))
 
 
 def test_what_packings_depend_on_is_told_by_paired_differences(table):
-    """A table for each number; the default's own mean first."""
-    text = documents.preparation(table)
-    assert text.startswith("**h**\n\n| options | μ = 0.1 |")
-    first = text.partition("**φ**")[0]
-    lines = {
-        line.split("|")[1].strip(): line.split("|")[2].strip() for line in first.splitlines()[4:-1]
-    }
-    assert len(lines) == 1 + len(plans.variations(0.1))
+    """The default's own mean first."""
+    rows = csv_tables.by_preparation(table)
+    rows = rows[rows["mu"] == 0.1].set_index(["quantity", "options"])
+    assert len(rows.loc["h"]) == 1 + len(plans.variations(0.1))
     some, usual = (
         statistics.grouped(table.part(part, n=20), "dimension")[0.1]
         for part in ("prepared_box_mass_30_exact", "exact")
     )
-    assert lines["default"] == formatting.with_error(usual)
-    apart = some - usual
-    sign = "+" if apart.mean() > 0 else ""
-    assert lines["box mass 30"].strip("*") == f"{sign}{formatting.with_error(apart)}"
-    assert "up to 2 pairs of packings" in text.splitlines()[-1]
+    assert rows.loc["h", "default"]["mean"] == usual.mean()
+    apart = rows.loc["h", "box mass 30"]
+    assert (apart["mean"], apart["packings"]) == ((some - usual).mean(), 2)
+    assert "up to 2 pairs of packings" in documents.preparation(table).splitlines()[-1]
 
 
 def test_differences_of_few_packings_are_judged_by_students_t():
@@ -505,12 +483,10 @@ def test_differences_of_few_packings_are_judged_by_students_t():
     ]
     rows += [row | {"part": row["part"].removesuffix("_exact")} for row in rows[3:]]
     text = documents.preparation(EMPTY._replace(plan={"n": 20}, rows=tables.make_rows(rows)))
-    cells = {
-        line.split("|")[1].strip(): line.split("|")[2].strip() for line in text.splitlines()[4:8]
-    }
+    cells = {line[0]: line[1] for line in table_of(text)}
     assert cells["default"] == "10.000" and cells["same"] == "+6.000"
-    assert cells["few"] == "+5.3 ± 1.5" and cells["far"] == "**+10.0100 ± 0.0058**"
-    assert "3 pairs" in text and "corrected for 12 differences" in text
+    assert cells["few"] == "+5.3(15)" and cells["far"] == "**+10.0100(58)**"
+    assert "up to 3 pairs" in text and "corrected for all 2 differences" in text
 
 
 def table_of(text):
@@ -530,7 +506,7 @@ def test_few_cases_are_listed_and_of_many_the_one_that_decides():
     many = [case(f"μ = {mu}", verdicts.REPRODUCED, 1 + mu) for mu in (0.1, 1, 3)]
     many += [case("μ = 10", verdicts.CONTRADICTED, 5.0)]
     assert documents.case_texts(many) == [
-        "✓ μ = 0.1, 1, 3: 4.00 (3.90 … 4.10) at 3",
+        "✓ μ = 0.1 … 3: 4.00 (3.90 … 4.10) at 3",
         "✗ μ = 10: 5.00 (4.90 … 5.10)",
     ]
 
@@ -541,12 +517,30 @@ def test_a_claim_says_by_whose_networks_and_in_which_preparations_it_was_judged(
     one |= {"by": {"exact": {"cases": [case("", verdicts.REPRODUCED, 0.5)]}}}
     usual = one | {"verdict": verdicts.REPRODUCED, "one_preparation": True}
     other = one | {"verdict": verdicts.DEPENDS, "one_preparation": False, "late": "contradicted"}
+    other["chosen"] = "after"
     first, second = table_of(documents.claim_table([usual, other]))[2:]
-    assert first[:2] == ["`a`<br>Fig. 4", "It falls.<br><small>b; exact</small>"]
-    assert first[2] == "small: ≤ 1<br>large: ≥ 2"
+    assert first[:2] == ["`a`<br>Fig. 4", "It falls.<br><small>b, exact intervals</small>"]
+    assert first[2] == "small: ≤ 1<br>large: ≥ 2" and second[2] == f"{first[2]} †"
     assert first[4] == "✓\u00a0reproduced<br><small>default preparation only</small>"
     assert second[4].endswith("<small>late drag: contradicted</small>")
-    assert table_of(documents.range_table([usual]))[2][2:] == ["so", "before"]
+    (told,) = csv_tables.by_claim([usual]).to_dict("records")
+    assert (told["why"], told["chosen"]) == ("so", "before")
+
+
+@pytest.mark.parametrize(
+    ("mean", "error", "told"),
+    [
+        (0.0473, 0.0025, "0.0473(25)"),
+        (221.7, 2.1, "221.7(21)"),
+        (294436.0, 223199.0, "294436(223199)"),
+        (-0.6, 1.1, "-0.6(11)"),
+        (9.4e-8, 4e-9, "9.40(40)·10⁻⁸"),
+        (7.0, 0.0, "7.000"),
+        (7.0, np.nan, "7.000"),
+    ],
+)
+def test_a_standard_error_is_given_in_units_of_the_last_digits(mean, error, told):
+    assert formatting.concise(mean, error) == told
 
 
 @pytest.mark.parametrize(

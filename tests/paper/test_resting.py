@@ -32,6 +32,6 @@ def test_a_line_for_each_imbalance_and_how_many_packings_it_has():
     ]
     heads = ["h, μ = 1", "h, μ = 10", "exact η3, μ = 1", "exact η3, μ = 10"]
     assert lines[0] == ["drag below, ⟨f_n⟩", "packings", *heads]
-    assert lines[1] == ["2·10⁻²", "2", "3.0 ± 1.0", "1.000", "0.75 ± 0.25", "0.250"]
-    assert lines[2] == ["2·10⁻⁶", "2", "", "4.0 ± 1.0", "", "1.00 ± 0.25"]
+    assert lines[1] == ["2·10⁻²", "2", "3.0(10)", "1.000", "0.75(25)", "0.250"]
+    assert lines[2] == ["2·10⁻⁶", "2", "", "4.0(10)", "", "1.00(25)"]
     assert not resting.resting(tables.StudyTable({"n": 400}, tables.make_rows([]), {}, [], {}, {}))
