@@ -28,8 +28,6 @@ DATA = next(  # inside an installed wheel, next to the package in a clone
     folder for folder in (HERE.parent / "data", HERE.parents[1] / "data") if folder.is_dir()
 )
 DRAWN = re.compile(r"\((?:\.\./)+data/(?:figures/|tables/)?(\w+\.(?:png|csv))\)")  # in the sources
-    r"\((?:\.\./)+data/(?:figures/|tables/)?(\w+\.(?:png|csv))\)"
-)  # as in the sources
 FORMULA = re.compile(r"\$\$(.+?)\$\$", re.S)  # LaTeX, shown as MathML
 SHOWN = re.compile(r"^## ([^\n]+)\n(.*?)(^```python\n(.*?)^```\n)", re.M | re.S)
 
