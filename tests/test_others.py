@@ -13,7 +13,7 @@ import pytest
 HOUSE = Path(__file__).parents[1] / "granforce"
 # Where it is used, what, and what it is for.
 NAMES = {
-    "study/scan.py": ("_processes", "workers are ended where the work is interrupted"),
+    "study/processes.py": ("_processes", "workers are ended where the work is interrupted"),
     "study/entries.py": ("zarr.core.metadata", "metadata of an array is written as Zarr does"),
     "numerics/lanes.py": ("numba.core", "LLVM's own functions are called for all lanes at once"),
     "system/compiled.py": ("numba.core", "a listener tells that kernels are compiled"),
@@ -76,7 +76,7 @@ def told(file):
 def test_a_pool_of_processes_knows_its_workers():
     with ProcessPoolExecutor(1) as pool:
         pool.submit(int).result()
-        assert [p.is_alive() for p in pool._processes.values()] == [True], told("study/scan.py")
+        assert [p.is_alive() for p in pool._processes.values()] == [True], told("study/processes.py")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Exact bounds, limit loads, outlines and volumes, of S and of its stresses, as datasets."""
 
 import json
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,6 +20,12 @@ from granforce.types import Floats, Integers
 UNDETERMINED = 1e-6
 
 
+def _dataset(result: Any, **arrays: Any) -> xr.Dataset:
+    """The stored fields of a result, and more arrays, with its counts."""
+    attrs = {"counts": json.dumps(result.counts)} if hasattr(result, "counts") else {}
+    return labelled(stored(result) | arrays, attrs)
+
+
 def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -> xr.Dataset:
     """Intervals as a dataset, with their measures and the clusters of undetermined contacts.
 
@@ -33,22 +40,19 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
         within = low[some], high[some]
         position[some] = measures.position_in_interval(original[some, 0], *within)
         correlation = measures.correlation(original[some, 0], measures.normal_extent(*within))
-    return labelled(
-        {
-            **stored(bounds),
-            "original": original,
-            "position": position,
-            "cluster": clusters_of(S, bounds),
-            "eta3": measures.eta3(low, high) if some.all() else np.nan,
-            "correlation": correlation,
-            **extension(S),
-            "coordination": S.coordination,
-            "packing_fraction": S.packing.packing_fraction,
-            "force_scale": S.force_scale,
-            **S.skipped,
-            "seconds": seconds,
-        },
-        {"counts": json.dumps(bounds.counts)},
+    return _dataset(
+        bounds,
+        seconds=seconds,
+        original=original,
+        position=position,
+        cluster=clusters_of(S, bounds),
+        eta3=measures.eta3(low, high) if some.all() else np.nan,
+        correlation=correlation,
+        **extension(S),
+        coordination=S.coordination,
+        packing_fraction=S.packing.packing_fraction,
+        force_scale=S.force_scale,
+        **S.skipped,
     )
 
 
@@ -71,69 +75,36 @@ def informative_dataset(
 
     The attribute twins lists, for each of them, contacts whose measurement gives the same.
     """
-    dataset = labelled(
-        {
-            **stored(informative),
-            **extension(S),
-            "force_scale": S.force_scale,
-            "seconds": seconds,
-        }
-    )
+    dataset = _dataset(informative, seconds=seconds, force_scale=S.force_scale, **extension(S))
     return dataset.assign_attrs(twins=json.dumps(informative.twins))
 
 
 def limit_loads_dataset(S: Ensemble, loads: LimitLoads, *, seconds: float = 0.0) -> xr.Dataset:
     """LimitLoads as a dataset."""
-    return labelled(
-        {
-            **stored(loads),
-            "original": S.original[S.positions(loads.contacts)],
-            "force_scale": S.force_scale,
-            "seconds": seconds,
-        },
-        {"counts": json.dumps(loads.counts)},
-    )
+    original = S.original[S.positions(loads.contacts)]
+    return _dataset(loads, seconds=seconds, force_scale=S.force_scale, original=original)
 
 
 def stress_dataset(S: Ensemble, outline: StressOutline, *, seconds: float = 0.0) -> xr.Dataset:
     """A StressOutline as a dataset."""
-    return labelled(
-        {
-            **stored(outline),
-            **extension(S),
-            "seconds": seconds,
-        },
-        {"counts": json.dumps(outline.counts)},
-    )
+    return _dataset(outline, seconds=seconds, **extension(S))
 
 
 def volume_dataset(S: Ensemble, volume: Volume) -> xr.Dataset:
     """A Volume as a dataset."""
-    return labelled(
-        {
-            **stored(volume),
-            "reached": volume.reached,
-            **extension(S),
-            "coordination": S.coordination,
-            "force_scale": S.force_scale,
-            **S.skipped,
-        },
-        {"counts": json.dumps(volume.counts)},
-    )
+    reduced = {"coordination": S.coordination, "force_scale": S.force_scale, **S.skipped}
+    return _dataset(volume, reached=volume.reached, **extension(S), **reduced)
 
 
 def outline_dataset(
     S: Ensemble, axes: Floats, outline: Outline, *, seconds: float = 0.0
 ) -> xr.Dataset:
     """An Outline in the plane of axes (2, N_c, 2) as a dataset."""
-    return labelled(
-        {
-            "backbone": S.index,
-            "axes": axes,
-            **stored(outline),
-            "programs": outline.counts["programs"],
-            "force_scale": S.force_scale,
-            "seconds": seconds,
-        },
-        {"counts": json.dumps(outline.counts)},
+    return _dataset(
+        outline,
+        seconds=seconds,
+        backbone=S.index,
+        axes=axes,
+        programs=outline.counts["programs"],
+        force_scale=S.force_scale,
     )

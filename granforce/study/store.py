@@ -10,12 +10,7 @@ from __future__ import annotations
 import errno
 import json
 import os
-import re
-import secrets
-import shutil
-import socket
 import stat
-import time
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -30,9 +25,9 @@ from granforce.records import InputError
 from granforce.study import entries, keys
 from granforce.study.keys import Parameters
 from granforce.system.files import ASIDE, expanded
+from granforce.system.temporaries import folder_bytes, is_stale, remove, temporary_name
 
 LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
-STALE_SECONDS = 3600.0  # the writer of a temporary untouched for this long is dead
 
 
 class NotKeptError(InputError):
@@ -173,7 +168,7 @@ def _create_root(path: Path) -> None:
         "node_type": "group",
         "attributes": {"granforce_store": keys.SCHEMA_VERSION},
     }
-    temporary = path / _temporary_name()
+    temporary = path / temporary_name()
     temporary.write_text(json.dumps(root, indent=2))
     os.replace(temporary, path / "zarr.json")
 
@@ -332,7 +327,7 @@ class Store(Mapping[str, xr.Dataset]):
 
     def _entry(self, name: str, attrs: Mapping[str, Any]) -> Entry:
         params = json.loads(attrs["parameters"])
-        size = _folder_bytes(self.path / name)
+        size = folder_bytes(self.path / name)
         return Entry(
             name=name,
             kind=attrs["kind"],
@@ -374,7 +369,7 @@ class Store(Mapping[str, xr.Dataset]):
 
     def size(self) -> int:
         """Bytes on disk, including temporaries of running writers."""
-        return _folder_bytes(self.path)
+        return folder_bytes(self.path)
 
     def clear(self, kind: str | None = None) -> int:
         """Remove all entries, or those of one kind, and return their number.
@@ -401,9 +396,9 @@ class Store(Mapping[str, xr.Dataset]):
         """
         with self._writing():
             aside = (*self.path.glob(".tmp-*"), *self.path.glob(ASIDE.format("*")))
-            stale = [item for item in aside if _is_stale(item)]
+            stale = [item for item in aside if is_stale(item)]
             for item in stale:
-                _remove(item)
+                remove(item)
         return len(stale)
 
     def verify(self, kind: str | None = None) -> list[Verdict]:
@@ -436,7 +431,7 @@ class Store(Mapping[str, xr.Dataset]):
         self, name: str, variables: Mapping[str, xr.Variable], attrs: Mapping[str, Any]
     ) -> None:
         """Write under a temporary name, then rename, so that no partial entry is ever visible."""
-        temporary = self.path / _temporary_name()
+        temporary = self.path / temporary_name()
         try:
             entries.write(temporary, variables, attrs)
             while True:
@@ -453,16 +448,16 @@ class Store(Mapping[str, xr.Dataset]):
                 if reason:
                     self._retire(name)
         finally:
-            _remove(temporary)
+            remove(temporary)
 
     def _retire(self, name: str) -> None:
         """Remove an entry: renamed first, so that it disappears at once."""
-        temporary = self.path / _temporary_name()
+        temporary = self.path / temporary_name()
         try:
             os.rename(self.path / name, temporary)
         except FileNotFoundError:
             return  # removed by another process
-        _remove(temporary)
+        remove(temporary)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -477,60 +472,3 @@ class Store(Mapping[str, xr.Dataset]):
                 f"cannot write to the store {self.path}: {reason}; "
                 f"give another folder or set {LOCATION_VARIABLE}"
             ) from error
-
-
-def _host() -> str:
-    return re.sub(r"\W", "_", socket.gethostname())
-
-
-def _temporary_name() -> str:
-    return f".tmp-{_host()}-{os.getpid()}-{secrets.token_hex(4)}"
-
-
-def _is_stale(temporary: Path) -> bool:
-    """Whether the writer is dead: known on this host, judged by age elsewhere."""
-    try:
-        age = time.time() - temporary.stat().st_mtime
-    except FileNotFoundError:
-        return False  # renamed or removed meanwhile
-    host, _, pid = temporary.name.removeprefix(".tmp-").rpartition("-")[0].rpartition("-")
-    local = host == _host() and pid.isdigit() and os.name == "posix"
-    return age > STALE_SECONDS or (local and not _is_alive(int(pid)))
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        pass  # it exists and belongs to someone else
-    return not _is_zombie(pid)
-
-
-def _is_zombie(pid: int) -> bool:
-    """Whether the process has ended but was not yet reaped by its parent (Linux)."""
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[:1] == ["Z"]
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
-def _folder_bytes(path: str | Path) -> int:
-    """Bytes of all files in a folder; files that disappear meanwhile count as 0."""
-    total = 0
-    for parent, _, files in os.walk(path):
-        for name in files:
-            try:
-                total += os.stat(os.path.join(parent, name)).st_size
-            except FileNotFoundError:
-                continue
-    return total
