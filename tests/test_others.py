@@ -76,7 +76,8 @@ def told(file):
 def test_a_pool_of_processes_knows_its_workers():
     with ProcessPoolExecutor(1) as pool:
         pool.submit(int).result()
-        assert [p.is_alive() for p in pool._processes.values()] == [True], told("study/processes.py")
+        alive = [process.is_alive() for process in pool._processes.values()]
+        assert alive == [True], told("study/processes.py")
 
 
 @pytest.mark.parametrize(
