@@ -12,7 +12,7 @@ from visitor import wait_for
 from app.explore import result_values
 from app.explore.result_values import between, short, with_error
 from app.explore.results_line import tables
-from app.packing import view
+from app.packing import legend
 from app.results.library import Library
 
 
@@ -52,7 +52,7 @@ def test_a_change_of_friction_alone_is_compared_until_the_next_change(state):
     assert f"μ {was:g} → 1, η₁ {short(seen['eta1'])} → {short(now['eta1'])}, " in line
     assert f"h {seen['dimension']} → {now['dimension']}" in line
     state.looks.colour = "extent"
-    assert f" at μ = {was:g})" in view.legend(state)
+    assert f" at μ = {was:g})" in legend.legend(state)
     state.ask(state.cell.selection._replace(states=5), at_once=True)
     wait_for(state)
     assert state.before is None and "→" not in tables(state, None, False)
@@ -103,14 +103,14 @@ def test_infinite_intervals_make_their_mean_infinite_and_are_drawn_as_the_longes
     assert result_values._mean_extent(possible) == "∞"
     assert with_error(np.nan, 0.1) == "–"
     exact = {"low": np.zeros(3), "high": high[:, 0]}
-    assert view.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
+    assert legend.normal_extent(None, exact).tolist() == [3.0, 3.0, 1.0]
 
 
 def test_an_empty_colour_scale_says_why():
     def end(dimension, most=0.0, full=None):
         shown, looks = SimpleNamespace(summary={"dimension": dimension}), SimpleNamespace(full=full)
         one = SimpleNamespace(shown=shown, looks=looks, drawn=None, free=None, before=None)
-        return view._full(one, most)
+        return legend._full(one, most)
 
     assert end(0) == "0: every force is determined"
     assert end(51) == "(being computed)"
