@@ -124,8 +124,8 @@ class Table(NamedTuple):
         """
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
-            values[row] = finite_number(text)
-            if np.isnan(values[row]) and text.lower() not in missing:
+            values[row] = value = finite_number(text)
+            if math.isnan(value) and text.lower() not in missing:
                 raise InputError(
                     f"{self.place(row)}: {column} is {_quoted(text)}, not a finite number; "
                     "repair or remove the row"
