@@ -59,6 +59,7 @@ def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
     assert np.mean(found.at_wall == right) > 0.85
     (note,) = found.report["notes"]
     assert f"{N} of {N} grains are flagged" in note and "\n" not in note
+    assert "--walls box or auto" in note and "annulus" not in note
     assert found.report["flags_ignored"] == N
     assert f"Warning: {N} disks are flagged" in " ".join(account(found.report))
     same(found, read(with_flag(grains, flag), rows, flag="ignore"))

@@ -44,7 +44,8 @@ def assert_same_contacts(one, other):
     count = len(one.r)
     pairs = [sorted((c.i * count + c.j).tolist()) for c in (one.contacts, other.contacts)]
     assert pairs[0] == pairs[1]
-    assert gf.ensemble(other).dimension == gf.ensemble(one).dimension
+    S, T = gf.ensemble(one), gf.ensemble(other)
+    assert T.dimension == S.dimension and T.force_scale == pytest.approx(S.force_scale)
 
 
 @pytest.mark.parametrize("name", [name for name, kind in SCENES.items() if not kind.packed][:-1])
