@@ -232,7 +232,7 @@ def from_store(kind: type, stored: xr.Dataset, *labels: str) -> Declared:
 
 
 def in_mean_forces(declared: Declared, scale: float) -> Declared:
-    """The same with all forces divided by ⟨f_n⟩, which is `scale`."""
+    """Variables with all forces divided by ⟨f_n⟩, which is `scale`."""
     return declared | {
         name: (field._replace(unit=field.unit.replace(FORCE, MEAN)), values / scale)
         for name, (field, values) in declared.items()

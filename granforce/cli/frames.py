@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, different, with_units
+from granforce.cli.results import PACKING_UNIT, Unit, check_outputs, distinct, with_units
 from granforce.cli.tables import write_csv
 from granforce.experiment.frames import frames_of
 from granforce.experiment.repair import KINDS
@@ -113,7 +113,7 @@ def _chosen(
     """The numbers of the requested frames; refusal(number): the error of one that is not there."""
     if text == "all":
         return list(available)
-    numbers = set(different("--frames", text, read_number, "all, or ") or [])
+    numbers = set(distinct("--frames", text, read_number, "all, or ") or [])
     for number in sorted(numbers - set(available)):
         if refusal is not None:
             raise refusal(number)

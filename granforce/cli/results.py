@@ -60,10 +60,10 @@ def numbers(
         ) from None
 
 
-def different(
+def distinct(
     option: str, text: str | None, cast: Callable[[str], Any], words: str = ""
 ) -> list[Any] | None:
-    """The same for a list of cases; InputError for one that is given twice."""
+    """The numbers of an option for a list of cases; InputError for one that is given twice."""
     found = numbers(option, text, cast, words)
     if repeated := [one for k, one in enumerate(found or []) if one in (found or [])[:k]]:
         raise InputError(f"{option} {repeated[0]} is given twice; give it once")
@@ -229,7 +229,7 @@ def stored_result(
     return StoredResult(study.entry_name(store, kind, parameters), parameters, dataset, cached)
 
 
-def telling_eta(bar: Any) -> Callable[[Any], None]:
+def eta_shown(bar: Any) -> Callable[[Any], None]:
     """watch(WalkState) of a walk, which shows η1 of all states so far next to the bar."""
     growth, lock = measures.Growth(), threading.Lock()
 
@@ -250,7 +250,7 @@ def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The known forces in the options, likewise."""
+    """The known forces in the options, as parameters of kinds."""
     given = getattr(arguments, "known", None)
     return {} if given is None else {"known": read_known(given)}
 
@@ -269,7 +269,7 @@ class Unit(NamedTuple):
         }
 
     def reported(self, forces: Mapping[str, Any]) -> dict[str, Any]:
-        """The same as plain numbers and lists."""
+        """Named forces as in `named`, as plain numbers and lists."""
         return {name: np.asarray(values).tolist() for name, values in self.named(forces).items()}
 
 
@@ -311,11 +311,11 @@ def extents(dataset: xr.Dataset) -> dict[str, float]:
     }
 
 
-def walked(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
+def walk_result(arguments: argparse.Namespace, output: str | None = None) -> StoredResult:
     """The walk of the options; output: a file that will be written."""
     return stored_result(
         *(arguments, kinds.WALK, output),
-        watching=telling_eta,
+        watching=eta_shown,
         states=arguments.states,
         seed=arguments.walk_seed,
         relax=RELAXATIONS[arguments.relax],

@@ -12,7 +12,7 @@ from granforce.cli import report_lines
 from granforce.cli.results import (
     StoredResult,
     conditions,
-    different,
+    distinct,
     extents,
     get_packing,
     known_forces,
@@ -45,7 +45,7 @@ def listed(dataset: xr.Dataset) -> dict[str, list[Any]]:
 
 def perturb(arguments: argparse.Namespace) -> None:
     """Compute or load critical forces and first motions of contacts, and report them."""
-    chosen = different("--contacts", arguments.contacts, integer)
+    chosen = distinct("--contacts", arguments.contacts, integer)
     result = stored_result(
         *(arguments, kinds.PERTURBATION, arguments.out),
         contacts=chosen,
@@ -80,7 +80,7 @@ def perturb(arguments: argparse.Namespace) -> None:
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> StoredResult:
     """Exact bounds or limit loads."""
-    contacts = different("--contacts", arguments.contacts, integer)
+    contacts = distinct("--contacts", arguments.contacts, integer)
     edges = numbers("--slice", arguments.slice, number)
     chosen = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
     return stored_result(arguments, kind, arguments.out, **chosen)

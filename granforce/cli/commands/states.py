@@ -10,12 +10,12 @@ from granforce.cli import report_lines
 from granforce.cli.results import (
     check_outputs,
     conditions,
-    different,
+    distinct,
     extents,
     packing_options,
     sample_notes,
     stored_result,
-    walked,
+    walk_result,
 )
 from granforce.cli.tables import of_contacts, write_csv, write_states, write_table
 from granforce.explore.random_walk import UNBOUNDED_WALK
@@ -37,7 +37,7 @@ DIGITS = 9
 
 def walk(arguments: argparse.Namespace) -> None:
     """Make or load a random walk, and report its course."""
-    result = walked(arguments, arguments.out)
+    result = walk_result(arguments, arguments.out)
     if np.isnan(result.dataset["eta1"].item()):
         print_notes([f"{UNBOUNDED_WALK}: η1, η2 and η3 are undefined"])
     write_states(arguments, result)
@@ -95,7 +95,7 @@ def volume(arguments: argparse.Namespace) -> int:
 
 def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or loaded."""
-    result = walked(arguments, arguments.out)
+    result = walk_result(arguments, arguments.out)
     if np.isnan(result.dataset["eta1"].item()):
         raise InputError(
             f"{UNBOUNDED_WALK}: nothing to measure; granforce intervals has its bounds"
@@ -114,7 +114,7 @@ def measure(arguments: argparse.Namespace) -> None:
 
 def scan(arguments: argparse.Namespace) -> int:
     """Compute cells by processes into a store; print their table. Returns 1 if a cell failed."""
-    mus = different("--mu", arguments.mu, number) or []
+    mus = distinct("--mu", arguments.mu, number) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     worker_count(arguments.workers, "--workers")
     to_table = arguments.out is not None and arguments.out.endswith(".csv")
