@@ -54,21 +54,7 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
     """
     if not paths:
         raise InputError("give a folder of frames, or their files")
-    files = []
-    for path in map(expanded, paths):
-        if path.is_dir():
-            files += sorted(one for one in path.rglob("*") if one.is_file())
-        else:
-            files.append(path)
-    solved = [one for one in files if one.suffix.lower() == ".mat" and "solved" in one.name.lower()]
-    if not solved and len(paths) == 1 and files and files[0].suffix.lower() == ".mat":
-        solved = files
-    if solved:
-        pairs = [(one, None) for one in solved]
-    elif len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
-        pairs = [tuple(files)]
-    else:
-        pairs = _paired(list(filter(_is_text, files)))
+    pairs = _file_pairs(*paths)
     if not pairs:
         raise InputError(
             f"{', '.join(map(str, paths))}: no frames; expected *_solved.mat, or text files with "
@@ -83,8 +69,8 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
                 raise
             warnings.warn(f"{error}: left out", InputWarning, stacklevel=2)
             continue
-        paths = str(one), None if two is None else str(two)
-        frames += [Frame(*paths, float(number)) for number in numbers]
+        files = str(one), None if two is None else str(two)
+        frames += [Frame(*files, float(number)) for number in numbers]
     if not frames:
         raise InputError(f"{pairs[0][0]} and all others contain no frame")
     frames.sort(key=lambda frame: frame.number)
@@ -92,6 +78,22 @@ def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> l
         if one.number == two.number:
             raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
     return frames
+
+
+def _file_pairs(*paths: str | Path) -> list[tuple[Path, Path | None]]:
+    """Pairs (positions, contacts) of files in folders or of files; (*_solved.mat, None)."""
+    files: list[Path] = []
+    for path in map(expanded, paths):
+        folder = sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else []
+        files += folder if path.is_dir() else [path]
+    solved = [one for one in files if one.suffix.lower() == ".mat" and "solved" in one.name.lower()]
+    if not solved and len(paths) == 1 and files and files[0].suffix.lower() == ".mat":
+        solved = files
+    if solved:
+        return [(one, None) for one in solved]
+    if len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
+        return [(files[0], files[1])]
+    return list(_paired(list(filter(_is_text, files))))
 
 
 def _is_text(path: Path) -> bool:
@@ -130,6 +132,6 @@ def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
             for key in sorted(set(by_number[0]) ^ set(by_number[1]), key=int):
                 found = by_number[key not in by_number[0]][key]
                 note = f"{found}: no file has the other half of frame {key}: left out"
-                warnings.warn(note, InputWarning, stacklevel=3)
+                warnings.warn(note, InputWarning, stacklevel=4)
             return [(by_number[0][key], by_number[1][key]) for key in both]
     return []
