@@ -7,14 +7,12 @@ at its μ, so that its error has no part of the trend with μ; for other numbers
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from granforce.measures import statistics
-from granforce.paper import tails
 from granforce.paper.claims.contacts import relative_extents
 from granforce.paper.claims.groups import (
     RANGES,
@@ -92,7 +90,7 @@ def measure(table: StudyTable) -> Iterator[Finding]:
 def correlations(table: StudyTable) -> Iterator[Finding]:
     """Whether strong contacts have long intervals: in absolute terms, and relative to f_n."""
     lengths = items(drawn(table, "exact"), "correlation")
-    _, ranks = relative_extents(table, "exact")
+    ranks = relative_extents(table, "exact", statistics.rank_correlation)
     for id, groups, statement in (
         ("extent-correlation", lengths, "correlation of f_n with the exact ΔF_n"),
         ("relative-correlation", ranks, "rank correlation of f_n with the exact ΔF_n/f_n"),
@@ -180,7 +178,7 @@ def shear(table: StudyTable) -> Iterator[Finding]:
 
 
 def volume(table: StudyTable) -> Iterator[Finding]:
-    """The width of S, and whether ln V per grain depends on N; it is not comparable between μ."""
+    """The width of S; ln V is not comparable between μ."""
     rows = table.part("volume")
     groups = statistics.grouped(rows, "extent")
     if len(groups) > 2:
@@ -198,46 +196,6 @@ def volume(table: StudyTable) -> Iterator[Finding]:
             lambda some: statistics.rank_correlation(*np.transpose(some)),
             [pairs],
         )
-    for mu in sorted(table.part("volume_size")["mu"].unique()):
-        sized = table.part("volume", "volume_size")
-        sized = sized[sized["mu"] == mu]
-        largest = sized["n"].max()
-        large, small = (
-            sized["log_volume_per_grain"][(sized["n"] == largest) == last].to_numpy()
-            for last in (True, False)
-        )
-        if min(len(large), len(small)) > 1:
-            statement = (
-                f"ln V per grain of {largest} disks minus that of smaller packings, μ = {mu:g}"
-            )
-            interval = statistics.difference_interval(large, small)
-            yield _measured(f"volume-size-{mu:g}", statement, interval)
-
-
-def forces(table: StudyTable) -> Iterator[Finding]:
-    """The decay of P(f_n) of uniform states, compared with an exponential and a Gaussian."""
-    for word, known in tails.counts(table).items():
-        for mu, packings in known.items():
-            tail = tails.fitted(packings)
-            if tail is None:
-                continue
-            case = f"{word}, μ = {mu:g}, f = {tail.low:g} … {tail.high:g} ⟨f_n⟩"
-            for name, what in (
-                ("power", "b of exp(−(λ f)^b) for uniform P(f_n > f)"),
-                (
-                    "off_exponential",
-                    "rms deviation of ln of uniform P(f_n > f) from an exponential",
-                ),
-                ("off_gaussian", "rms deviation of ln of uniform P(f_n > f) from a Gaussian"),
-            ):
-                statement = f"{what}, {case}"
-                number = partial(_part, name=name)
-                yield _finding(f"tail-{name}", statement, number, [packings])
-
-
-def _part(packings: Any, name: str) -> float:
-    """One number of the tail of some packings, or NaN."""
-    return getattr(tails.fitted(packings), name, np.nan)
 
 
 # Topic, which takes the place of a source, → its findings.
@@ -248,7 +206,6 @@ TOPICS = {
     "Local perturbation": (strength,),
     "Shear stress": (shear,),
     "Volume of S": (volume,),
-    "Forces in uniform networks": (forces,),
 }
 
 

@@ -159,23 +159,11 @@ def _critical(of: _Numbers) -> Highlight:
         raise KeyError("part-of-load")
     return Highlight(
         "At intermediate friction, a packing moves before the push reaches its limit load: the "
-        f"mean critical force is {_quoted(middle)} of the mean limit load at intermediate μ "
-        f"({_from_to(of)}); at small μ, it is {_quoted(small)}, and at large μ {_quoted(large)} "
-        f"{PREPARED}.{_error(of)}",
+        f"mean critical force is {_quoted(middle)} of the mean limit load at intermediate μ, "
+        f"{_quoted(small)} at small μ, and {_quoted(large)} at large μ {PREPARED}.{_error(of)}",
         "figure2_limit",
         "local-perturbation",
     )
-
-
-def _from_to(of: _Numbers) -> str:
-    """F_crit over the limit load at both ends of intermediate μ."""
-    forces, loads = (
-        statistics.grouped(of.table.part("response"), name)
-        for name in ("critical_force", "limit_load")
-    )
-    ends = [mu for mu in sorted(forces) if MIDDLE[0] <= mu <= MIDDLE[1]]
-    ratios = [f"{forces[mu].mean() / loads[mu].mean():.2f} at {mu:g}" for mu in (ends[0], ends[-1])]
-    return " to ".join(ratios)
 
 
 def _error(of: _Numbers) -> str:

@@ -442,11 +442,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
     if "shown_row" in dataset:
         for k in np.unique(dataset["shown_row"]).tolist():
             chosen = dataset["shown_row"].values == k
-            if "shown_count" in dataset:
-                shown.append((k, dataset["shown_count"].values[chosen]))
-            else:  # as in former tables: some states
-                original = samples["normal"][samples["row"] == k].to_numpy()
-                shown.append((k, ratio_counts(original, dataset["shown_normal"].values[:, chosen])))
+            shown.append((k, dataset["shown_count"].values[chosen]))
             packings[k] = _packing(store, rows.loc[k])
     tails = {}
     if "tail_row" in dataset:

@@ -82,7 +82,6 @@ _TABLES = {
     "sample_least": Field("sample", MEAN, "least f_n"),
     "sample_extent": Field("sample", MEAN, "ΔF_n"),
     "shown_row": whole("shown", "row that the shown contact belongs to"),
-    "shown_normal": Field("shown_state shown", MEAN, "f_n in some states"),
     "shown_count": whole("shown ratio", "states of the walk by f_n over its original value"),
 }
 

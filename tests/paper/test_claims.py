@@ -453,8 +453,6 @@ def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
     assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
     row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
     table = study([row], tails={0: counted.astype(float)})
-    texts = [finding.statement for finding in findings.forces(table)]
-    assert len(texts) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in texts)
     assert tails.described(table).startswith("whole stress prescribed, μ = 0.1: b = ")
 
 
@@ -470,4 +468,3 @@ def test_volumes_tell_where_they_are_largest_and_what_they_follow():
     ours = {finding.id: finding.value for finding in findings.volume(table)}
     assert 0.03 < ours["volume-peak"] < 0.5
     assert ours["volume-rank"] > 0.6
-    assert not any("volume-size" in name for name in ours)  # not comparable between μ

@@ -35,29 +35,29 @@ PERMUTATIONS = 40
 
 def relative_turns(table: StudyTable, sampler: str) -> Iterator[Case]:
     """The rise and fall of the median ΔF_n/F_orig."""
-    yield from turning("", relative_extents(table, sampler)[0])
+    medians = relative_extents(table, sampler, lambda normal, ratio: float(np.median(ratio)))
+    yield from turning("", medians)
 
 
 def relative_weak(table: StudyTable, sampler: str) -> Iterator[Case]:
     """Rank correlation of ΔF_n/F_orig with F_orig."""
-    ranks = relative_extents(table, sampler)[1]
+    ranks = relative_extents(table, sampler, statistics.rank_correlation)
     yield from at_each(within(ranks, (LEAST_DYNAMIC, np.inf)))
 
 
-def relative_extents(table: StudyTable, sampler: str) -> tuple[Groups, Groups]:
-    """Median ΔF_n/F_orig over contacts, and its rank correlation with F_orig, by μ > 0."""
-    both = positive_friction(over_contacts(table, sampler, _relative))
-    return each(both, lambda pair: pair[0]), each(both, lambda pair: pair[1])
+def relative_extents(
+    table: StudyTable, sampler: str, measure: Callable[[Floats, Floats], float]
+) -> Groups:
+    """measure(F_orig, ΔF_n/F_orig) over contacts, by μ > 0, of packings with indeterminacy."""
 
+    def measured(contacts: pd.DataFrame) -> float:
+        normal, extent = contacts["normal"].to_numpy(), contacts["extent"].to_numpy()
+        carrying = normal > DETERMINED
+        if carrying.sum() < 3 or not free(contacts):
+            return np.nan
+        return measure(normal[carrying], extent[carrying] / normal[carrying])
 
-def _relative(contacts: pd.DataFrame) -> tuple[float, float]:
-    """Median ΔF_n/F_orig, and its rank correlation with F_orig; NaN without indeterminacy."""
-    carrying = contacts[contacts["normal"] > DETERMINED]
-    if len(carrying) < 3 or not free(contacts):
-        return np.nan, np.nan
-    normal = carrying["normal"].to_numpy()
-    ratio = carrying["extent"].to_numpy() / normal
-    return float(np.median(ratio)), statistics.rank_correlation(normal, ratio)
+    return positive_friction(over_contacts(table, sampler, measured))
 
 
 def shape(table: StudyTable, sampler: str) -> Iterator[Case]:
