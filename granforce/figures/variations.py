@@ -60,6 +60,29 @@ def sizes(rows: Table, *, exact: Table = (), backend: str = "bokeh") -> hv.Layou
     return style.page(frames, backend, columns=2)
 
 
+def resting(rows: Table, *, backend: str = "bokeh") -> hv.Layout:
+    """h and exact η3 against the imbalance of forces below which drag acts, a line for each μ.
+
+    rows: dicts with drag_below, mu, dimension and eta3.
+    """
+    style.ready(backend)
+    table, frames = pd.DataFrame(rows), []
+    for name, label, legend in (("dimension", "h", None), ("eta3", "exact η3", "right")):
+        series = [
+            (
+                statistics.means(group, name, "drag_below"),
+                f"μ = {mu:g}",
+                style.COLOURS[k],
+                "solid",
+                k,
+            )
+            for k, (mu, group) in enumerate(table.groupby("mu"))
+        ]
+        words: dict[str, Any] = {"title": label, "x": "drag below, ⟨f_n⟩", "y": label}
+        frames.append(style.graph(series, backend, **words, logx=True, legend=legend))
+    return style.page(frames, backend, columns=2)
+
+
 def opened(rows: Table, packed: Table, *, backend: str = "bokeh") -> hv.Layout:
     """η2 and 0.15 η3 of frictionless packings whose cones are opened to μ.
 

@@ -11,6 +11,7 @@ from granforce import figures
 from granforce.measures import statistics
 from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn, outside, positive
+from granforce.paper.resting import resting_rows
 from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder
 from granforce.types import Floats, Progress
@@ -62,6 +63,8 @@ CAPTIONS = {
     "largest ΔF_n ({walk}). Grey: all contacts.",
     "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the nearest-network walk, and 0.15 η3 of the "
     f"exact intervals (dashed), against the number N of disks; {POINTS}.",
+    "resting": "Dimension h and exact η3 of packings of 100 disks against the imbalance of forces "
+    f"below which drag replaces inertia; {POINTS}.",
     "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
     f"of packings made with μ; {POINTS}.",
     "frozen": "Fraction of contacts without a unique force, and number of their clusters, where "
@@ -218,6 +221,8 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
         drawings["sizes"] = _later(
             figures.sizes, _with_sizes(table), exact=table.part("size_exact", "exact")
         )
+    if len(resting_rows(table)):
+        drawings["resting"] = _later(figures.resting, resting_rows(table))
     if len(table.part("opened")):
         drawings["opened"] = _later(figures.opened, table.part("opened"), walk)
     if len(table.part("frozen")):

@@ -1,7 +1,7 @@
 """h at large friction by the imbalance at which drag sets in."""
 
 from granforce.paper import plan as plans
-from granforce.paper import resting, tables
+from granforce.paper import drawings, resting, tables
 
 
 def test_packings_differ_only_in_when_drag_sets_in():
@@ -24,7 +24,11 @@ def test_a_line_for_each_imbalance_and_how_many_packings_it_has():
         )
         for seed, h in enumerate(dimensions)
     ]
-    text = resting.resting(tables.StudyTable({"n": 400}, tables.make_rows(rows), {}, [], {}, {}))
+    table = tables.StudyTable({"n": 400}, tables.make_rows(rows), tables.no_samples(), [], {}, {})
+    drawn = drawings.all_figures(table)["resting"](backend="bokeh")
+    labels = [{element.label for element in frame} - {""} for frame in drawn]
+    assert labels == 2 * [{"μ = 1", "μ = 10"}]
+    text = resting.resting(table)
     lines = [
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in text.splitlines()
