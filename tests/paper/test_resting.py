@@ -1,7 +1,7 @@
 """h at large friction by the imbalance at which drag sets in."""
 
-from granforce.paper import plan as plans
 from granforce.paper import drawings, resting, tables
+from granforce.paper import plan as plans
 
 
 def test_packings_differ_only_in_when_drag_sets_in():

@@ -286,7 +286,8 @@ CLAIMS = (
     Claim(
         "patterns",
         5,
-        "At μ = 10, these two kinds of contacts form seemingly different patterns.",
+        "At μ = 10, contacts with f_n > 2⟨f_n⟩ and those with ΔF_n > ⟨ΔF_n⟩ form seemingly "
+        "different patterns.",
         "share of the former among the latter, on a scale from 0 (as of all contacts) to 1",
         _at_most(0.5),
         "Closer to unrelated patterns than to the same one.",
