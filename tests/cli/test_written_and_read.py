@@ -115,8 +115,9 @@ READ = {
         "import lammps export-grains.dump {} --mu 0.3",
     ),
 }
-# Arguments for files that no command writes.
+# Arguments for files that no command writes, or that a server opens.
 OTHERS = {
+    ("app", "packing"),
     *((f"import {name}", "grains") for name in ("table", "blocks", "pegs")),
     *((f"import {name}", "contacts") for name in ("table", "pegs")),
 }
