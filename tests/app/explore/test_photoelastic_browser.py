@@ -42,7 +42,7 @@ def head(page, number):
 @pytest.mark.parametrize(
     "width", [390, *(pytest.param(wide, marks=pytest.mark.slow) for wide in (1280, 1440, 1920))]
 )
-def test_pictures_are_seen_and_saved(visit, tmp_path, width):
+def test_pictures_are_seen_and_saved_and_the_frame_is_opened(visit, tmp_path, width):
     page = visit("?scene=many&tab=upload", width, 900)
     dropped(page, tmp_path, (1,))
     for name, count in (("Both", 2), ("Difference in σ", 1), ("Measured", 1), ("Inferred", 1)):
@@ -63,6 +63,10 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     download.value.save_as(path)
     assert path.name == "frame1.svg" and path.stat().st_size > 20_000
     assert "unit of the file" in path.read_text() and "⟨mₙ⟩" in path.read_text()
+    page.get_by_role("button", name="Open as a packing").click()
+    page.get_by_text("coordination z").wait_for()
+    until(page, "scene.geometry.grain && new Set(scene.geometry.grain).size === 40")
+    assert scene(page, "scene.painted") > 0
 
 
 def test_a_series_is_played_to_frames_that_are_inferred_on_the_way(visit, tmp_path):
@@ -74,12 +78,3 @@ def test_a_series_is_played_to_frames_that_are_inferred_on_the_way(visit, tmp_pa
     for number in (1, 2, 3):  # round and round
         head(page, number).wait_for()
     player.locator("button.pause").click()
-
-
-def test_a_frame_is_opened_and_pulled_like_any_packing(visit, tmp_path):
-    page = visit("?scene=many&tab=upload", 1440, 900)
-    dropped(page, tmp_path, (1,))
-    page.get_by_role("button", name="Open as a packing").click()
-    page.get_by_text("coordination z").wait_for()
-    until(page, "scene.geometry.grain && new Set(scene.geometry.grain).size === 40")
-    assert scene(page, "scene.painted") > 0
