@@ -1,19 +1,23 @@
-"""A name means one thing in the store, in records, in tables and in reports."""
+"""A name means one thing in the store, in records and in reports, which are made from the store."""
 
 import importlib
 import inspect
 import pkgutil
+from argparse import Namespace
 
 import pytest
 
 import granforce
 from granforce.cli.command_table import COMMANDS, FORMATS
 from granforce.cli.report_lines import line
+from granforce.cli.results import StoredResult
 from granforce.fields import fields
 from granforce.quantities import QUANTITIES
 from granforce.study import kinds
 from granforce.study.evolution import SCALARS
 from granforce.study.relaxations import RELAXATIONS
+from granforce.study.responses import unsteady
+from granforce.study.schema import labelled
 
 pytestmark = pytest.mark.fast
 
@@ -75,3 +79,19 @@ def test_relaxations_have_one_name_where_people_read_them():
     assert set(RELAXATIONS.values()) == kinds.RELAXATIONS.keys()
     for typed, stored in RELAXATIONS.items():
         assert kinds.typed({"relax": stored})["relax"] == typed
+
+
+def test_directions_taken_as_pinned_are_reported_where_there_are_any():
+    names = ("dimension", "directions_taken_as_pinned", "as_narrower_than", "cached")
+    for flat, expected in ((0, [4, True]), (2, [4, 2, 1e-9, True])):
+        extent = {"dimension": 4, "flat_directions": flat, "resolution": 1e-9}
+        result = StoredResult("walk-0", {}, labelled(extent), cached=True)
+        lines = result.report(names, Namespace(json=False, unit="packing"))
+        assert list(lines.values()) == expected
+
+
+def test_contacts_without_steady_motion_are_named():
+    loads = {"critical_high": [1, 1, 2], "limit_load": [2, 2, 2], "motion_breach": [0, 1, 1]}
+    dataset = labelled({"backbone": [3, 5, 8], **loads})
+    assert unsteady(dataset).startswith("contact 5: the motion under the smallest load")
+    assert unsteady(dataset.isel(contact=[0, 2])) == ""  # the last one reached its limit load
