@@ -4,6 +4,7 @@ import ast
 import doctest
 import importlib
 import inspect
+import json
 import re
 import subprocess
 import sys
@@ -102,6 +103,12 @@ def test_the_site_builds_without_a_warning(tmp_path):
     for code in sections:
         assert len([line for line in code.splitlines() if line]) <= 10, code
     assert (site / "accuracy.html").read_text().count("<table>") >= 4
+    # A search for these words leads to the sections that define them.
+    found = json.loads((site / "search" / "search_index.json").read_text())
+    boosts = {page["title"]: page.get("boost", 1) for page in found["docs"]}
+    assert "stemmer" not in found["config"]["pipeline"] and boosts["Install"] > 1
+    for word in ("critical force, F_crit", "indeterminacy by intervals, η3"):
+        assert boosts[word] == max(boosts.values())
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path, capsys):

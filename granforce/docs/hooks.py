@@ -38,6 +38,9 @@ mtd[columnalign="left"] { text-align: left }
 mtd[columnalign="right"] { text-align: right }
 """
 
+# Pages whose sections the search lists before others: definitions, and how to install.
+FOUND_FIRST = {"reference/symbols.md": 10, "index.md": 3}
+
 FIRST = ("pack", "ensemble", "intervals", "walk", "sample_uniform", "plot")
 
 
@@ -63,6 +66,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Link figures to their place on the site, and show those of the gallery."""
+    if page.file.src_uri in FOUND_FIRST:
+        page.meta["search"] = {"boost": FOUND_FIRST[page.file.src_uri]}
     up = "../" * page.url.count("/")
     markdown = DRAWN.sub(rf"({up}figures/\1)", markdown)
     markdown = FORMULA.sub(formula, markdown)
