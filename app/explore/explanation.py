@@ -62,8 +62,8 @@ def rest(replay: Replay) -> str:
             f"But {summary['contacts']} contacts carry {forces} unknown force components, a "
             f"{term('fn')} and a {term('ft')} each: <b>h = {free}</b> numbers are left free "
             f"({term('h')}). That the forces are not determined by balance is called force "
-            f"indeterminacy. {term('s')} is the set of networks in which no contact pulls (fₙ ≥ "
-            "0) and none slips (|fₜ| ≤ μ fₙ)."
+            f"indeterminacy. {term('s', 'S')} is the set of networks in which no contact pulls (fₙ "
+            "≥ 0) and none slips (|fₜ| ≤ μ fₙ)."
         )
     text = (
         f"<p><b>Why not just one?</b> {why}</p><p><b>How undetermined?</b> {term('eta1')}: how "

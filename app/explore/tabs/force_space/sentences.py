@@ -18,7 +18,7 @@ CROWDED = ": to move far out, many forces have to change together, which is unli
 HEADING = "<b>Every network, and the one on screen.</b> "
 HELP = (
     "Click a line in the packing to make it the green one. The plot shows the shadow "
-    f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: "
+    f"({term('principal', 'projection')}) that {term('s', 'S')} casts on a plane, not a section: "
     f"all of S lies inside the shaded {term('outline')}."
 )
 COMPUTED = (
