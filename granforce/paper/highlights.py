@@ -87,7 +87,7 @@ def _maximum(of: _Numbers) -> Highlight:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
         f"Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
-        f"than others ({LONGEST_SETTLED:g}); with {LONGEST:g} throughout, this maximum would be at "
+        f"than others ({LONGEST_SETTLED:g}). With {LONGEST:g} throughout, this maximum would be at "
         "larger μ ([limits](#limits))."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
@@ -128,7 +128,7 @@ def _coverage(of: _Numbers) -> Highlight:
         "samplers",
         "exact-intervals",
         "The paper says that η3 does not depend on the sampling provided that this explores the "
-        "solution set; so many networks do not.",
+        "solution set. These networks do not.",
     )
 
 
