@@ -115,7 +115,7 @@ class Controls:
         observe(self._command, state, "selection", "missing", "replay", "knowledge.known")
         self._command()
         observe(self._refused, self.work, "message")
-        observe(self._rest, self.work, "computation.running")
+        observe(self._offer_computation, self.work, "computation.running")
 
     # From the widgets
 
@@ -184,13 +184,14 @@ class Controls:
         self.relax.visible = selection.kind == "walk"
         self.series.param.update(**offered(state))
         self._following = False
-        self._rest()
+        self._offer_computation()
 
     def _command(self, *events: Any) -> None:
         if self.state.selection is not None:
             self.command.text = self.state.command
 
-    def _rest(self, *events: Any) -> None:
+    def _offer_computation(self, *events: Any) -> None:
+        """Show the button if the selection is missing, and neither under way nor just failed."""
         state = self.state
         task = self.work.computation
         self.go.visible = state.missing and not task.running and not task.message

@@ -52,6 +52,7 @@ def palettes(dark: bool) -> dict[str, Any]:
     """Colours of the packing: of the chains by the quantity shown, and of everything else."""
     diverging = ramp(BLUE, GREY, ORANGE)
     body, line = ((150, 172, 200), 0.5) if dark else ((139, 160, 187), 0.75)
+    # Of carrying disks, loose ones, and the periodic images of both.
     fills = (0.34, 0.12, 0.16, 0.06) if dark else (0.42, 0.14, 0.2, 0.07)
     disks = [
         {"fill": _faded(body, part), "line": _faded(body, line * part / 0.42)} for part in fills

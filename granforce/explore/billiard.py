@@ -161,8 +161,9 @@ def fly(rows, speeds, times, middles, flight, limit, out, stop):
     walls are met at times in closed form (Pakman, Paninski, arXiv:1208.4118).
 
     A path with more than `limit` reflections is rejected, which is as likely as for its reverse.
-    out (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing.
-    Ends early, with invalid states, once stop[0] is set.
+    out (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing:
+    called again with the same arguments and that row, it goes on from there. Ends early, with
+    invalid states, once stop[0] is set.
     """
     s, w, count, harmonic = flight.s, flight.w, flight.count, len(middles) > 0
     while count[_PATH] < len(times):
@@ -171,6 +172,7 @@ def fly(rows, speeds, times, middles, flight, limit, out, stop):
         if not count[_FLYING]:
             flight.start[:], w[:], flight.left[0] = s, speeds[path], times[path]
             count[_HITS], count[_FLYING] = 0, 1
+            # No motion, of any row: only the first wall is found.
             _onward(flight, middle, harmonic, rows.values[0], 0.0, 0.0)
         while count[_NEXT] >= 0 and count[_HITS] < limit and not stop[0]:
             wall, time = count[_NEXT], 1.0 / flight.left[1]

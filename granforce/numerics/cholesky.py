@@ -50,6 +50,8 @@ def factor(network, least, factors, stop, lanes):
     matrix half factored, once stop[0] is set.
     """
     layout, L, sides, corner = network.layout, factors.lower, factors.sides, factors.corner
+    # start[k] is the first block of column k, panel[p] the first column of panel p, and `number`
+    # counts the pairs of blocks that earlier panels have subtracted.
     start, panel = layout.start, layout.panel
     m, rows = network.border.shape[1] // 2, 3 * (len(start) - 1)
     number = 0

@@ -126,30 +126,30 @@ def look(problem, loads, at, work, lanes):
 @compiled
 def advance(problem, loads, mode, at, work, lanes):
     """One step of the programs that are `going`, after `look`; modes as listed above."""
-    pairs = len(at.y) if loads else len(at.y) - 1
+    count = len(at.y) if loads else len(at.y) - 1
     _stiffen(problem, mode, at, work, lanes)
     if mode == BALANCE:
         clear(work.h, lanes)
     if mode == CENTRE:
         clear(work.turn, lanes)
         store(work.target, 0, lanes, 1.0)
-        _aim(problem, pairs, at, work, lanes)
+        _aim(problem, count, at, work, lanes)
     _factor(problem, mode, at, work, lanes)
     optimum = mode == OPTIMUM or mode == REFINED
     for attempt in range(2 if optimum else 1):
         if attempt == 1:
-            _predict(pairs, at, work, lanes)
-            _aim(problem, pairs, at, work, lanes)
+            _predict(count, at, work, lanes)
+            _aim(problem, count, at, work, lanes)
         _towards(problem, mode, at, work, lanes)
     if mode == REFINED:
         _refine(problem, at, work, lanes)
     primal = dual = load(work.going, 0, lanes)
     if optimum or mode == CENTRE:
-        _measure(pairs, _INSIDE if optimum else _CENTRING, at, work, lanes)
+        _measure(count, _INSIDE if optimum else _CENTRING, at, work, lanes)
         primal, dual = load(work.primal, 0, lanes), load(work.dual, 0, lanes)
-        _move(at.z, work.dz, dual, pairs, lanes)
+        _move(at.z, work.dz, dual, count, lanes)
     if mode != PROJECTED:
-        _move(at.y, work.dy, primal, pairs, lanes)
+        _move(at.y, work.dy, primal, count, lanes)
     if mode != BALANCE:
         _move(at.v, work.dv, dual, len(at.v), lanes)
         _move(at.v_border, work.dv_border, dual, len(at.v_border), lanes)
@@ -323,11 +323,11 @@ def _step_beside(problem, a, mode, at, work, lanes):
 
 
 @within
-def _predict(pairs, at, work, lanes):
+def _predict(count, at, work, lanes):
     """Longest step towards τ = 0, the τ that follows from it, and δy δz."""
     primal = dual = same(lanes, 1.0)
     z_dy = y_dz = both = same(lanes, 0.0)
-    for k in range(pairs):
+    for k in range(count):
         y, z, dy = load(at.y, k, lanes), load(at.z, k, lanes), load(work.dy, k, lanes)
         ratio = dy / y
         dz = fma(-z, ratio, -z)
@@ -340,15 +340,15 @@ def _predict(pairs, at, work, lanes):
     left = product + z_dy / primal + (y_dz + both / primal) / dual
     ratio = left / product
     # The further the predictor gets, the smaller the next τ.
-    target = ratio * ratio * ratio * product / (1.0 * pairs)
+    target = ratio * ratio * ratio * product / (1.0 * count)
     store(work.target, 0, lanes, target)
 
 
 @within
-def _aim(problem, pairs, at, work, lanes):
+def _aim(problem, count, at, work, lanes):
     """h ← h + (τ − turn)/y − Tᵀ Eᵀ (τ − turn)/s: the corrector."""
     target = load(work.target, 0, lanes)
-    for k in range(pairs):
+    for k in range(count):
         extra = (target - load(work.turn, k, lanes)) / load(at.y, k, lanes)
         store(work.h, k, lanes, load(work.h, k, lanes) + extra)
     for a in range(len(problem.side)):
@@ -358,11 +358,11 @@ def _aim(problem, pairs, at, work, lanes):
 
 
 @within
-def _measure(pairs, inside, at, work, lanes):
+def _measure(count, inside, at, work, lanes):
     """Step lengths, at most the fraction `inside` of the way to the nearest wall, and δz."""
     primal = dual = same(lanes, inside)
     target = load(work.target, 0, lanes)
-    for k in range(pairs):
+    for k in range(count):
         y, z, dy = load(at.y, k, lanes), load(at.z, k, lanes), load(work.dy, k, lanes)
         ratio = dy / y
         dz = fma(-z, ratio, (target - load(work.turn, k, lanes)) / y - z)

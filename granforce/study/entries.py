@@ -329,7 +329,11 @@ def _checked(folder: Path) -> Look[xr.Dataset]:
 
 
 def _is_sealed(metadata: _Metadata) -> bool:
-    """Whether metadata are as written; those of older entries have no checksum."""
+    """Whether metadata are as written.
+
+    Older entries have neither a checksum nor consolidated metadata: with the latter alone, an entry
+    has lost its checksum.
+    """
     (group, arrays), attrs = metadata, metadata.group["attributes"]
     if "metadata_checksum" not in attrs:
         return "consolidated_metadata" not in group

@@ -184,7 +184,7 @@ def _of_contacts(numbers: Floats) -> list[Sequence[str]]:
 
 
 def _of_grains(numbers: Floats) -> list[Sequence[str]]:
-    """Possible names of columns of grains."""
+    """Possible names of columns of grains, the most likely first."""
     width = numbers.shape[1]
     if width == 3:
         return [GRAINS[2:5]]
@@ -198,7 +198,7 @@ def _of_grains(numbers: Floats) -> list[Sequence[str]]:
 
 
 def _of_four(numbers: Floats) -> list[Sequence[str]]:
-    """x, y, radius, flag, or id, x, y, radius."""
+    """x, y, radius, flag, or id, x, y, radius, the most likely first."""
     first, last = numbers[:, 0], numbers[:, 3]
     is_flag = _are_among(last, (-1, 0, 1))
     are_ids = _are_whole(first) and (_occur_once(first) or restarts(first) is not None)
@@ -210,7 +210,7 @@ def _of_four(numbers: Floats) -> list[Sequence[str]]:
 
 
 def _of_five(numbers: Floats) -> list[Sequence[str]]:
-    """id, x, y, radius, flag, or frame, id, x, y, radius.
+    """id, x, y, radius, flag, or frame, id, x, y, radius, the most likely first.
 
     A frame number repeats; the id of a grain occurs once per frame.
     """
@@ -223,6 +223,7 @@ def _of_five(numbers: Floats) -> list[Sequence[str]]:
     readings: list[Sequence[str]] = [GRAINS[1:]] if with_flag else []
     if _are_radii(last) or not with_flag:
         readings.append(GRAINS[:5])
+    # Two columns of whole numbers are a frame and an id.
     are_ids = once or (restart and not _are_whole(numbers[:, 1]))
     return readings if are_ids else readings[::-1]
 

@@ -260,7 +260,9 @@ def _left_over(packing: Packing) -> Floats:
 
 
 def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
-    """The packing of an open set, its loads in balance to rounding, and its ensemble.
+    """The packing of an open set, and its ensemble.
+
+    Loads are brought into balance to rounding if S is otherwise empty or undecided.
 
     Lever arms meet midway: with a_i + a_j = ℓ the balance of all grains implies that of the loads,
     while arms that differ from ℓ by a gap would require one particular Σ gap f_t.
@@ -278,7 +280,7 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     forces = np.zeros_like(packing.forces)
     forces[:, 0] = mean_load(packing)  # the scale of tolerances
     packing = packing._replace(contacts=contacts, forces=forces)
-    settled = _settled(packing)
+    settled = _settled(packing)  # first, as it refuses loads that no forces balance
     try:
         return packing, ensemble(packing)
     except (NotJammedError, UndecidedError):

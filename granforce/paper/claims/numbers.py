@@ -203,9 +203,11 @@ def pair_distances(table: StudyTable, sampler: str) -> Iterator[Case]:
 def centre(table: StudyTable, sampler: str) -> Iterator[Case]:
     """Distance of the original network from the centre over that of the others."""
     rows = positive(dynamic(drawn(table, sampler)), "dimension", "mean_distance")
-    ratio = rows["original_distance"] / rows["mean_distance"]
-    rows = rows.assign(ratio=rows["original_ratio"] if sampler == "uniform" else ratio)
-    yield from at_each(items(rows, "ratio"))
+    if sampler == "uniform":  # whose cells do not have the original network
+        ratio = rows["original_ratio"]
+    else:
+        ratio = rows["original_distance"] / rows["mean_distance"]
+    yield from at_each(items(rows.assign(ratio=ratio), "ratio"))
 
 
 def everywhere(table: StudyTable, sampler: str) -> Iterator[Case]:
