@@ -21,7 +21,7 @@ from granforce.paper import csv_tables
 from granforce.paper import plan as plans
 from granforce.paper.claims.groups import SAMPLERS, WHOLE_WALK
 from granforce.paper.claims.table import AFTER
-from granforce.paper.claims.verdicts import DEPENDS, SYMBOLS
+from granforce.paper.claims.verdicts import SYMBOLS
 from granforce.paper.drawings import CAPTIONS, POINTS
 from granforce.paper.formatting import between, concise, listed
 from granforce.paper.highlights import highlights
@@ -284,6 +284,9 @@ def prepared(claim: dict[str, Any]) -> str:
     """In which preparations a claim about large friction was judged, as HTML."""
     if claim["one_preparation"]:
         return "<small>default preparation only</small>"
-    if claim["verdict"] == DEPENDS:
-        return f"<small>late drag: {claim['late']}</small>"
-    return "<small>both preparations</small>" if claim["late"] else ""
+    late = claim["late"]
+    if late in ("", claim["verdict"]):
+        return "<small>both preparations</small>" if late else ""
+    if late == claim["same_networks"]:
+        return f"<small>nearest-network walk: {late} in both preparations</small>"
+    return f"<small>late drag: {late}</small>"

@@ -34,7 +34,7 @@ _TAILS = (
 # 1 to 6 are the paper's, by its own relaxation if the study has it at every μ.
 CAPTIONS = {
     "figure1": "Coordination z of the backbone, and indeterminacy η1, η2 and 0.15 η3 ({walk}), "
-    f"against μ; {POINTS}. The paper finds η1 ≈ 0.15 η3.",
+    f"against μ; {POINTS}. The paper finds η1 ≈ η2 ≈ 0.15 η3.",
     "figure2": "Mean critical force of pushed contacts in ⟨f_n⟩, and exponent α of the decay "
     "|u| ~ r^−α of the first motion, against η2 ({walk}) in the same packings, joined in order of "
     f"μ; {POINTS}.",

@@ -87,7 +87,7 @@ def _maximum(of: _Numbers) -> Highlight:
         first = "The exact intervals are longest at one friction coefficient"
     step = (
         f"Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
-        f"than others ({LONGEST_SETTLED:g}). With {LONGEST:g} throughout, this maximum would be at "
+        f"than others ({LONGEST_SETTLED:g}). With {LONGEST:g} throughout, this maximum may be at "
         "larger μ ([limits](#limits))."
         if place["low"] <= SETTLED_FROM <= place["high"]
         else ""
@@ -181,8 +181,8 @@ def _error(of: _Numbers) -> str:
     least = REACHED * Protocol().precision
     word = "so the two are equal within it" if apart <= least else "so F_crit is smaller on average"
     return (
-        f" There, the mean difference is {apart:.2g} ⟨f_n⟩, and the error of F_crit near the limit "
-        f"load is {least:g} ⟨f_n⟩, {word}."
+        f" At small μ, the mean difference is {apart:.2g} ⟨f_n⟩, and the error of F_crit near "
+        f"the limit load is {least:g} ⟨f_n⟩, {word}."
     )
 
 
@@ -205,9 +205,9 @@ def _proportional(of: _Numbers) -> Highlight:
         f"{itself} the proportionality: in packings made without friction, whose Coulomb condition "
         f"alone has these μ, the slopes are {_quoted(opened[0])} and {_quoted(opened[-1])}."
         + (
-            f" It ends at smaller μ if packings are made with friction: from {most:g} to {above:g} "
-            f"the slopes are {_quoted(slopes[1])} for these, and {_quoted(opened[1])} for those "
-            "made without."
+            f" It may end at smaller μ if packings are made with friction: from {most:g} to "
+            f"{above:g} the slopes are {_quoted(slopes[1])} for these, and {_quoted(opened[1])} for"
+            " those made without."
         )
         * sooner,
     )

@@ -168,6 +168,7 @@ def here(place, monkeypatch):
         "tables.merged": reduced,
         "tables.save": None,
         "drawings.draw": None,
+        "csv_tables.save": None,
         "claims.judged": [],
         "findings.measured": [],
     }.items():

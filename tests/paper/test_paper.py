@@ -510,6 +510,7 @@ def test_few_cases_are_listed_and_of_many_the_one_that_decides():
 def test_a_claim_says_by_whose_networks_and_in_which_preparations_it_was_judged():
     one = {"id": "a", "place": "Fig. 4", "text": "It falls.", "number": "b", "why": "so"}
     one |= {"range": "small: ≤ 1; large: ≥ 2", "sampler": "exact", "chosen": "before", "late": ""}
+    one["same_networks"] = ""
     one |= {"by": {"exact": {"cases": [case("", verdicts.REPRODUCED, 0.5)]}}}
     usual = one | {"verdict": verdicts.REPRODUCED, "one_preparation": True}
     other = one | {"verdict": verdicts.DEPENDS, "one_preparation": False, "late": "contradicted"}

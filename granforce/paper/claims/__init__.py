@@ -14,7 +14,14 @@ Verdicts are not corrected for the number of claims: each is an answer of its ow
 from typing import Any
 
 from granforce.paper.claims.table import CLAIMS, Claim
-from granforce.paper.claims.verdicts import DEPENDS, FEW, MISSING, Case, verdict_of
+from granforce.paper.claims.verdicts import (
+    CONTRADICTED,
+    DEPENDS,
+    MISSING,
+    REPRODUCED,
+    Case,
+    verdict_of,
+)
 from granforce.paper.tables import StudyTable
 from granforce.types import Rows
 
@@ -30,7 +37,9 @@ def judged(table: StudyTable) -> Rows:
     """All claims about a `tables.StudyTable` as dicts, even without data.
 
     "by" has, for each sampler, its verdict and cases; "late" is the verdict in packings with late
-    drag, empty if the claim is not about μ ≥ PREPARED_FROM or these packings lack the numbers.
+    drag, and "same_networks" that by default with networks drawn alike at the same μ. Both are
+    empty if the claim is not about μ ≥ PREPARED_FROM, or if packings with late drag lack the
+    numbers.
     """
     usual, late = in_preparations(table)
     return [_judge(claim, table, usual, late) for claim in CLAIMS]
@@ -45,12 +54,12 @@ def _judge(claim: Claim, table: StudyTable, usual: StudyTable, late: StudyTable)
     # The paper's walk and uniform networks are known in one preparation.
     both = next((name for name in claim.samplers if name not in ("gauss_seidel", "uniform")), "")
     other = list(claim.measure(late, both)) if needed else []
-    late_verdict = ""
+    late_verdict = compared = ""
     if _large(other):
         by[both + LATE] = verdict_of(other, claim.ranges)
         late_verdict = by[both + LATE]["verdict"]
         compared = verdict_of(list(claim.measure(usual, both)), claim.ranges)["verdict"]
-        if FEW not in (late_verdict, compared) and late_verdict != compared:
+        if {late_verdict, compared} == {REPRODUCED, CONTRADICTED}:
             verdict = DEPENDS
     return {
         "id": claim.id,
@@ -64,6 +73,7 @@ def _judge(claim: Claim, table: StudyTable, usual: StudyTable, late: StudyTable)
         "verdict": verdict,
         "sampler": sampler,
         "late": late_verdict,
+        "same_networks": compared,
         "one_preparation": needed and not late_verdict,
         "by": by,
     }

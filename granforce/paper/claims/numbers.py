@@ -32,9 +32,12 @@ from granforce.types import Floats
 
 MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 RATIOS = (("eta2", "eta1", "η2/η1"), ("eta1", "eta3", "η1/η3"), ("eta2", "eta3", "η2/η3"))
+GIVEN = ("η1/η3", "η2/η3")  # ratios of which the paper gives the number
 ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 FEWEST_SHELLS = 4  # fewer do not distinguish the two laws
 FROZEN_SMALL = 0.05  # μ up to which contacts with frozen surroundings are judged as at small μ
+# Names of the two ranges of μ for these contacts.
+SMALL_FROZEN, LARGE_FROZEN = f"μ ≤ {FROZEN_SMALL:g}", f"μ ≥ {BARELY_RIGID:g}"
 # Parts with repeated walks.
 _AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
 
@@ -54,9 +57,10 @@ def constancy(table: StudyTable, sampler: str) -> Iterator[Case]:
 
 
 def factors(table: StudyTable, sampler: str) -> Iterator[Case]:
-    """The geometric mean of each ratio over μ."""
+    """The geometric mean over μ of the ratios of which the paper gives one."""
     for word, logs in ratios(table, sampler):
-        yield from over_all(word, lambda _, means: np.exp(np.mean(means)), logs, span=word)
+        if word in GIVEN:
+            yield from over_all(word, lambda _, means: np.exp(np.mean(means)), logs, span=word)
 
 
 def _etas(table: StudyTable, sampler: str) -> Iterator[tuple[str, Groups]]:
@@ -221,8 +225,8 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Case]:
     rows = positive(table.part("frozen"), "contacts")
     rows = rows.assign(cluster_part=rows["largest_cluster"] / rows["contacts"])
     for name, span, word in (
-        ("undetermined_part", (0, FROZEN_SMALL), "small"),
-        ("cluster_part", (BARELY_RIGID, np.inf), "large"),
+        ("undetermined_part", (0, FROZEN_SMALL), SMALL_FROZEN),
+        ("cluster_part", (BARELY_RIGID, np.inf), LARGE_FROZEN),
     ):
         yield from at_each(within(items(rows, name), span), possible=FRACTION, span=word)
 

@@ -78,9 +78,8 @@ CLAIMS = (
         1,
         "The constant factors are η1 ≈ η2 ≈ 0.15 η3.",
         "geometric mean of the ratio over μ ≥ 0.001",
-        {"η2/η1": (1 / 1.5, 1.5), "η1/η3": (0.12, 0.18), "η2/η3": (0.12, 0.18)},
-        "The factor 0.15 is given, and taken within a fifth; that of η2 and η1 is not, and taken "
-        "within a half.",
+        dict.fromkeys(numbers.GIVEN, (0.12, 0.18)),
+        "The factor 0.15 is taken within a fifth.",
         numbers.factors,
         BY_STATES,
     ),
@@ -207,8 +206,8 @@ CLAIMS = (
     Claim(
         "centre",
         3,
-        "The original network lies closer to the centre of S than sampled ones.",
-        "its distance from the centre over their mean distance, μ ≥ 0.001",
+        "The original network lies closer to the centre than sampled ones.",
+        "its distance from the mean of these over their mean distance, μ ≥ 0.001",
         _at_most(1),
         _SIGN,
         numbers.centre,
@@ -220,7 +219,7 @@ CLAIMS = (
         3,
         "The relative extent ΔF_n/F_orig of a contact is not monotonic in μ: it rises, and then "
         "falls.",
-        "as for η, of the median over contacts",
+        "the smaller of rise and fall, over the maximum, of the median over contacts",
         _at_least(0),
         _SIGN,
         contacts.relative_turns,
@@ -297,7 +296,7 @@ CLAIMS = (
     Claim(
         "everywhere",
         5,
-        "With only the pressure prescribed, indeterminacy is everywhere, and not in clusters.",
+        "With only the pressure prescribed, indeterminacy is everywhere.",
         "undetermined fraction of the force-carrying contacts, μ > 0",
         _at_least(0.9),
         "At most one contact in ten is determined.",
@@ -311,7 +310,7 @@ CLAIMS = (
         "clusters at large μ.",
         "fraction of the contacts inside that are undetermined (μ ≤ 0.05), or in the largest "
         "cluster (μ ≥ 0.5)",
-        {"small": (0.75, np.inf), "large": (-np.inf, 0.25)},
+        {numbers.SMALL_FROZEN: (0.75, np.inf), numbers.LARGE_FROZEN: (-np.inf, 0.25)},
         "Three quarters of the contacts are most of them, a quarter is a small part.",
         numbers.frozen,
         ("exact",),
@@ -347,8 +346,8 @@ CLAIMS = (
     Claim(
         "origin",
         6,
-        "This correlation is of statistical origin: the position of f_n in its interval does not "
-        "matter.",
+        "The correlation of f_n with ΔF_n is of statistical origin: the position of f_n in its "
+        "interval does not matter.",
         "corr(f_n, ΔF_n) minus its mean if positions are shuffled among contacts, intermediate μ",
         {"": (-0.1, 0.1)},
         "Small compared with the correlation.",

@@ -5,8 +5,8 @@ A claim has one case, or several: one for each μ of a range, or for each of η1
 number of cases, as all of them must hold. It is "contradicted" if the interval of some case, made
 wider for their number (Bonferroni), is entirely outside its range; otherwise it is "undecided". The
 interval that is shown is the one that counts: 95 % if it is in the range, else the wider one.
-Nothing else changes a verdict, except that a claim about μ ≥ 1 must have the same verdict in two
-preparations (`judged` in this folder).
+Nothing else changes a verdict, except that a claim about μ ≥ 1 must not be reproduced in one
+preparation and contradicted in another (`judged` in this folder).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
