@@ -133,7 +133,10 @@ def act(page, recorder):
     """What is seen: packing, walking, grabbing."""
     recorder.on = True
     ask(page, ASKED)
-    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 25")
+    until(page, "scene.hand.player.grows")
+    recorder.on = False  # nothing moves until there are networks
+    until(page, "scene.hand.player.replay.last > 25")
+    recorder.on = True
     page.wait_for_timeout(2500)
     recorder.on = False
     until(page, "!scene.hand.player.grows && !scene.hand.player.model.busy")
