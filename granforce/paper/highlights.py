@@ -80,11 +80,11 @@ def _maximum(of: _Numbers) -> Highlight:
     within = MIDDLE[0] <= place["low"] and place["high"] <= MIDDLE[1]
     middle = "at intermediate friction"
     if not turns:
-        first = f"Whether the exact intervals are longest {middle} is undecided"
+        first = f"Whether the exact intervals are relatively longest {middle} is undecided"
     elif within:
-        first = f"The exact intervals are longest {middle}"
+        first = f"The exact intervals are relatively longest {middle}"
     else:
-        first = "The exact intervals are longest at one friction coefficient"
+        first = "The exact intervals are relatively longest at one friction coefficient"
     step = (
         f"Packings at μ < {SETTLED_FROM:g} are compressed with a longer time step ({LONGEST:g}) "
         f"than others ({LONGEST_SETTLED:g}). With {LONGEST:g} throughout, this maximum may be at "
@@ -93,8 +93,8 @@ def _maximum(of: _Numbers) -> Highlight:
         else ""
     )
     return Highlight(
-        f"{first}: exact η3 is largest at μ = {_quoted(place)}. The paper finds the maximum of "
-        f"η near {PAPERS_PEAK:g}.",
+        f"{first}: exact η3 is largest at μ = {_quoted(place)}. The paper's sampled η "
+        f"peaks near {PAPERS_PEAK:g}.",
         "samplers",
         "exact-intervals",
         step,
@@ -145,7 +145,7 @@ def _strong(of: _Numbers) -> Highlight:
         else "and whether they are shorter relative to the force is undecided"
     )
     return Highlight(
-        f"{first}, {second}: at intermediate μ, the force f_n of a contact in the original network "
+        f"{first}, {second}: at intermediate μ, the force f_n with which a contact came to rest "
         f"has a correlation of {_quoted(absolute)} with the exact ΔF_n, and a rank correlation of "
         f"{_quoted(relative)} with ΔF_n/f_n.",
         "figure6_exact",
