@@ -288,5 +288,5 @@ def prepared(claim: dict[str, Any]) -> str:
     if late in ("", claim["verdict"]):
         return "<small>both preparations</small>" if late else ""
     if late == claim["same_networks"]:
-        return f"<small>nearest-network walk: {late} in both preparations</small>"
+        return f"<small>nearest-network walk: {late}</small>"
     return f"<small>late drag: {late}</small>"

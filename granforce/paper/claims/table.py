@@ -76,7 +76,7 @@ CLAIMS = (
     Claim(
         "factors",
         1,
-        "The constant factors are η1 ≈ η2 ≈ 0.15 η3.",
+        "The factors are η1 ≈ 0.15 η3 and η2 ≈ 0.15 η3.",
         "geometric mean of the ratio over μ ≥ 0.001",
         dict.fromkeys(numbers.GIVEN, (0.12, 0.18)),
         "The factor 0.15 is taken within a fifth.",
@@ -128,7 +128,7 @@ CLAIMS = (
         "size",
         1,
         "η hardly depends on the number N of disks.",
-        "slope of log η2 (exact: η3) against log N",
+        "slope of log η2 against log N; for exact η3 see the findings",
         {"": (-0.1, 0.1)},
         "Less than 15 % for four times as many disks.",
         numbers.sizes,
@@ -206,8 +206,8 @@ CLAIMS = (
     Claim(
         "centre",
         3,
-        "The original network lies closer to the centre than sampled ones.",
-        "its distance from the mean of these over their mean distance, μ ≥ 0.001",
+        "The original network lies closer to the mean of sampled ones than these do.",
+        "its distance from the mean over their mean distance, μ ≥ 0.001",
         _at_most(1),
         _SIGN,
         numbers.centre,
@@ -258,7 +258,7 @@ CLAIMS = (
     Claim(
         "width",
         4,
-        "P(ΔF_n) is broadest at intermediate μ.",
+        "P(ΔF_n) is broader at intermediate μ.",
         "μ at the top of a parabola in log μ, for the standard deviation of ΔF_n",
         {"": (0.05, 0.3)},
         "Our range of intermediate μ.",
@@ -306,10 +306,9 @@ CLAIMS = (
     Claim(
         "frozen",
         5,
-        "With frozen boundary forces, indeterminacy is everywhere at small μ, and in small "
-        "clusters at large μ.",
-        "fraction of the contacts inside that are undetermined (μ ≤ 0.05), or in the largest "
-        "cluster (μ ≥ 0.5)",
+        "With frozen boundary forces, indeterminacy is almost everywhere at μ ≤ 0.05, and in small "
+        "clusters at μ ≥ 0.5.",
+        "fraction of the contacts inside that are undetermined, or in the largest cluster",
         {numbers.SMALL_FROZEN: (0.75, np.inf), numbers.LARGE_FROZEN: (-np.inf, 0.25)},
         "Three quarters of the contacts are most of them, a quarter is a small part.",
         numbers.frozen,
@@ -347,7 +346,7 @@ CLAIMS = (
         "origin",
         6,
         "The correlation of f_n with ΔF_n is of statistical origin: the position of f_n in its "
-        "interval does not matter.",
+        "interval hardly matters.",
         "corr(f_n, ΔF_n) minus its mean if positions are shuffled among contacts, intermediate μ",
         {"": (-0.1, 0.1)},
         "Small compared with the correlation.",
