@@ -213,6 +213,8 @@ def test_a_change_that_comes_before_a_component_listens_is_seen(visit):
 def test_everything_can_be_taken_along(visit, tmp_path):
     # A walk of its own, all of whose states are stored.
     page = visit(f"?n={DISKS}&seed=1&mu=0.1&states={STATES}&walkseed=3&tab=export&frame=3")
+    # Before, nothing is saved under the name of the link.
+    until(page, f"scene.geometry.states === {STATES} && !scene.hand.player.model.busy")
 
     def take(words):
         button = page.get_by_role("button", name=words, exact=True)
