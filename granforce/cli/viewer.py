@@ -14,7 +14,7 @@ import webbrowser
 from html import escape
 from pathlib import Path
 from urllib.error import URLError
-from urllib.parse import urlencode
+from urllib.parse import urlencode, urljoin
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from granforce.forces.knowledge import Known
 from granforce.packing.importers import load_packing
 from granforce.records import InputError, Packing
 from granforce.study import kinds
+from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 
 # The folder into which the app's server writes the forces held on its pages; see `View.known`.
@@ -86,24 +87,52 @@ def show(packing: Packing, *, browser: bool | None = None) -> View:
     """
     if not isinstance(packing, Packing):
         raise InputError(f"show takes a Packing, not {type(packing).__name__}")
-    query = stored_query(packing)
+    parameters = _stored(packing)
     root, folder = _server()
-    address = f"{root}?{query}"
+    address = f"{root}?{_query(parameters)}"
     if browser or (browser is None and "ipykernel" not in sys.modules):
         open_when_ready(address)
-    return View(address, folder / f"{kinds.imported_parameters(packing)['imported']}.json")
-
-
-def stored_query(packing: Packing) -> str:
-    """The query of a link to a packing, which is saved in the default store for it."""
-    parameters = kinds.imported_parameters(packing)
-    kinds.keep_packing(open_store(), parameters, packing)
-    return urlencode({"packing": parameters["imported"], "mu": f"{packing.mu:.9g}"})
+    return View(address, folder / f"{parameters['imported']}.json")
 
 
 def query_of_file(path: str | None) -> str:
     """The query of a link to the packing in an NPZ file; empty without a file."""
-    return "" if path is None else f"?{stored_query(load_packing(path))}"
+    return "" if path is None else f"?{_query(_stored(load_packing(path)))}"
+
+
+def _stored(packing: Packing) -> Parameters:
+    """Save a packing in the default store; the parameters under which a link finds it."""
+    parameters = kinds.imported_parameters(packing)
+    kinds.keep_packing(open_store(), parameters, packing)
+    return parameters
+
+
+def _query(parameters: Parameters) -> str:
+    return urlencode({"packing": parameters["imported"], "mu": f"{parameters['mu']:.9g}"})
+
+
+def checked_port(address: str, port: int) -> int:
+    """The port, a free one for 0; InputError if the address cannot be used, or is in use."""
+    if not address.strip():
+        raise InputError("--address is empty; give a host name or an IP address, such as localhost")
+    try:
+        family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(place)
+            return int(probe.getsockname()[1])
+    except (OSError, ValueError) as error:  # ValueError: not a valid name
+        reason = getattr(error, "strerror", None) or "no such name"
+        raise InputError(
+            f"cannot listen at {address[:40]!r}, port {port}: {reason}; choose another with "
+            "--address and --port"
+        ) from None
+
+
+def page_at(address: str, port: int) -> str:
+    """The address of the page, for a browser on this machine."""
+    host = "localhost" if address in ("0.0.0.0", "::") else address
+    return f"http://[{host}]:{port}/app" if ":" in host else f"http://{host}:{port}/app"
 
 
 def open_when_ready(address: str) -> None:
@@ -118,7 +147,7 @@ def open_when_ready(address: str) -> None:
 
 def wait_for_server(address: str) -> bool:
     """Whether the server of an address responds within PATIENCE."""
-    health = f"{address.partition('/app')[0]}/health"
+    health = urljoin(address, "/health")
     until = time.monotonic() + PATIENCE
     while time.monotonic() < until:
         try:
@@ -129,24 +158,23 @@ def wait_for_server(address: str) -> bool:
     return False
 
 
-_started: list[tuple[subprocess.Popen[bytes], str, Path]] = []  # the server of this process
+# The server of this process: its process, page, and folder of held forces, removed at the end.
+_started: list[tuple[subprocess.Popen[bytes], str, tempfile.TemporaryDirectory[str]]] = []
 
 
 def _server() -> tuple[str, Path]:
-    """The address of this process's server, and the folder of held forces; starts it if needed."""
+    """The page of this process's server, and the folder of held forces; starts it if needed."""
     if not _started or _started[-1][0].poll() is not None:
-        with socket.socket() as probe:
-            probe.bind(("localhost", 0))
-            port = probe.getsockname()[1]
-        folder = Path(tempfile.mkdtemp(prefix="granforce-held-"))
+        port = checked_port("localhost", 0)
+        folder = tempfile.TemporaryDirectory(prefix="granforce-held-")
         process = subprocess.Popen(
             [sys.executable, "-m", "granforce", "app", "--no-show", "--port", str(port)],
-            env=os.environ | {HELD_VARIABLE: str(folder)},
+            env=os.environ | {HELD_VARIABLE: folder.name},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
         atexit.register(process.terminate)
-        _started[:] = [(process, f"http://localhost:{port}/app", folder)]
-    _, address, folder = _started[-1]
-    return address, folder
+        _started[:] = [(process, page_at("localhost", port), folder)]
+    _, page, folder = _started[-1]
+    return page, Path(folder.name)

@@ -18,7 +18,7 @@ from numba.core.caching import _CacheLocator
 from packings import packed
 
 import granforce as gf
-from granforce.cli import commands
+from granforce.cli import commands, viewer
 from granforce.cli.commands import service
 from granforce.cli.entry_point import main
 from granforce.packing.importers import save_packing
@@ -535,6 +535,24 @@ def test_the_app_reads_addresses_of_a_proxy_only_if_asked(words, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["granforce"])
     assert main(["app", "--no-show", "--port", "0", *words]) == 0
     assert ("--use-xheaders" in served[0]) == bool(words)
+
+
+@pytest.mark.parametrize(
+    "address, root",
+    [
+        ("app.example.org", "http://app.example.org:5006"),
+        ("::1", "http://[::1]:5006"),
+        ("0.0.0.0", "http://localhost:5006"),
+    ],
+)
+def test_a_page_is_opened_at_the_address_of_its_server(address, root, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "urllib.request.urlopen", lambda url, **_: contextlib.nullcontext(asked.append(url))
+    )
+    page = viewer.page_at(address, 5006)
+    assert page == f"{root}/app"
+    assert viewer.wait_for_server(f"{page}?packing=1") and asked == [f"{root}/health"]
 
 
 @pytest.mark.parametrize("options", ["", "--box isotropic --pressure 2", "--radii r.txt"])

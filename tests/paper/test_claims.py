@@ -232,7 +232,7 @@ def late(table, sampler="nearest", **columns):
     return with_rows(table, walk, other)
 
 
-def test_a_claim_about_large_friction_needs_the_same_verdict_in_two_preparations(monkeypatch):
+def test_a_claim_about_large_friction_is_judged_in_two_preparations(monkeypatch):
     ids = ("turns", "vanishing", "pair-distances", "significant", "response")
     monkeypatch.setattr(claims, "CLAIMS", [BY_ID[id] for id in ids])
     same = {one["id"]: one for one in claims.judged(late(synthetic(rise_and_fall)))}

@@ -9,7 +9,6 @@ import os
 import re
 import runpy
 import shutil
-import socket
 import subprocess
 import sys
 import webbrowser
@@ -51,15 +50,14 @@ def app(arguments: argparse.Namespace) -> None:
                 f"--allow-websocket-origin {origin[:40]!r}: give a name and a port, such as "
                 "lab.example.org:5006"
             )
-    port = _checked_port(arguments.address, port)
+    port = viewer.checked_port(arguments.address, port)
     words = ["panel", "serve", str(_page()), "--port", str(port), "--address", arguments.address]
     for origin in arguments.allow_websocket_origin:
         words += ["--allow-websocket-origin", origin]
     words += ["--warm"] if arguments.warm else []
     words += ["--use-xheaders"] if arguments.use_xheaders else []
     words += ["--plugins", "granforce.cli.health"]
-    host = "localhost" if arguments.address in ("0.0.0.0", "::") else arguments.address
-    page = f"http://{host}:{port}/app{viewer.query_of_file(arguments.packing)}"
+    page = viewer.page_at(arguments.address, port) + viewer.query_of_file(arguments.packing)
     if not arguments.no_show:
         viewer.open_when_ready(page)
     elif arguments.packing:
@@ -75,24 +73,6 @@ def _page() -> Path:
         if (folder / "main.py").is_file():
             return folder
     raise InputError(f"the app is not installed: {package} has no folder app; install the wheel")
-
-
-def _checked_port(address: str, port: int) -> int:
-    """The port, a free one for 0; InputError if the address cannot be used, or is in use."""
-    if not address.strip():
-        raise InputError("--address is empty; give a host name or an IP address, such as localhost")
-    try:
-        family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(place)
-            return int(probe.getsockname()[1])
-    except (OSError, ValueError) as error:  # ValueError: not a valid name
-        reason = getattr(error, "strerror", None) or "no such name"
-        raise InputError(
-            f"cannot listen at {address[:40]!r}, port {port}: {reason}; choose another with "
-            "--address and --port"
-        ) from None
 
 
 def docs(arguments: argparse.Namespace) -> None:
