@@ -7,20 +7,18 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from granforce.cli import report_lines
-from granforce.cli.option_table import attribute
+from granforce.cli.option_table import Option, attribute, options
+
+Options = tuple[Option, ...]
 
 
 class Group(NamedTuple):
     """Options under one heading of the help text."""
 
     title: str
-    options: str  # keys of OPTIONS, separated by blanks, like all options below
+    options: Options
     description: str | None = None
-    one_of: str = ""  # options of which one may be given; they come first
-
-
-class Hidden(str):
-    """Options that the help text leaves out."""
+    one_of: Options = ()  # of which one may be given; they come first
 
 
 class Rule(NamedTuple):
@@ -28,95 +26,101 @@ class Rule(NamedTuple):
 
     words: str  # that form in words: "with --scene"
     holds: Callable[[argparse.Namespace], bool]  # whether a command line has that form
-    options: str
+    options: Options
 
     @property
     def names(self) -> frozenset[str]:
         """The options as attributes."""
-        return frozenset(map(attribute, self.options.split()))
+        return frozenset(option.attribute for option in self.options)
 
 
 class Command(NamedTuple):
     name: str
     summary: str
     example: str
-    parts: tuple[str | Hidden | Group, ...]  # in the order of the help text
+    parts: tuple[Options | Group, ...]  # in the order of the help text
     rules: tuple[Rule, ...] = ()
     lines: tuple[str, ...] = ()  # of its report, explained in the help text
     columns: tuple[str, ...] = ()  # of its list of contacts, explained likewise
     formats: tuple[Command, ...] = ()
 
 
-def given(option: str) -> Callable[[argparse.Namespace], bool]:
+def given(typed: str) -> Callable[[argparse.Namespace], bool]:
     """Whether an option has a value."""
-    name = attribute(option)
+    name = attribute(typed)
     return lambda arguments: getattr(arguments, name) not in (None, False)
 
 
-def with_option(option: str, options: str) -> Rule:
-    return Rule(f"with {option}", given(option), options)
+def with_option(typed: str, useless: Options) -> Rule:
+    return Rule(f"with {typed}", given(typed), useless)
 
 
-def without(option: str, options: str, also: str = "") -> Rule:
-    has = given(option)
-    return Rule(f"without {option}{also}", lambda arguments: not has(arguments), options)
+def without(typed: str, useless: Options, also: str = "") -> Rule:
+    has = given(typed)
+    return Rule(f"without {typed}{also}", lambda arguments: not has(arguments), useless)
 
 
-SHAPE = "-n --radii --pressure --box"
-COMPACTION = "--dt --box-mass --sweeps --step-accuracy --drag-below"
+SHAPE = options("-n --radii --pressure --box")
+COMPACTION = options("--dt --box-mass --sweeps --step-accuracy --drag-below")
 EXPERT = Group("expert settings of the compaction", COMPACTION)
-PACKING = Group("the packing", "-n --mu --seed --radii --pressure --box")
+PACKING = Group("the packing", options("-n --mu --seed --radii --pressure --box"))
 # A packing that is made unless a file is given.
-MADE_PACKING = (PACKING, Hidden(COMPACTION))
-ANY_PACKING = ("--json packing", *MADE_PACKING)
+MADE_PACKING = (PACKING, tuple(option.hidden for option in COMPACTION))
+ANY_PACKING = (options("--json packing"), *MADE_PACKING)
 FROM_FILE = "with the file of a packing"
-MADE = f"{PACKING.options} {COMPACTION}"
+MADE = PACKING.options + COMPACTION
 NO_FILE = Rule(FROM_FILE, given("packing"), MADE)
-WALK = Group("the random walk", "--states --walk-seed --ensemble-mu --relax --chains --workers")
+WALK = Group(
+    "the random walk", options("--states --walk-seed --ensemble-mu --relax --chains --workers")
+)
 CONDITIONS = Group(
     "conditions on the forces, in addition to equilibrium and friction",
-    "--prescribe --stress --known",
+    options("--prescribe --stress --known"),
 )
-NO_UNIT = without("--out", "--unit")
+NO_UNIT = without("--out", options("--unit"))
 EXACT = (
     *ANY_PACKING,
-    Group("the ensemble", "--ensemble-mu --contacts --slice --workers --out:contacts --unit"),
-    CONDITIONS._replace(options="--prescribe:exact --stress --known"),
-    "--cache",
+    Group(
+        "the ensemble", options("--ensemble-mu --contacts --slice --workers --out:contacts --unit")
+    ),
+    CONDITIONS._replace(options=options("--prescribe:exact --stress --known")),
+    options("--cache"),
 )
 EXACT_RULES = (
     NO_FILE,
     Rule(
         "with --slice, where the frozen contacts determine the stress",
         lambda arguments: arguments.slice is not None and arguments.prescribe != "none",
-        "--prescribe --stress",
+        options("--prescribe:exact --stress"),
     ),
 )
 # Of photoelastic frames.
-READING = "--reach --scale --error --reverse --columns:frames"
-REPAIR = "--flag --repair --strict --walls:frames --wall-force"
-STRICT = with_option("--strict", "--repair")
+READING = options("--reach --scale --error --reverse --columns:frames")
+REPAIR = options("--flag --repair --strict --walls:frames --wall-force")
+STRICT = with_option("--strict", options("--repair"))
 SNAPSHOTS = Group(
     "many snapshots",
-    "--frames:import --states:import --walk-seed --csv --workers --scheduler --cache",
+    options("--frames:import --states:import --walk-seed --csv --workers --scheduler --cache"),
     "with --frames: write exact intervals of all snapshots to one dataset (--out FOLDER.zarr), "
     "and print one line per snapshot",
 )
 SNAPSHOT_RULES = (
-    without("--frames", "--states --walk-seed --csv --workers --scheduler --cache"),
-    with_option("--frames", "--frame"),
+    without("--frames", options("--states:import --walk-seed --csv --workers --scheduler --cache")),
+    with_option("--frames", options("--frame:lammps --frame:mercury")),
     Rule(
         "without --states",
         lambda arguments: arguments.frames and not arguments.states,
-        "--walk-seed",
+        options("--walk-seed"),
     ),
 )
 STUDY_SIZE = Group(
     "size",
-    "-n:study --mu:study --packings --states:study --gauss-seidel-packings --response-packings "
-    "--response-contacts --perturb-packings --sizes",
+    options(
+        "-n:study --mu:study --packings --states:study --gauss-seidel-packings --response-packings "
+        "--response-contacts --perturb-packings --sizes"
+    ),
 )
-RUN = "--minutes --workers --scheduler"  # options of a study that computes
+RUN = options("--minutes --workers --scheduler")  # options of a study that computes
 
 
 # One parser per format: it takes the options that its reader in `granforce.packing.importers`
@@ -127,8 +131,10 @@ FORMATS = (
         "import a particle dump and a contact dump from LAMMPS",
         "particles.dump contacts.dump",
         (
-            "--json grains:lammps contacts:lammps --mu:import --out:snapshots --frame:lammps "
-            "--columns:import --reverse",
+            options(
+                "--json grains:lammps contacts:lammps --mu:import --out:snapshots --frame:lammps "
+                "--columns:import --reverse"
+            ),
             SNAPSHOTS,
         ),
         SNAPSHOT_RULES,
@@ -139,8 +145,10 @@ FORMATS = (
         "import bodies and interactions from YADE",
         "bodies.txt interactions.txt",
         (
-            "--json grains:yade contacts:yade --mu:import --out:import --box:import --tilt "
-            "--columns:import --walls:simulation --reverse",
+            options(
+                "--json grains:yade contacts:yade --mu:import --out:import --box:import --tilt "
+                "--columns:import --walls:simulation --reverse"
+            ),
         ),
         (),
         report_lines.IMPORT,
@@ -150,8 +158,10 @@ FORMATS = (
         "import .data and .fstat files from MercuryDPM",
         "run.data run.fstat",
         (
-            "--json grains:mercury contacts:mercury --mu:import --out:snapshots --frame:mercury "
-            "--box:import --tilt --walls:simulation --reverse",
+            options(
+                "--json grains:mercury contacts:mercury --mu:import --out:snapshots "
+                "--frame:mercury --box:import --tilt --walls:simulation --reverse"
+            ),
             SNAPSHOTS,
         ),
         SNAPSHOT_RULES,
@@ -162,15 +172,17 @@ FORMATS = (
         "import a table of grains and, optionally, a table of contacts",
         "grains.csv contacts.csv",
         (
-            "--json grains:table contacts:table --mu:import --out:import --box:import --tilt "
-            "--columns:import --reverse --walls:table --gravity --tolerance:table --forces "
-            "--pressure:table",
+            options(
+                "--json grains:table contacts:table --mu:import --out:import --box:import --tilt "
+                "--columns:import --reverse --walls:table --gravity --tolerance:table --forces "
+                "--pressure:table"
+            ),
         ),
         (
             Rule(
                 "with a table of contacts and no walls",
                 lambda arguments: arguments.contacts is not None and arguments.walls is None,
-                "--tolerance",
+                options("--tolerance:table"),
             ),
         ),
         report_lines.IMPORT,
@@ -179,7 +191,7 @@ FORMATS = (
         "blocks",
         "import rigid bodies: convex polygons and disks",
         "bodies.csv",
-        ("--json grains:blocks --mu:import --out:import --density --tolerance:blocks",),
+        (options("--json grains:blocks --mu:import --out:import --density --tolerance:blocks"),),
         (),
         report_lines.IMPORT,
     ),
@@ -188,8 +200,8 @@ FORMATS = (
         "import a photoelastic frame from PeGS",
         "positions.txt adjacency.txt",
         (
-            "--json grains:pegs contacts:pegs --mu:import --out:import --frame:pegs "
-            f"{READING} {REPAIR} --measured:pegs",
+            options("--json grains:pegs contacts:pegs --mu:import --out:import --frame:pegs"),
+            READING + REPAIR + options("--measured:pegs"),
         ),
         (STRICT,),
         report_lines.PEGS,
@@ -205,10 +217,15 @@ COMMANDS = (
         "  granforce pack --scene groove --mu 0.5\n"
         "  granforce pack --scene arch --out arch.npz\n"
         "  granforce pack --scene wall --scene-options courses=10,blocks=5 --out wall.npz",
-        ("--json --scene --scene-options", PACKING, EXPERT, "--cache --max-steps --out:pack"),
         (
-            without("--scene", "--scene-options"),
-            with_option("--scene", f"{SHAPE} --seed {COMPACTION} --cache --max-steps"),
+            options("--json --scene --scene-options"),
+            PACKING,
+            EXPERT,
+            options("--cache --max-steps --out:pack"),
+        ),
+        (
+            without("--scene", options("--scene-options")),
+            with_option("--scene", SHAPE + COMPACTION + options("--seed --cache --max-steps")),
         ),
         report_lines.PACK,
     ),
@@ -216,7 +233,7 @@ COMMANDS = (
         "walk",
         "random walk through the force networks of a packing",
         "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000 --out states.zarr",
-        (*ANY_PACKING, WALK, CONDITIONS, "--cache --out:states --unit"),
+        (*ANY_PACKING, WALK, CONDITIONS, options("--cache --out:states --unit")),
         (NO_FILE, NO_UNIT),
         report_lines.WALK,
     ),
@@ -228,11 +245,13 @@ COMMANDS = (
             *ANY_PACKING,
             Group(
                 "the sample",
-                "--states:uniform --sample-seed --ensemble-mu --chains:uniform --effective "
-                "--workers",
+                options(
+                    "--states:uniform --sample-seed --ensemble-mu --chains:uniform --effective "
+                    "--workers"
+                ),
             ),
             CONDITIONS,
-            "--cache --out:states --unit",
+            options("--cache --out:states --unit"),
         ),
         (NO_FILE, NO_UNIT),
         report_lines.UNIFORM,
@@ -243,9 +262,9 @@ COMMANDS = (
         "granforce volume -n 400 --mu 0.1 --seed 1 --accuracy 0.1",
         (
             *ANY_PACKING,
-            Group("the volume", "--accuracy --volume-seed --ensemble-mu --workers"),
+            Group("the volume", options("--accuracy --volume-seed --ensemble-mu --workers")),
             CONDITIONS,
-            "--cache",
+            options("--cache"),
         ),
         (NO_FILE,),
         report_lines.VOLUME,
@@ -256,17 +275,19 @@ COMMANDS = (
         "granforce infer frame.npz --measured frame.csv\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
         (
-            "--json files",
+            options("--json files"),
             *MADE_PACKING,
             Group(
                 "the inference",
-                "--measured:infer --unmeasured --again --states:infer --certain --sample-seed "
-                "--ensemble-mu --chains:uniform --workers --out:infer --unit",
+                options(
+                    "--measured:infer --unmeasured --again --states:infer --certain --sample-seed "
+                    "--ensemble-mu --chains:uniform --workers --out:infer --unit"
+                ),
             ),
             CONDITIONS,
-            "--cache",
-            Group("many photoelastic frames", f"--frames:infer {READING} {REPAIR}"),
-            "--scheduler",
+            options("--cache"),
+            Group("many photoelastic frames", options("--frames:infer") + READING + REPAIR),
+            options("--scheduler"),
         ),
         (
             Rule(
@@ -277,25 +298,29 @@ COMMANDS = (
             STRICT,
             without(
                 "--frames",
-                f"{READING} {REPAIR} --scheduler",
+                READING + REPAIR + options("--scheduler"),
                 " (--frames all reads the two files of photoelastic frames)",
             ),
             with_option(
                 "--frames",
-                f"{SHAPE} --seed {COMPACTION} --measured --again --certain --chains "
-                f"--ensemble-mu {CONDITIONS.options}",
+                SHAPE
+                + COMPACTION
+                + CONDITIONS.options
+                + options(
+                    "--seed --measured:infer --again --certain --chains:uniform --ensemble-mu"
+                ),
             ),
             Rule(
                 "with --states 0",
                 lambda arguments: arguments.states == 0,
-                "--sample-seed --chains --again",
+                options("--sample-seed --chains:uniform --again"),
             ),
             Rule(
                 "with --states 0 and without --certain or --frames",
                 lambda arguments: (
                     arguments.states == 0 and not arguments.certain and arguments.frames is None
                 ),
-                "--workers",
+                options("--workers"),
             ),
         ),
         report_lines.INFER,
@@ -309,11 +334,13 @@ COMMANDS = (
             *ANY_PACKING,
             Group(
                 "the ranking",
-                "--best --check --states:informative --sample-seed --ensemble-mu --workers "
-                "--out:contacts --unit",
+                options(
+                    "--best --check --states:informative --sample-seed --ensemble-mu --workers "
+                    "--out:contacts --unit"
+                ),
             ),
             CONDITIONS,
-            "--cache",
+            options("--cache"),
         ),
         (NO_FILE,),
         report_lines.INFORMATIVE,
@@ -322,7 +349,7 @@ COMMANDS = (
         "measure",
         "compute the indeterminacy η1, η2, η3 from a random walk, optionally for each contact",
         "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --out contacts.csv",
-        (*ANY_PACKING, WALK, CONDITIONS, "--cache --out:measure --unit"),
+        (*ANY_PACKING, WALK, CONDITIONS, options("--cache --out:measure --unit")),
         (NO_FILE,),
         report_lines.MEASURE,
     ),
@@ -332,17 +359,17 @@ COMMANDS = (
         "resume",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
         (
-            "--json --mu:scan --seeds",
+            options("--json --mu:scan --seeds"),
             PACKING._replace(options=SHAPE),
             EXPERT,
             WALK,
-            "--out:scan --cache --keep --float32 --scheduler",
+            options("--out:scan --cache --keep --float32 --scheduler"),
         ),
         (
             Rule(
                 "with --out FOLDER.zarr",
                 lambda arguments: arguments.out is not None and not arguments.out.endswith(".csv"),
-                "--cache",
+                options("--cache"),
             ),
         ),
         report_lines.SCAN,
@@ -351,15 +378,15 @@ COMMANDS = (
         "figures",
         "draw Figure 1 of the paper from the store of a scan",
         "granforce figures scan.zarr --out figure1.pdf",
-        ("scan --out:picture",),
+        (options("scan --out:picture"),),
     ),
     Command(
         "plot",
         "draw a packing and its contact forces",
         "granforce plot packing.npz --out packing.png\n"
         "  granforce plot packing.npz --states states.zarr --colour spread --out spread.pdf",
-        ("packing:required --out:picture --states:plot --state --numbers --colour",),
-        (without("--states", "--state"),),
+        (options("packing:required --out:picture --states:plot --state --numbers --colour"),),
+        (without("--states", options("--state")),),
     ),
     Command(
         "intervals",
@@ -385,8 +412,8 @@ COMMANDS = (
         "compute the largest multiple of a load on all bodies that contact forces can balance",
         "granforce pack --scene wall --out wall.npz\n"
         "  granforce load-factor wall.npz --load horizontal",
-        ("--json packing:required --load --critical --precision:load-factor",),
-        (without("--critical", "--precision"),),
+        (options("--json packing:required --load --critical --precision:load-factor"),),
+        (without("--critical", options("--precision:load-factor")),),
         report_lines.LOAD_FACTOR,
     ),
     Command(
@@ -394,7 +421,7 @@ COMMANDS = (
         "test whether the grains of a packing stay at rest in contact dynamics, also with noise on "
         "the forces",
         "granforce rest packing.npz",
-        ("--json packing:required --ensemble-mu",),
+        (options("--json packing:required --ensemble-mu"),),
         (),
         report_lines.REST,
     ),
@@ -405,8 +432,8 @@ COMMANDS = (
         "granforce stress -n 400 --mu 0.1 --seed 1 --out outline.csv",
         (
             *ANY_PACKING,
-            Group("the outline", "--ensemble-mu --angles --known --workers --out:stress"),
-            "--cache",
+            Group("the outline", options("--ensemble-mu --angles --known --workers --out:stress")),
+            options("--cache"),
         ),
         (NO_FILE,),
         report_lines.STRESS,
@@ -420,16 +447,18 @@ COMMANDS = (
             *ANY_PACKING,
             Group(
                 "the perturbation",
-                "--draw-seed --ensemble-mu --precision:perturb --workers --out:contacts --unit",
-                one_of="--random --contacts:perturb --all",
+                options(
+                    "--draw-seed --ensemble-mu --precision:perturb --workers --out:contacts --unit"
+                ),
+                one_of=options("--random --contacts:perturb --all"),
             ),
-            CONDITIONS._replace(options="--prescribe --stress"),
-            "--cache",
+            CONDITIONS._replace(options=options("--prescribe --stress")),
+            options("--cache"),
         ),
         (
             NO_FILE,
-            with_option("--all", "--random --draw-seed"),
-            with_option("--contacts", "--random --draw-seed"),
+            with_option("--all", options("--random --draw-seed")),
+            with_option("--contacts", options("--random --draw-seed")),
         ),
         report_lines.PERTURB,
         report_lines.CRITICAL,
@@ -439,18 +468,22 @@ COMMANDS = (
         "repeat the paper's study, draw its figures and judge its claims; interrupted runs resume",
         "granforce study --out study\n  granforce study --quick --out quick",
         (
-            "--json --quick:study --out:study --paper --parts --minutes --status --table:study "
-            "--reduce --documents:study",
+            options(
+                "--json --quick:study --out:study --paper --parts --minutes --status --table:study "
+                "--reduce --documents:study"
+            ),
             STUDY_SIZE,
-            "--workers:study --formats --scheduler",
+            options("--workers:study --formats --scheduler"),
         ),
         (
-            with_option("--status", f"{RUN} --table --reduce --documents --formats"),
-            with_option("--reduce", f"{RUN} --paper --parts"),
+            with_option(
+                "--status", RUN + options("--table:study --reduce --documents:study --formats")
+            ),
+            with_option("--reduce", RUN + options("--paper --parts")),
             Rule(
                 "with --table alone",
                 lambda arguments: arguments.table is not None and arguments.reduce is None,
-                f"{RUN} --paper --parts {STUDY_SIZE.options} --quick",
+                RUN + STUDY_SIZE.options + options("--paper --parts --quick:study"),
             ),
         ),
     ),
@@ -458,13 +491,18 @@ COMMANDS = (
         "app",
         "open the app in a browser",
         "granforce app\n  granforce app packing.npz\n  granforce app --port 8080 --no-show",
-        ("packing:app --port --address --allow-websocket-origin --use-xheaders --no-show --warm",),
+        (
+            options(
+                "packing:app --port --address --allow-websocket-origin --use-xheaders --no-show "
+                "--warm"
+            ),
+        ),
     ),
     Command(
         "docs",
         "build the documentation and open it in a browser; stop with Ctrl-C",
         "granforce docs\n  granforce docs --out site",
-        ("--out:docs",),
+        (options("--out:docs"),),
     ),
     Command(
         "completion",
@@ -472,7 +510,7 @@ COMMANDS = (
         "granforce completion bash > ~/.local/share/bash-completion/completions/granforce\n"
         "  granforce completion zsh > ~/.zfunc/_granforce\n"
         "  granforce completion fish > ~/.config/fish/completions/granforce.fish",
-        ("shell",),
+        (options("shell"),),
     ),
     Command(
         "import",
@@ -492,20 +530,20 @@ COMMANDS = (
         "export a packing and its force network to ParaView or LAMMPS",
         "granforce export packing.npz grains.vtp contacts.vtp\n"
         "  granforce export packing.npz particles.dump contacts.dump",
-        ("packing:required grains:export contacts:export",),
+        (options("packing:required grains:export contacts:export"),),
     ),
     Command(
         "bench",
         "measure the run time and error of every solver on this machine",
         "granforce bench --quick --out bench",
-        ("--json --quick:bench --out:bench --documents:bench --table:bench",),
+        (options("--json --quick:bench --out:bench --documents:bench --table:bench"),),
         (
             Rule(
                 "without --documents or --out",
                 lambda arguments: not (arguments.documents or arguments.out),
-                "--table",
+                options("--table:bench"),
             ),
-            with_option("--table", "--quick --json"),
+            with_option("--table", options("--quick:bench --json")),
         ),
     ),
     Command(
@@ -513,14 +551,14 @@ COMMANDS = (
         "list, clear or verify the store of results, or print its size or its path; also for the "
         "built documentation and the compiled kernels",
         "granforce cache verify --cache scan.zarr",
-        ("--json action --kind --yes --cache",),
+        (options("--json action --kind --yes --cache"),),
         (
-            Rule("with path", lambda arguments: arguments.action == "path", "--kind"),
-            Rule("without clear", lambda arguments: arguments.action != "clear", "--yes"),
+            Rule("with path", lambda arguments: arguments.action == "path", options("--kind")),
+            Rule("without clear", lambda arguments: arguments.action != "clear", options("--yes")),
             Rule(
                 "with documentation or kernels",
                 lambda arguments: arguments.kind in ("documentation", "kernels"),
-                "--cache",
+                options("--cache"),
             ),
         ),
     ),

@@ -27,6 +27,22 @@ class Option(NamedTuple):
     listed: bool = False  # several values, separated by commas
     repeated: bool = False  # can be given several times
     default_shown: bool = True  # in the help, if it is a number that the text does not mention
+    key: str = ""  # in `OPTIONS`
+
+    @property
+    def typed(self) -> str:
+        """The option as typed in a command line."""
+        return self.key.partition(":")[0]
+
+    @property
+    def attribute(self) -> str:
+        """The attribute of parsed arguments that holds it."""
+        return attribute(self.typed)
+
+    @property
+    def hidden(self) -> Option:
+        """This option, left out of the help text."""
+        return self._replace(help=argparse.SUPPRESS, default_shown=False)
 
     @property
     def keywords(self) -> dict[str, Any]:
@@ -51,14 +67,14 @@ class Option(NamedTuple):
         return f"{self.help} (default {self.default:g})" if self.default_shown else self.help
 
 
-def attribute(key: str) -> str:
-    """The attribute of parsed arguments that holds the option with a key of `OPTIONS`."""
-    return as_typed(key).lstrip("-").replace("-", "_")
+def attribute(typed: str) -> str:
+    """The attribute of parsed arguments that holds an option as typed."""
+    return typed.lstrip("-").replace("-", "_")
 
 
-def as_typed(key: str) -> str:
-    """The option with a key of `OPTIONS` as typed in a command line."""
-    return key.partition(":")[0]
+def options(keys: str) -> tuple[Option, ...]:
+    """Options by their keys in `OPTIONS`, separated by blanks."""
+    return tuple(OPTIONS[key]._replace(key=key) for key in keys.split())
 
 
 def spec_or_file(word: str) -> str:

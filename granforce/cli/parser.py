@@ -15,8 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NoReturn
 
 from granforce import __version__
-from granforce.cli.command_table import COMMANDS, Command, Group, Hidden, Rule
-from granforce.cli.option_table import OPTIONS, as_typed
+from granforce.cli.command_table import COMMANDS, Command, Group, Options, Rule
 from granforce.cli.path_roles import ROLES, Output, TableOrStore
 from granforce.cli.report_lines import FEW, explained
 from granforce.system.wording import integer, number
@@ -307,9 +306,6 @@ def _add_command(
     return parser
 
 
-def _add_options(group: argparse._ActionsContainer, keys: str) -> None:
-    for key in keys.split():
-        keywords = OPTIONS[key].keywords
-        if isinstance(keys, Hidden):
-            keywords["help"] = argparse.SUPPRESS
-        group.add_argument(as_typed(key), **keywords)
+def _add_options(group: argparse._ActionsContainer, options: Options) -> None:
+    for option in options:
+        group.add_argument(option.typed, **option.keywords)

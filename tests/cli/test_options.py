@@ -201,12 +201,12 @@ def test_every_command_and_every_way_has_a_line():
 
 def test_every_option_of_the_table_belongs_to_a_command():
     commands_and_formats = [*command_table.COMMANDS, *command_table.FORMATS]
-    parts = [part for command in commands_and_formats for part in command.parts]
-    texts = [
-        f"{part.one_of} {part.options}" if isinstance(part, command_table.Group) else part
-        for part in parts
-    ]
-    assert set(" ".join(texts).split()) == option_table.OPTIONS.keys()
+    keys = set()
+    for command in commands_and_formats:
+        for part in command.parts:
+            grouped = isinstance(part, command_table.Group)
+            keys.update(option.key for option in (part.one_of + part.options if grouped else part))
+    assert keys == option_table.OPTIONS.keys()
 
 
 @pytest.mark.parametrize("command, line", CASES)
