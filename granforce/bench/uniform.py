@@ -50,7 +50,7 @@ MOST_DENSE_WALLS = 6000
 # States per chain to time a way of storing rows, after as many that fill the store.
 _TIMED = 2
 # Where rows of K are stored, as fractions of `billiard.MEMORY`.
-ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e3}
+ROOMS = {"16 rows at a time": 0.0, "rows within the memory": 1.0, "all rows kept": 1e3}
 
 
 def uniform(
@@ -131,6 +131,7 @@ def uniform_growth(
     process until then. seconds_per_state: processor time per further effective state, by where rows
     of K are stored, which does not change the states. setup_seconds: centre, factor and, if there
     is room, rows of K; null_space_ratio: a dense null space of the balance over that.
+    seconds_of_eight: processor time of eight networks, warm-up included.
     """
     base = ensemble(pack(n, mu, seed))
     sample_uniform(ensemble(tile(base, 1), prune=False), 8)  # compiles
@@ -148,6 +149,7 @@ def uniform_growth(
             "seconds": seconds,
             "peak_MB": peak_megabytes(),
             "setup_seconds": setup,
+            "seconds_of_eight": timed(sample_uniform, S, 8, seed=seed, clock=time.process_time)[0],
         }
         if polytope.count <= MOST_DENSE_WALLS:
             row["null_space_ratio"] = _null_space(S, polytope) / setup

@@ -17,12 +17,14 @@ import numpy as np
 from granforce.numerics import lanes
 from granforce.numerics.lanes import MANY, compiled, inline, within
 from granforce.system import cancelling
+from granforce.system.memory import machine_memory
 from granforce.types import Floats, Integers, Mask
 
 # The search for the next wall skips blocks of this many: walls are padded to a multiple of it.
 BLOCK = 64
-# Memory for rows of K, all threads together: all those of 11,500 walls (3500 disks at μ = 0.1) fit.
-MEMORY = 1 << 30
+# Memory for rows of K, all threads together: all those of 23,000 walls (7000 disks at μ = 0.1) fit.
+# Only rows that are computed occupy it.
+MEMORY = min(4 << 30, machine_memory() / 4)
 # Reflections after which a path is rejected, per dimension; a typical path has less than one.
 MOST_TURNS = 10
 # Slacks stay above this: a point that rounding puts on a wall is reflected there at once.

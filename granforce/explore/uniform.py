@@ -51,8 +51,10 @@ BATCH = lanes.LANES
 # Moves of hit-and-run per state and dimension; its chains mix more slowly by about this factor.
 MOVES_PER_DIMENSION = 20
 # States dropped at the start of each chain; the first part determines the path length of the
-# second, which determines the final one.
+# second, which determines the final one. The distance from the centre is stationary after three
+# states, so that large S, where a state costs dimension², get fewer.
 WARM_UP = 20, 40
+WARM_UP_OF_LARGE, LARGE = (5, 10), 1000  # beyond this dimension
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed.,
 # 11.4); for mixed chains the largest R̂ of 1300 components is 1.01 with 1000 states, 1.06 with 200.
 MIXED = 1.1
@@ -351,13 +353,18 @@ def start_chains(polytope: Walls, chains: int, seed: int) -> list[ChainState]:
     return [init(polytope, child) for child in np.random.SeedSequence(seed).spawn(chains)]
 
 
+def warm_up_states(dimension: int) -> tuple[int, ...]:
+    """States of each chain dropped in the parts of the warm-up."""
+    return () if not dimension else WARM_UP_OF_LARGE if dimension > LARGE else WARM_UP
+
+
 def warm_up(
     polytope: Walls, chains: int, seed: int, stores: Sequence[RowStore], *, method: str = "billiard"
 ) -> tuple[list[ChainState], float, Integers]:
     """Chains ready to draw from: (ChainState of each, reach, turns and rejected paths of each)."""
     ends, counts = start_chains(polytope, chains, seed), np.zeros((chains, 2), dtype=int)
     reach = float(np.sqrt(polytope.dimension))
-    for count in WARM_UP if polytope.dimension else ():
+    for count in warm_up_states(polytope.dimension):
         advance = partial(step, polytope, count=count, reach=reach, method=method)
         ends, slacks, done = advance_all(stores, ends, advance)
         counts += done
@@ -436,7 +443,7 @@ def _start(
     ready = time.perf_counter()
     stores = stores_for(polytope, chains, workers)
     ends, reach, done = warm_up(polytope, chains, seed, stores, method=method)
-    dropped = chains * sum(WARM_UP) if polytope.dimension else 0
+    dropped = chains * sum(warm_up_states(polytope.dimension))
     counts = {"turns": 0, "refused": 0, "dropped": dropped}
     nothing = np.zeros((chains, 0))
     sample = UniformSample(

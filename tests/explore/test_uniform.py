@@ -131,6 +131,11 @@ def test_more_than_a_thousand_dimensions():
     assert sample.walls.dimension == S.dimension > 1000
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
     assert sample.counts["refused"] == 0 and sample.mixing.worst_r_hat < 1.1
+    # The short warm-up of large S is long enough: the energy does not drift afterwards.
+    energy = np.sum(sample.states**2, axis=(2, 3))
+    first, rest = energy[:, :10], energy[:, 10:]
+    error = rest.std() * np.sqrt(3 / first.size)  # autocorrelation of about three states
+    assert abs(first.mean() - rest.mean()) < 3 * error
 
 
 def test_chains_mix(sample):
