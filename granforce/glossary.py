@@ -274,12 +274,12 @@ TERMS = {
         "uniform in S",
         "Networks drawn so that every part of S is visited in proportion to its volume.",
     ),
-    "accelerated": Term(
+    "nearest": Term(
         "nearest-network walk",
         "After a kick, the balanced network nearest to the kicked forces in force space: fast, "
         "and always found.",
     ),
-    "nearest": Term(
+    "nearest_piqp": Term(
         "nearest-network walk, by PIQP",
         "The same network nearest to the kicked forces, computed by another program as a check.",
     ),

@@ -28,12 +28,12 @@ from granforce.cli.entry_point import main
 from granforce.cli.parser import make_parser
 from granforce.cli.results import with_units
 from granforce.explore import uniform
+from granforce.explore.random_walk import RELAXATIONS
 from granforce.figures import picture
 from granforce.glossary import TERMS
 from granforce.packing import compaction
 from granforce.packing.scenes import SCENES
 from granforce.perturb import grain_loads
-from granforce.study import scan
 from granforce.study.cells import scan_rows
 from granforce.study.schema import VARIABLES
 from granforce.system import terminal
@@ -350,13 +350,8 @@ def test_a_table_in_another_unit_is_refused_where_forces_are_known(cache, capsys
 
 
 def test_relaxations_are_typed_as_functions_are_called():
-    from granforce.study.kinds.states import RELAXATIONS as computed
-    from granforce.study.relaxations import RELAXATIONS as typed
-
-    assert set(typed.values()) == set(computed)
-    for name, word in typed.items():
-        function = computed[word]["relax"]
-        assert getattr(gf, name.removesuffix("_only")) is function
+    for name, options in RELAXATIONS.items():
+        assert getattr(gf, name.removesuffix("_only")) is options["relax"]
     S = gf.ensemble(reference("n100_mu0.1_s11"))
     named, called = gf.walk(S, 2, relax="nearest_piqp"), gf.walk(S, 2, relax=gf.nearest_piqp)
     assert np.array_equal(named.states, called.states)
@@ -370,8 +365,8 @@ def test_stored_walks_are_listed_with_the_relaxation_as_typed(cache, capsys):
     assert main(["cache", "list", "--kind", "walk", "--json"]) == 0
     (entry,) = json.loads(capsys.readouterr().out)
     assert json.loads(entry["params"])["relax"] == "nearest"
-    (stored,) = gf.open_store(cache / "cache").find("walk")
-    assert stored.params["relax"] == "accelerated"  # keys stay
+    (stored,) = gf.open_store(cache / "cache").find("walk", relax="nearest")
+    assert stored.params["relax"] == "nearest"
 
 
 def test_results_are_labelled_in_xarray_and_pandas():
@@ -1326,16 +1321,6 @@ def test_contacts_that_pull_are_named_where_nothing_balances():
     packing = gf.read_lammps(io.StringIO(particles), io.StringIO(contacts), mu=0.5)
     with pytest.raises(gf.NotJammedError, match="forces pull on contact 0, and contacts can only"):
         gf.ensemble(packing)
-
-
-def test_failed_cells_of_a_scan_have_the_relaxation_as_typed(tmp_path, monkeypatch):
-    def all_fail(path, cells, **options):
-        assert [cell["relax"] for cell in cells] == ["accelerated"]  # as stored
-        return [], [(cell, "lost") for cell in cells]
-
-    monkeypatch.setattr(scan, "walks", all_fail)
-    _, [(cell, _)] = gf.scan(tmp_path / "s.zarr", [0.3], n=12, states=3)
-    assert cell["relax"] == "nearest"
 
 
 def square_lattice(f_n, across, up):

@@ -9,15 +9,14 @@ from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, friction
 from granforce.study import kinds
 from granforce.study.keys import Parameters
-from granforce.study.relaxations import typed_relaxation
 from granforce.system.wording import number
 
 from ..background.limits import Limits
 
-# Names on screen of kinds.RELAXATIONS; the first is the default of a new walk.
+# Names on screen of `walk`'s relaxations; the first is the default of a new walk.
 SOLVERS = {
-    "accelerated": "nearest-network walk",
-    "nearest": "nearest-network walk, by PIQP",
+    "nearest": "nearest-network walk",
+    "nearest_piqp": "nearest-network walk, by PIQP",
     "gauss_seidel": "walk by sweeps, finished exactly",
     "gauss_seidel_only": "the paper's walk, by sweeps alone",
 }
@@ -30,7 +29,7 @@ KEPT_BYTES = 64e6
 # Disks times (disks, for the packing, and states) up to which states appear quickly, and the
 # relative cost of a state of each kind.
 EASY = 500_000
-_WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
+_WEIGHTS = {"nearest": 1, "uniform": 2, "nearest_piqp": 3, "gauss_seidel": 10}
 _WEIGHTS["gauss_seidel_only"] = 10
 
 
@@ -40,7 +39,7 @@ class Selection(NamedTuple):
     packing: Parameters  # parameters of kinds.PACKING
     mu: float  # friction coefficient of the ensemble
     kind: str = "walk"  # one of KINDS
-    relax: str = "accelerated"  # of the walk
+    relax: str = "nearest"  # of the walk
     states: int = 200
     seed: int = 0  # of the walk or sample
 
@@ -136,7 +135,7 @@ def _plain(selection: Selection) -> Selection:
 def selected(kind: str, parameters: Parameters) -> Selection:
     """The Selection of these parameters of a walk or sample."""
     packing, mu = parameters["packing"], float(parameters["mu"])
-    relax = parameters.get("relax", "accelerated")
+    relax = parameters.get("relax", "nearest")
     return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
 
 
@@ -205,7 +204,7 @@ def command(selection: Selection) -> str:
     """The command that computes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
-        words += ["--walk-seed", selection.seed, "--relax", typed_relaxation(selection.relax)]
+        words += ["--walk-seed", selection.seed, "--relax", selection.relax]
     elif selection.seed:
         words += ["--sample-seed", selection.seed]
     return shlex.join(str(word) for word in words)

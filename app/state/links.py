@@ -11,12 +11,11 @@ import numpy as np
 from granforce.packing.scenes import BLOCKS
 from granforce.records import InputError, brief, choice, friction
 from granforce.study.keys import Parameters
-from granforce.study.relaxations import RELAXATIONS, typed_relaxation
 from granforce.system.wording import integer, number
 from granforce.types import Integers
 
 from ..results.replays import Replay
-from ..results.selection import KINDS, OPTIONS, Selection, select, typed, unusual
+from ..results.selection import KINDS, OPTIONS, SOLVERS, Selection, select, typed, unusual
 from . import known, pulls
 
 View = dict[str, Any]  # parameters stored in links
@@ -41,7 +40,7 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
         given["packed"] = f"{packing['mu']:.9g}"
     given |= {"source": selection.kind, "states": selection.states}
     if selection.kind == "walk":
-        given["relax"] = typed_relaxation(selection.relax)
+        given["relax"] = selection.relax
     if selection.seed:
         given["walkseed"] = selection.seed
     return urlencode(given | view)
@@ -67,9 +66,7 @@ def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
 
 def _read_selection(given: dict[str, str]) -> Selection:
     kind = choice(given.pop("source", "walk"), KINDS, "source")
-    relax = given.pop("relax", "nearest")
-    if relax != "accelerated":  # as links of earlier versions call it
-        relax = RELAXATIONS[choice(relax, RELAXATIONS, "relax")]
+    relax = choice(given.pop("relax", "nearest"), SOLVERS, "relax")
     mu = friction(typed(given.pop("mu")))
     packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
     rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}

@@ -17,7 +17,7 @@ LABELS = {
     "Networks": "states",
     "Friction during packing": "packed_mu",
     "Networks from": "s",
-    "Relaxation": "accelerated",
+    "Relaxation": "nearest",
     "Precomputed results": "store",
     "network as packed": "original",
     "force as packed": "original",

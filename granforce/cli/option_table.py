@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from granforce.cli.path_roles import Edited, Input, Output, StorePath, TableOrStore, Workplace
-from granforce.study.relaxations import RELAXATIONS
+from granforce.study.relaxations import STORED
 from granforce.system.wording import number
 
 TABLES = ("csv", "npz", "zarr")  # suffixes of files that hold a value per contact or per state
@@ -399,7 +399,7 @@ OPTIONS = {
         "Gauss–Seidel sweeps to a residual of 1e-6; gauss_seidel sweeps to 1e-3 and finishes "
         "with the nearest network",
         default="nearest",
-        choices=tuple(RELAXATIONS),
+        choices=tuple(STORED),
     ),
     "--repair": Option(
         "repair up to this fraction of the data (default 0.1); the report lists every repair",

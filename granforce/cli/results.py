@@ -23,7 +23,6 @@ from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
-from granforce.study.relaxations import RELAXATIONS
 from granforce.study.series import check_folder
 from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, content_of
@@ -318,7 +317,7 @@ def walk_result(arguments: argparse.Namespace, output: str | None = None) -> Sto
         watching=eta_shown,
         states=arguments.states,
         seed=arguments.walk_seed,
-        relax=RELAXATIONS[arguments.relax],
+        relax=arguments.relax,
         chains=arguments.chains,
         **conditions(arguments),
     )

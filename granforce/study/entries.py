@@ -63,7 +63,7 @@ def attributes(
 ) -> dict[str, Any]:
     """Attributes of an entry: the caller's, its identity, its origin and time, and its checksum."""
     attrs = {key: value for key, value in given.items() if key not in (*_IDENTITY, *_PROVENANCE)}
-    attrs |= {"kind": kind, "parameters": keys.canonical(params)}
+    attrs |= {"kind": kind, "parameters": keys.described(params)}
     if "seed" in params:
         attrs["seed"] = params["seed"]
     attrs |= {"algorithm_version": version, "schema_version": keys.SCHEMA_VERSION}
@@ -185,7 +185,7 @@ def read_attributes(folder: Path) -> dict[str, Any] | None:
     """An entry's attributes, or None if they are unreadable or belong to another name."""
     try:
         attrs = json.loads((folder / "zarr.json").read_bytes())["attributes"]
-        params = json.loads(attrs["parameters"])
+        params = keys.parameters(attrs["parameters"])
         versions = attrs["algorithm_version"], attrs["schema_version"]
         name_matches = folder.name == keys.entry_name(attrs["kind"], params, *versions)
         return attrs if name_matches and {"created", "checksum"} <= attrs.keys() else None

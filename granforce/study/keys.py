@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from granforce.study.relaxations import as_stored, from_stored
 from granforce.tolerances import MU_DIGITS
 
 Parameters = dict[str, Any]  # plain values by name, from which a key is made
@@ -57,9 +58,20 @@ def _quantised(value: float | np.floating[Any], where: str) -> int | float:
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
 
 
+def described(params: Mapping[str, Any]) -> str:
+    """The text of parameters in the attributes of an entry; TypeError as for `canonical`."""
+    return canonical(as_stored(params))
+
+
+def parameters(text: str) -> Parameters:
+    """The parameters in such a text."""
+    return from_stored(json.loads(text))
+
+
 def entry_name(kind: str, params: Mapping[str, Any], version: int | str, schema: int) -> str:
     """Name of an entry: <kind>-<20 hexadecimal digits>; TypeError as for `canonical`."""
-    content = canonical({"kind": kind, "params": params, "version": version, "schema": schema})
+    named = {"kind": kind, "params": as_stored(params), "version": version, "schema": schema}
+    content = canonical(named)
     name = f"{kind}-{hashlib.sha256(content.encode()).hexdigest()[:KEY_DIGITS]}"
     if not ENTRY.fullmatch(name):
         raise ValueError(f"kind must be a lower-case word, got {kind!r}")

@@ -28,7 +28,6 @@ from granforce.records import (
     InputError,
     Packing,
     brief,
-    choice,
     friction,
     real_array,
     refuse_options,
@@ -40,7 +39,6 @@ from granforce.study.cells import StudyCell, entry_name, get, load, row
 from granforce.study.cluster import client_of, over_dask
 from granforce.study.keys import Parameters, canonical
 from granforce.study.processes import TRIES, Calls, Tasks, Waits, lost, one_pool, run_cell
-from granforce.study.relaxations import RELAXATIONS
 from granforce.study.store import open_store
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
@@ -136,17 +134,16 @@ def scan(
             states,
             walk_seed,
             mu=ensemble_mu,
-            relax=RELAXATIONS[choice(relax, RELAXATIONS, "relax")],
+            relax=relax,
             chains=chains,
             keep=keep,
         )
         for one in mus
         for seed in range(1, seeds + 1)
     ]
-    rows, failed = walks(
+    return walks(
         path, cells, workers=workers, scheduler=scheduler, dtypes=dtypes, progress=progress
     )
-    return rows, [(kinds.typed(parameters), message) for parameters, message in failed]
 
 
 def _check_dtypes(dtypes: Mapping[str, str]) -> None:

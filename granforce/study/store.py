@@ -326,7 +326,7 @@ class Store(Mapping[str, xr.Dataset]):
         return None if attrs is None else self._entry(name, attrs)
 
     def _entry(self, name: str, attrs: Mapping[str, Any]) -> Entry:
-        params = json.loads(attrs["parameters"])
+        params = keys.parameters(attrs["parameters"])
         size = folder_bytes(self.path / name)
         return Entry(
             name=name,
@@ -359,7 +359,7 @@ class Store(Mapping[str, xr.Dataset]):
             attrs = self._attrs(name)
             if attrs is None:
                 return True  # to be warned about
-            known = json.loads(attrs["parameters"])
+            known = keys.parameters(attrs["parameters"])
             return all(
                 key in known and keys.canonical(known[key]) == value
                 for key, value in parameters.items()

@@ -11,11 +11,11 @@ import granforce
 from granforce.cli.command_table import COMMANDS, FORMATS
 from granforce.cli.report_lines import line
 from granforce.cli.results import StoredResult
+from granforce.explore.random_walk import RELAXATIONS
 from granforce.fields import fields
 from granforce.quantities import QUANTITIES
-from granforce.study import kinds
 from granforce.study.evolution import SCALARS
-from granforce.study.relaxations import RELAXATIONS
+from granforce.study.relaxations import STORED, as_stored, from_stored
 from granforce.study.responses import unsteady
 from granforce.study.schema import labelled
 
@@ -76,9 +76,10 @@ def test_numbers_of_snapshots_mean_what_the_store_says():
 
 
 def test_relaxations_have_one_name_where_people_read_them():
-    assert set(RELAXATIONS.values()) == kinds.RELAXATIONS.keys()
-    for typed, stored in RELAXATIONS.items():
-        assert kinds.typed({"relax": stored})["relax"] == typed
+    assert STORED.keys() == RELAXATIONS.keys()
+    for name, stored in STORED.items():
+        assert as_stored({"relax": name}) == {"relax": stored}
+        assert from_stored({"relax": stored}) == {"relax": name}
 
 
 def test_directions_taken_as_pinned_are_reported_where_there_are_any():

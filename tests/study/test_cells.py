@@ -18,7 +18,7 @@ from granforce.study.store import open_store
 
 def cell(packed_mu=0.3, seed=1, states=6, n=20, **options):
     packing = kinds.PACKING.parameters(n, packed_mu, seed)
-    return kinds.WALK.parameters(packing, states, relax="nearest", **options)
+    return kinds.WALK.parameters(packing, states, relax="nearest_piqp", **options)
 
 
 def test_a_cell_is_computed_once(tmp_path):
@@ -122,7 +122,7 @@ def test_packings_from_elsewhere_are_named_by_their_content(tmp_path):
     packing, _ = kinds.get_packing(store, cell()["packing"])
     named = kinds.imported_parameters(packing)
     kinds.keep_packing(store, named, packing)
-    walked = kinds.WALK.parameters(named, 4, relax="nearest")
+    walked = kinds.WALK.parameters(named, 4, relax="nearest_piqp")
     assert study.get(store, kinds.WALK, walked)[0].sizes["state"] == 4
     other = kinds.imported_parameters(packing._replace(mu=0.31))
     assert other != named

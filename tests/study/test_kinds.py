@@ -22,7 +22,7 @@ MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 # What entries are called since packings are of version 6, which all others name by its parameters.
 NAMES = {
     "packing": ((20, 0.1, 1), {}, "packing-e92faea7640195223d3c"),
-    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-1d62362ee85d8524a995"),
+    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest_piqp"}, "walk-1d62362ee85d8524a995"),
     "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-50d4941ac9f07fe279e3"),
     "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-75597dd2cb17663205e9"),
     "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-c54698df5db99cfb720a"),

@@ -184,7 +184,7 @@ def cache(arguments: argparse.Namespace) -> int:
     else:
         entries = store.find(arguments.kind)
         if arguments.json:
-            params = [{"params": json.dumps(kinds.typed(entry.params))} for entry in entries]
+            params = [{"params": json.dumps(entry.params)} for entry in entries]
             print(json_text([e._asdict() | more for e, more in zip(entries, params, strict=True)]))
         else:
             _print_entries(entries)
@@ -237,7 +237,7 @@ def _print_entries(entries: Sequence[Entry]) -> None:
     print(f"{'name':<28}  {'bytes':>{size}}  {'created':<10}  contents")
     for entry in entries:
         line = f"{entry.name:<28}  {entry.bytes:>{size}}  {entry.created[:10]}  "
-        line += _contents(kinds.typed(entry.params))
+        line += _contents(entry.params)
         print(line if len(line) <= width else f"{line[: width - 1]}…")
 
 

@@ -16,11 +16,9 @@ from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
 from granforce.study.kinds.states import (
     INFERENCE,
     INFORMATIVE,
-    RELAXATIONS,
     UNIFORM,
     VOLUME,
     WALK,
-    typed,
 )
 
 __all__ = [
@@ -33,7 +31,6 @@ __all__ = [
     "PACKING",
     "PERTURBATION",
     "PERTURBED_CONTACT",
-    "RELAXATIONS",
     "STRESS",
     "UNIFORM",
     "VOLUME",
@@ -42,7 +39,6 @@ __all__ = [
     "imported_parameters",
     "keep_packing",
     "parameters_of",
-    "typed",
 ]
 
 KINDS = {

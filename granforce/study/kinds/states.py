@@ -11,14 +11,12 @@ from granforce.experiment import remeasured
 from granforce.experiment.carrying import carrying
 from granforce.experiment.infer import infer
 from granforce.experiment.informative import informative
-from granforce.explore import random_walk
-from granforce.explore.random_walk import Walk, walk
+from granforce.explore.random_walk import RELAXATIONS, Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import LEAST_ACCURACY, volume
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, spread_of
-from granforce.records import InputError, brief, positive, random_seed, whole
-from granforce.study import relaxations
+from granforce.records import InputError, choice, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
@@ -33,10 +31,6 @@ from granforce.types import Progress
 # Least memory of a walk per state and disk: f_n and f_t of 1.5 contacts, twice (during the walk and
 # in the result).
 STATE_BYTES = 48
-# Arguments of `walk`, by the name of the relaxation in keys of results.
-RELAXATIONS = {
-    stored: random_walk.RELAXATIONS[name] for name, stored in relaxations.RELAXATIONS.items()
-}
 
 
 def _walk_parameters(
@@ -45,7 +39,7 @@ def _walk_parameters(
     seed: int = 0,
     *,
     mu: Any = None,
-    relax: str = "accelerated",
+    relax: str = "nearest",
     chains: int = 1,
     keep: int | None = None,
     residual: float | None = None,
@@ -61,10 +55,7 @@ def _walk_parameters(
     state the walk is stored with the states it has; by default too few states are an error. skip:
     whether to skip relaxation if S is one point. conditions: on the forces.
     """
-    if relax not in RELAXATIONS:
-        raise InputError(
-            f"unknown relaxation {brief(relax)}; choose one of {', '.join(RELAXATIONS)}"
-        )
+    choice(relax, RELAXATIONS, "relax")
     size = _size(packing, states, seed, chains, keep)
     if size["chains"] > size["states"]:
         raise InputError("there must be at least as many states as chains")
@@ -86,13 +77,6 @@ def _walk_parameters(
     if not skip:
         named["skip"] = False
     return named
-
-
-def typed(parameters: Parameters) -> Parameters:
-    """Parameters with the name of their relaxation as typed."""
-    if parameters.get("relax") not in RELAXATIONS:
-        return parameters
-    return parameters | {"relax": relaxations.typed_relaxation(parameters["relax"])}
 
 
 def _size(

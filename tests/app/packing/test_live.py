@@ -52,7 +52,7 @@ class Browser:
 
 
 def asked(mu, states=20, **others):
-    return select(DISKS, mu, 1, states=states, relax="nearest", **others)
+    return select(DISKS, mu, 1, states=states, relax="nearest_piqp", **others)
 
 
 def test_compaction_and_walk_are_seen_as_they_go(state):

@@ -10,7 +10,7 @@ from app.state.app_state import AppState
 
 
 def asked(mu, **others):
-    return select(DISKS, mu, 1, **{"states": STATES, "relax": "nearest"} | others)
+    return select(DISKS, mu, 1, **{"states": STATES, "relax": "nearest_piqp"} | others)
 
 
 def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state):
