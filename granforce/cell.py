@@ -39,7 +39,7 @@ class Cell(NamedTuple):
         return np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]) @ self.vectors
 
     @property
-    def extent(self) -> Floats:
+    def bounding_box(self) -> Floats:
         """Lower left and upper right corners (2, 2) of the bounding box; inf in open directions."""
         lean = np.array([self.tilt, 0.0])
         return np.array([np.minimum(lean, 0.0), self.box + np.maximum(lean, 0.0)])

@@ -107,7 +107,7 @@ def _window(packing: Picture) -> tuple[Floats, Floats]:
     low = np.min([*(packing.x - radius), *np.concatenate([packing.x, *packing.polygons])], axis=0)
     high = np.max([*(packing.x + radius), *np.concatenate([packing.x, *packing.polygons])], axis=0)
     closed = np.isfinite(packing.cell.box)
-    corner, opposite = packing.cell.extent
+    corner, opposite = packing.cell.bounding_box
     low = np.where(closed, corner, low)
     return low, np.where(closed, opposite, high) - low
 

@@ -89,7 +89,7 @@ QUANTITIES = {
     "worst_r_hat": Field("", "", "largest split R̂ of any component"),
     "least_bulk_size": Field("", "", "smallest bulk effective sample size"),
     "least_tail_size": Field("", "", "smallest tail effective sample size"),
-    "reached": whole("", "1 if the chains mixed and reached the requested effective size"),
+    "reached": whole("", "1 if the requested size or accuracy was reached"),
     "turns": whole("", "reflections of the billiard walk"),
     "refused": whole("", "paths discarded because of too many reflections"),
     "dropped": whole("", "states discarded while the chains warmed up"),
@@ -169,7 +169,7 @@ QUANTITIES = {
     "log_volume_error": Field("", "", "standard error of ln V"),
     "log_volume_ladders": Field("ladder", "", "ln V from the ladder down and the ladder up"),
     "log_volume_per_grain": Field("", "", "ln V per grain of the backbone"),
-    "extent": Field("", MEAN, "extent V^(1/h)/√(2πe) of S per free dimension"),
+    "extent": Field("", MEAN, "width V^(1/h)/√(2πe) of S per free dimension"),
     # the outline of S in a plane of force space
     "axes": Field("plane_axis contact component", "", "axes of the plane"),
     "inner": Field("inner_corner plane_axis", MEAN, "polygon inside the outline"),

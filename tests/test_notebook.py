@@ -63,7 +63,7 @@ def test_a_tilted_cell_is_cut_at_its_sides():
     corners = [p.split(",") for p in clip[0].get("points").split()]
     corners = np.array(corners, float)
     assert len(corners) == 4
-    scale = notebook.SIDE / np.ptp(packing.cell.extent, axis=0).max()
+    scale = notebook.SIDE / np.ptp(packing.cell.bounding_box, axis=0).max()
     assert np.linalg.norm(corners[1] - corners[0]) == pytest.approx(packing.box[0] * scale, abs=0.2)
     drawn = np.array(
         [[float(c.get(key)) for key in ("cx", "cy", "r")] for c in picture.iter(f"{SVG}circle")]

@@ -64,7 +64,7 @@ def states(library: Library, selection: Selection) -> Work:
                         progress=lambda done, total: _counted(job, done, total),
                         **_watched(job, selection, params),
                     )
-                cell = library.find(selection.kind, kind.reached(params, dataset))
+                cell = library.find(selection.kind, kind.parameters_of(params, dataset))
             if cell is None:
                 raise InputError("these networks were removed from the cache; compute them again")
         return library.shown(cell)

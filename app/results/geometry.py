@@ -78,7 +78,7 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     """(x_low, x_high, y_low, y_high) of a square around the cell (or the grains, if open)."""
     margin = MARGIN * unit(packing)
     periodic = np.isfinite(packing.box)
-    corner, opposite = packing.cell.extent
+    corner, opposite = packing.cell.bounding_box
     r, shapes = packing.r[:, None], packing.shapes
     ends = np.concatenate([x - r, x + r])
     if shapes is not None:

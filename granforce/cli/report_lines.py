@@ -120,7 +120,7 @@ _LINES: dict[str, str | Line] = {
     "ln_volume_on_the_way_up": "ln V from the ladder of increasing β alone",
     "ln_volume_per_grain": Line("ln V per grain of the backbone", "log_volume_per_grain"),
     "extent_over_mean_normal_force": Line(
-        "extent V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩", "extent"
+        "width V^(1/h)/√(2πe) of S per dimension, in units of ⟨f_n⟩", "extent"
     ),
     "paths": "paths of the billiard walk",
     "mean_limit_load": Line("mean limit load", "limit_load", "mean", FORCE),

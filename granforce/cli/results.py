@@ -300,7 +300,7 @@ def unit(arguments: argparse.Namespace, dataset: xr.Dataset) -> Unit:
     return PACKING_UNIT
 
 
-def extents(dataset: xr.Dataset) -> dict[str, float]:
+def interval_lengths(dataset: xr.Dataset) -> dict[str, float]:
     """Lengths of the finite intervals of f_n, by name, in the packing's unit."""
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
     extent = extent[np.isfinite(extent)]

@@ -267,7 +267,7 @@ def _without_limit(ensemble: Ensemble, system: System, keys: Sequence[Key]) -> B
 
 def needs_no_program(ensemble: Ensemble, system: System) -> bool:
     """Whether everything is `determined`; checked only if S has no interior or forces are known."""
-    checked = ensemble.known is not None or not system.middle.reached
+    checked = ensemble.known is not None or not system.middle.converged
     return checked and ensemble.is_determined
 
 

@@ -158,8 +158,8 @@ def supports(
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     _, solutions = solved(solver, plane, directions)
-    reached = (solutions.point * solutions.d).sum(axis=1)
-    return reached, np.abs(solutions.bound - reached)
+    inner = (solutions.point * solutions.d).sum(axis=1)
+    return inner, np.abs(solutions.bound - inner)
 
 
 def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:

@@ -176,14 +176,14 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
 
     Multipliers diverge at an end, so its network is computed slightly inside.
     """
-    reached = reach(ensemble, contact)
+    ends = reach(ensemble, contact)
     beyond = INTERVAL_GAP * ensemble.force_scale
-    for value in values[(values < reached.low - beyond) | (values > reached.high + beyond)]:
+    for value in values[(values < ends.low - beyond) | (values > ends.high + beyond)]:
         raise InputError(
             f"a normal force of {value:.9g} on contact {contact} is outside its exact interval, "
-            f"{reached.low:.9g} to {reached.high:.9g}: no admissible network has it"
+            f"{ends.low:.9g} to {ends.high:.9g}: no admissible network has it"
         )
-    width = reached.high - reached.low
+    width = ends.high - ends.low
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
         states = np.stack([some_network(ensemble, state)] * len(values))
         if np.all(ensemble.admits(states)):
@@ -194,14 +194,14 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         )
     position = ensemble.position(contact)
     for part in _INWARD:
-        inside = reached.low + part * width, reached.high - part * width
+        inside = ends.low + part * width, ends.high - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
         if np.all(admitted := ensemble.admits(states)):
             return states
-    between = np.clip((values - reached.low) / width, 0.0, 1.0)[:, None, None]
+    between = np.clip((values - ends.low) / width, 0.0, 1.0)[:, None, None]
     # The segment between both ends contains a network with each value, so S with that value known
     # is not empty.
-    on_the_line = (1 - between) * reached.states[0] + between * reached.states[1]
+    on_the_line = (1 - between) * ends.states[0] + between * ends.states[1]
     for k in np.flatnonzero(~admitted):
         states[k] = some_network(ensemble.with_normal(position, on_the_line[k]), state)
     if np.all(admitted := ensemble.admits(states)):
@@ -209,7 +209,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not found; choose a value further from the ends of its interval, "
-        f"{reached.low:.9g} to {reached.high:.9g}"
+        f"{ends.low:.9g} to {ends.high:.9g}"
     )
 
 

@@ -94,7 +94,7 @@ def stress_outline(
         raise InputError("give at least one angle")
     support, gap = supports(ensemble, axes, angles, workers=workers)
     polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
-    reached = np.hypot(*polygons.inner.T).max(initial=0.0)
+    friction = np.hypot(*polygons.inner.T).max(initial=0.0)
     bound = np.hypot(*polygons.outer.T).max(initial=0.0) if len(polygons.outer) else np.inf
     original = stress_plane(ensemble, ensemble.original)
     return StressOutline(
@@ -103,7 +103,7 @@ def stress_outline(
         gap,
         polygons.inner,
         polygons.outer,
-        float(reached),
+        float(friction),
         float(bound),
         original,
         polygons.converged,

@@ -89,7 +89,7 @@ class UniformSample(NamedTuple):
     residual: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.residual"]
     violation: Annotated[Floats, "(chains, k) in ⟨f_n⟩, by Ensemble.violation"]
     mixing: Annotated[Mixing, "R̂ and effective sample sizes of each component (NaN if cancelled)"]
-    reached: Annotated[bool, quantity("reached", note="and all are in S")]
+    reached: Annotated[bool, quantity("reached", note="the chains mixed, and all are in S")]
     counts: Annotated[
         dict[str, Any], "turns, rejected paths, dropped, skipped states, held coordinates"
     ]

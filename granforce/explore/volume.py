@@ -30,7 +30,7 @@ from granforce.explore import billiard, uniform
 from granforce.explore.walls import Walls, walls
 from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
-from granforce.quantities import Field, quantity
+from granforce.quantities import quantity
 from granforce.records import positive, random_seed, takes, worker_count
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Integers, Progress
@@ -70,9 +70,7 @@ class Volume(NamedTuple):
     dimension: Annotated[int, quantity("dimension", label="dimension")]
     per_grain: Annotated[float, quantity("log_volume_per_grain", label="per_grain")]
     ladders: Annotated[Floats, quantity("log_volume_ladders")]
-    reached: Annotated[
-        bool, Field("", "", "the error is as requested, and both ladders agree", label="reached")
-    ]
+    reached: Annotated[bool, quantity("reached", note="and both ladders agree")]
     counts: Annotated[dict[str, Any], "rungs, paths, turns, rejected paths"]
     seconds: Annotated[float, quantity("seconds")]
 
@@ -82,8 +80,8 @@ class Volume(NamedTuple):
         return "" if self.reached else inaccurate(self.error, *self.ladders)
 
     @property
-    @derived(quantity("extent"))
-    def extent(self) -> float:
+    @derived(quantity("extent", label="extent"))
+    def width(self) -> float:
         """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
         if not self.dimension:
             return 0.0
@@ -95,7 +93,7 @@ class Volume(NamedTuple):
             "dimension h": self.dimension,
             "ln V": self.log_volume,
             "standard error": self.error,
-            "extent / ⟨fₙ⟩": self.extent,
+            "width / ⟨fₙ⟩": self.width,
             "ln V per grain": self.per_grain,
         }
         return notebook.table("Volume of S", lines)

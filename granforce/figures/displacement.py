@@ -46,7 +46,7 @@ def displacement(
         drawn.append(style.dots(at, "perturbed contact", style.COLOURS[1], backend, size=8))
     periodic = np.isfinite(packing.box).all()
     if periodic:
-        low, high = packing.cell.extent
+        low, high = packing.cell.bounding_box
     else:
         corners = [*(outlines[k] for k in np.flatnonzero(free)), x[known] + arrow * field[known]]
         low, high = (end(np.concatenate(corners), axis=0) for end in (np.min, np.max))

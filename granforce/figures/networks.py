@@ -204,7 +204,7 @@ def outline(packing: Packing, backend: str) -> list[hv.Curve]:
 
 def _axes(packing: Packing, backend: str) -> dict[str, Any]:
     """Options of a frame that shows the cell with equal scales on both axes."""
-    low, high = packing.cell.extent
+    low, high = packing.cell.bounding_box
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     words = {"x": "x / r_max", "y": "y / r_max"}
     return words | limits | style.equal_scales(high - low, backend)

@@ -305,7 +305,7 @@ def _window(packing: Packing) -> tuple[Floats, Floats]:
     disks = ~packing.are_walls
     x, r = packing.x[disks], packing.r[disks, None]
     margin = 0.1 * packing.r[disks].mean()
-    corner, opposite = packing.cell.extent
+    corner, opposite = packing.cell.bounding_box
     closed = np.isfinite(packing.box)
     low = np.where(closed, corner, (x - r).min(axis=0) - margin)
     return low, np.where(closed, opposite, (x + r).max(axis=0) + margin)

@@ -222,7 +222,7 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
         bounding = None
     problem = independent_problem_of(ensemble)
     middle = centre_of(ensemble)
-    states = [middle.y] if middle.reached else []
+    states = [middle.y] if middle.converged else []
     if ensemble.reference is not None:
         states.append(_coordinates(ensemble, ensemble.reference))
     if states:

@@ -85,7 +85,7 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     """
     middle = centre_of(ensemble)
     y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
-    if not middle.reached or not middle.y.min(initial=1.0) > _WELL_INSIDE:
+    if not middle.converged or not middle.y.min(initial=1.0) > _WELL_INSIDE:
         return None
     if ensemble.known is not None:
         normal, tangential = (ensemble.known.value / ensemble.units).T

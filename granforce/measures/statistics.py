@@ -209,12 +209,12 @@ def departure(values: npt.ArrayLike) -> float:
     at, count = np.unique(np.asarray(values, float), return_counts=True)
     if at[0] > 0:
         at, count = np.r_[0.0, at], np.r_[0, count]
-    reached = np.cumsum(count) / count.sum()
+    below = np.cumsum(count) / count.sum()
     gap = np.diff(at)
-    slope = optimize.isotonic_regression(np.diff(reached) / gap, weights=gap, increasing=False).x
-    majorant = reached[0] + np.r_[0.0, np.cumsum(slope * gap)]
+    slope = optimize.isotonic_regression(np.diff(below) / gap, weights=gap, increasing=False).x
+    majorant = below[0] + np.r_[0.0, np.cumsum(slope * gap)]
     # F is lowest just before it rises.
-    return float((majorant[1:] - reached[:-1]).max(initial=0.0))
+    return float((majorant[1:] - below[:-1]).max(initial=0.0))
 
 
 def chance_departure(number: float, level: float = LEVEL) -> float:
@@ -243,9 +243,9 @@ def effective_number(groups: Sequence[Sequence[float] | Floats]) -> float:
         return float("nan")
     part = np.arange(1, 10) / 10
     at = np.quantile(joined, part)
-    reached = np.array([(np.asarray(group)[:, None] <= at).mean(axis=0) for group in groups])
+    below = np.array([(np.asarray(group)[:, None] <= at).mean(axis=0) for group in groups])
     size = np.mean([len(group) for group in groups])
-    excess = (reached.var(axis=0, ddof=1) * size / (part * (1 - part))).mean()
+    excess = (below.var(axis=0, ddof=1) * size / (part * (1 - part))).mean()
     return len(joined) / max(1.0, float(excess))
 
 

@@ -105,13 +105,13 @@ def make_system(
         no_cost = np.zeros(A.shape[1])
         combination = -linear_programs.multipliers(problem, A, no_cost, balance, middle.z)
         weight = A.T @ combination
-        if not middle.reached or weight.min(initial=1.0) <= 0:
+        if not middle.converged or weight.min(initial=1.0) <= 0:
             combination, grows = _bounding_rows(A, b)
             weight = A.T @ combination
         total = float(b @ combination)
     accuracy = INTERVAL_GAP
     if grows is not None:
-        middle = middle._replace(reached=False)
+        middle = middle._replace(converged=False)
         total += _FAR * np.maximum(-weight[grows.mask], 0.0).sum()
         weight = np.where(grows.mask, np.inf, weight)
         accuracy = max(accuracy, _ROUNDED * total)
@@ -217,7 +217,7 @@ class Solver:
         return batch.bounds
 
     def _solve(self, batch: _Batch, every: Sequence[int]) -> None:
-        if self.system.middle.reached:
+        if self.system.middle.converged:
             self._carry(batch, every, refined=False)
             # Among thousands of contacts, rounding may leave the bound of one or two too loose.
             self._carry(batch, batch.open(every), refined=True)
@@ -331,25 +331,25 @@ def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[Prog
 def most_under(system: System) -> tuple[float, float, Floats]:
     """(−F, bound of −F, y) of the largest load F in a System `under` one load.
 
-    −F is inf if no state was reached, and −inf if F has no limit; the bound is −inf if unproved.
+    −F is inf if no state was found, and −inf if F has no limit; the bound is −inf if unproved.
     """
     task, best, bound = Program([], [], 0), np.inf, -np.inf
-    reached = np.empty(0)
+    y = np.empty(0)
     # One column meets every row: the simplex method takes five times as long for 400 blocks.
     for outcome in from_scratch(system, 0, task, solver="ipm"):
         value, below = (float(one[0]) for one in certify(system, [outcome], [task]))
         bound = max(bound, below)
         if value < best:
-            best, reached = value, outcome.y
+            best, y = value, outcome.y
         if best - bound <= system.accuracy:
-            return best, bound, reached
+            return best, bound, y
     # F has no limit if forces balance the load alone.
     load = system.loads.toarray().ravel()
-    for _, y in highs.solutions(highs.standard_form(system.A, -load)):
-        y = np.maximum(y, 0.0)
-        if len(y) and np.abs(system.A @ y + load).max() <= BALANCED * np.abs(load).max():
-            return -np.inf, -np.inf, reached
-    return best, bound, reached
+    for _, balancing in highs.solutions(highs.standard_form(system.A, -load)):
+        forces = np.maximum(balancing, 0.0)
+        if len(forces) and np.abs(system.A @ forces + load).max() <= BALANCED * np.abs(load).max():
+            return -np.inf, -np.inf, y
+    return best, bound, y
 
 
 def from_scratch(

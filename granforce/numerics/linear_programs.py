@@ -63,24 +63,24 @@ class Centre(NamedTuple):
     z: Floats
     v: Floats
     v_border: Floats
-    reached: bool
+    converged: bool
 
 
 def centre(problem: Problem) -> Centre:
     """The analytic centre of a problem, by Newton's method on y z = 1."""
     at, work = contact_program.make_iterate(problem, 1), contact_program.make_workspace(problem, 1)
     at.c[-1] = 1.0
-    reached = False
+    converged = False
     for _ in range(_MOST_STEPS):
         interior_point.look(problem, True, at, work, ONE)
         off = np.abs(at.y * at.z - 1).max()
         unbalance = max(work.unbalance[0, 0], work.slackness[0, 0])
-        reached = bool(off < 0.3 and unbalance < BALANCED)
-        if reached or not np.isfinite(off):
+        converged = bool(off < 0.3 and unbalance < BALANCED)
+        if converged or not np.isfinite(off):
             break
         cancelling.check()
         interior_point.advance(problem, True, CENTRE, at, work, ONE)
-    return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], reached)
+    return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], converged)
 
 
 def run(
@@ -240,7 +240,7 @@ def balanced(
         interior_point.advance(problem, True, BALANCE, at, work, lanes)
         at.y[:, done] = kept
     y, load = at.y[:-1], at.y[-1]
-    if middle.reached:
+    if middle.converged:
         share = np.max(np.maximum(-y, 0.0) / (middle.y[:, None] + np.maximum(-y, 0.0)), axis=0)
         y += share * (middle.y[:, None] - y)
         load *= 1 - share

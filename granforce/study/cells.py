@@ -49,7 +49,7 @@ class Kind(NamedTuple):
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
     # (parameters, dataset) → the parameters of the dataset, which may have ended early
-    reached: Callable[[Parameters, xr.Dataset], Parameters] = _unchanged
+    parameters_of: Callable[[Parameters, xr.Dataset], Parameters] = _unchanged
 
 
 class StudyCell(NamedTuple):
@@ -77,14 +77,14 @@ def get(
 
     workers: threads, which do not change the result. dtypes: as for Store.save, for states.
     options: further arguments of the kind's compute; if they end it early, the result is stored
-    under the parameters that it has `reached`. Raises the errors of compute.
+    under its `parameters_of`. Raises the errors of compute.
     """
     stored = load(store, kind, parameters)
     if stored is not None:
         return stored, True
     store.refuse_unwritable()
     dataset = kind.compute(store, parameters, workers=workers, progress=progress, **options)
-    named = kind.reached(parameters, dataset)
+    named = kind.parameters_of(parameters, dataset)
     save(store, kind, named, dataset, dtypes=dtypes if kind.holds_states else None)
     return dataset, False
 

@@ -272,13 +272,13 @@ def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
     Fractions are in quarters, which add up exactly. Cells may be counted as ended before they are
     reported, and again if a worker died.
     """
-    reached = 0.0
+    shown = 0.0
 
     def tell(parts: float) -> None:
-        nonlocal reached
-        reached = max(reached, min(int(4 * parts) / 4, total))
+        nonlocal shown
+        shown = max(shown, min(int(4 * parts) / 4, total))
         if progress is not None:
-            progress(reached, total)
+            progress(shown, total)
 
     return tell
 

@@ -200,7 +200,7 @@ def test_tilted_cells_are_drawn_with_their_images(library, basis):
     assert len(links.contact) == np.count_nonzero(np.all(seen, axis=-1))
     x_low, x_high, y_low, y_high = replay.window
     assert x_high - x_low == pytest.approx(y_high - y_low)
-    low, high = tilted.cell.extent
+    low, high = tilted.cell.bounding_box
     assert x_low < low[0] and y_low < low[1] and x_high > high[0] and y_high > high[1]
 
 

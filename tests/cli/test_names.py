@@ -34,7 +34,6 @@ OF_THE_RECORD = {
     "load": {"Loaded"},
     "axes": {"Body"},  # all of S; else a plane
     "corners": {"Body", "Outline"},  # of a polygon in S; else of a grain
-    "reached": {"Volume"},  # its accuracy; else a sample size
     "opened": {"Pull", "Reach", "Response"},  # which contacts; else how many
     "slid": {"Response"},
     "kept": {"Response"},

@@ -61,7 +61,7 @@ def test_bounds_where_some_contacts_can_do_nothing_but_slide():
     packing = packed(50, 0.01, 3)
     S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
     system = make_system(S)
-    assert not system.middle.reached
+    assert not system.middle.converged
     found = intervals(S)
     assert found.converged
     assert found.counts["again"] == 0

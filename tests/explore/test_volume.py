@@ -89,10 +89,10 @@ def test_the_volume_scales_with_no_pressure_and_falls_with_what_is_known():
 def test_a_point_has_no_extent_and_crystals_have_one():
     for packing in (packed(40, 0.0), two_disks()):
         point = gf.volume(gf.ensemble(packing))
-        assert point.log_volume == point.error == point.extent == 0 and point.reached
+        assert point.log_volume == point.error == point.width == 0 and point.reached
     crystal = gf.ensemble(lattice(4, 4, 0.2, triangular=True))
     found = gf.volume(crystal, accuracy=0.3)
-    assert found.dimension == crystal.dimension and found.extent > 0
+    assert found.dimension == crystal.dimension and found.width > 0
 
 
 @pytest.mark.parametrize("n, mu, seed, h", [(6, 0.3, 1, 0), (8, 1.0, 1, 0), (16, 1.0, 1, 1)])

@@ -13,8 +13,8 @@ from granforce.cli.results import (
     StoredResult,
     conditions,
     distinct,
-    extents,
     get_packing,
+    interval_lengths,
     known_forces,
     numbers,
     stored_result,
@@ -103,7 +103,7 @@ def intervals(arguments: argparse.Namespace) -> None:
     histogram = np.histogram(np.clip(position[undetermined], 0, 1), bins=10, range=(0, 1))[0]
     given = {
         "contacts": dataset.sizes["contact"],
-        **extents(dataset),
+        **interval_lengths(dataset),
         **_without_limit(bounded | ~certified),
         **({"contacts_not_certified": len(left)} if len(left) else {}),
         "determined_contacts": int(np.sum(cluster < 0)),

@@ -11,7 +11,7 @@ from granforce.cli.results import (
     check_outputs,
     conditions,
     distinct,
-    extents,
+    interval_lengths,
     packing_options,
     sample_notes,
     stored_result,
@@ -100,7 +100,9 @@ def measure(arguments: argparse.Namespace) -> None:
         raise InputError(
             f"{UNBOUNDED_WALK}: nothing to measure; granforce intervals has its bounds"
         )
-    given = {name: result.parameters[name] for name in ("mu", "states")} | extents(result.dataset)
+    given = {name: result.parameters[name] for name in ("mu", "states")} | interval_lengths(
+        result.dataset
+    )
     lines = result.report(report_lines.MEASURE, arguments, **given)
     with report_after(lines, arguments.json):
         if arguments.out is not None:

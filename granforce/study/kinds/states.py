@@ -161,7 +161,7 @@ def _longest_begun(store: Store, parameters: Parameters) -> Walk | None:
     return None
 
 
-def _walk_reached(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
+def _parameters_of(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
     """The parameters of a walk that ended early: those of a walk of the reached length."""
     if "attempts" in parameters:
         return parameters
@@ -353,7 +353,7 @@ WALK = Kind(
     parameters=_walk_parameters,
     compute=_walk,
     holds_states=True,
-    reached=_walk_reached,
+    parameters_of=_parameters_of,
 )
 UNIFORM = Kind(
     name="uniform",
