@@ -54,7 +54,7 @@ MOVES_PER_DIMENSION = 20
 # second, which determines the final one. The distance from the centre is stationary after three
 # states, so that large S, where a state costs dimension², get fewer.
 WARM_UP = 20, 40
-WARM_UP_OF_LARGE, LARGE = (5, 10), 1000  # beyond this dimension
+WARM_UP_OF_LARGE, LARGE = (5, 10), 2000  # beyond this dimension
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed.,
 # 11.4); for mixed chains the largest R̂ of 1300 components is 1.01 with 1000 states, 1.06 with 200.
 MIXED = 1.1

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 from scipy import linalg, sparse
+from scipy.sparse.linalg import splu
 
 from granforce.forces import knowledge
 from granforce.forces.ensemble import Ensemble
@@ -37,8 +38,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, depend on others. Dense matrices are used
 # up to this number of rows.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
-# Number of corrections in `in_balance`.
-_RESTORED = 3
+# Number of corrections in `in_balance`, and ε there.
+_RESTORED, _DEPENDENT_SHIFT = 3, 1e-12
 
 
 def balance_of(
@@ -265,10 +266,20 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
 
 
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
-    """y (n,), corrected to A y = b by the least change relative to y + away."""
-    dense = A.toarray()
+    """y (n,), corrected to A y = b by the least change relative to y + away.
+
+    With D = diag(y + away) the change is D s of the least |s|, from (1, D Aᵀ; A D, −ε) (s, λ) =
+    (0, b − A y); ε > 0 keeps rows that depend on others solvable.
+    """
+    rows, columns = A.shape
     for _ in range(_RESTORED):
         size = np.abs(y) + away
-        least = partial(linalg.lstsq, cond=1e-13, lapack_driver="gelsy")
-        y = y + size * cancelling.apart(least, dense * size, b - A @ y)[0]
+        scaled = A @ sparse.diags(size)
+        both = [
+            [sparse.identity(columns), scaled.T],
+            [scaled, -_DEPENDENT_SHIFT * sparse.identity(rows)],
+        ]
+        factor = partial(splu, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
+        factors = cancelling.apart(factor, sparse.block_array(both, format="csc"))
+        y = y + size * factors.solve(np.append(np.zeros(columns), b - A @ y))[:columns]
     return y

@@ -12,7 +12,6 @@ from scipy.sparse.linalg import norm
 
 from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.forces.contact_problem import (
-    MOST_DENSE,
     centre_of,
     in_balance,
     independent_problem_of,
@@ -94,7 +93,7 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
     inner = np.append(inner, middle.y[y.size :])
     A, b, _ = ensemble.scaled_form
-    if np.abs(A @ inner - b).max(initial=0.0) <= _UNBALANCED or A.shape[0] > MOST_DENSE:
+    if np.abs(A @ inner - b).max(initial=0.0) <= _UNBALANCED:
         return inner
     inner = in_balance(A, b, inner)
     return inner if inner.min(initial=1.0) > 0 else None

@@ -12,7 +12,7 @@ import numpy as np
 import piqp
 from scipy import sparse
 
-from granforce.forces.contact_problem import MOST_DENSE, in_balance
+from granforce.forces.contact_problem import in_balance
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import highs as programs
 from granforce.records import Relaxation, positive, takes, whole
@@ -89,8 +89,7 @@ def restored(ensemble: Ensemble, y: Floats) -> Floats:
     A program ends at its tolerance; the remaining residual is removed by the least relative change.
     """
     A, b, T = ensemble.scaled_form
-    if A.shape[0] <= MOST_DENSE:
-        y = np.maximum(in_balance(A, b, y, _AWAY), 0.0)
+    y = np.maximum(in_balance(A, b, y, _AWAY), 0.0)
     return ensemble.pin(ensemble.to_forces(T @ y * ensemble.force_scale))
 
 

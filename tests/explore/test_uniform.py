@@ -28,7 +28,7 @@ from granforce.cli.entry_point import main
 from granforce.explore import billiard, uniform
 from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk
-from granforce.explore.uniform import sample_uniform
+from granforce.explore.uniform import LARGE, sample_uniform
 from granforce.explore.walls import walls
 from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
@@ -125,10 +125,10 @@ def test_every_state_is_in_s(S, sample):
 
 
 @pytest.mark.slow
-def test_more_than_a_thousand_dimensions():
-    S = ensemble(packed(2000, 0.1))
+def test_more_than_two_thousand_dimensions():
+    S = ensemble(packed(2500, 0.01))
     sample = sample_uniform(S, 400)
-    assert sample.walls.dimension == S.dimension > 1000
+    assert sample.walls.dimension == S.dimension > LARGE
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
     assert sample.counts["refused"] == 0 and sample.mixing.worst_r_hat < 1.1
     # The short warm-up of large S is long enough: the energy does not drift afterwards.
