@@ -22,8 +22,7 @@ from zarr.core.metadata import ArrayV3Metadata
 from zarr.storage import LocalStore, MemoryStore
 
 from granforce.records import InputError
-from granforce.study import keys
-from granforce.study.schema import VARIABLES, declared, to_builtin
+from granforce.study import keys, schema
 
 STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
 
@@ -42,7 +41,7 @@ def conforming(dataset: xr.Dataset, dtypes: Mapping[Any, str]) -> dict[Any, xr.V
     """The dataset's variables as they will be stored; ValueError if they violate VARIABLES."""
     stored: dict[Any, xr.Variable] = {}
     for name, variable in dataset.variables.items():
-        row = declared(str(name))
+        row = schema.declared(str(name))
         dtype = np.dtype(dtypes.get(name, row.dtype))
         if variable.dims != row.dims:
             raise ValueError(f"{name!r} must have dims {row.dims}, got {variable.dims}")
@@ -69,7 +68,7 @@ def attributes(
     attrs |= {"algorithm_version": version, "schema_version": keys.SCHEMA_VERSION}
     attrs |= {"created": datetime.now(UTC).isoformat(timespec="seconds"), **_library_versions()}
     # The checksum must be computed from values as read back from JSON.
-    attrs = json.loads(json.dumps(attrs, default=to_builtin))
+    attrs = json.loads(json.dumps(attrs, default=schema.to_builtin))
     return attrs | {"checksum": _checksum(variables, attrs)}
 
 
@@ -108,7 +107,7 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
             chunks=_chunks(variable),
             compressors=(ZstdCodec(level=3),),
             dimension_names=[str(name) for name in variable.dims],
-            attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
+            attributes=schema.attributes(str(name)),
             config={"write_empty_chunks": True},  # otherwise Zarr 3.0 loses a chunk of −0.0
             zarr_format=3,
         )

@@ -17,25 +17,26 @@ from granforce.records import InputError, Packing, takes
 from granforce.study import kinds
 from granforce.study.cells import StudyCell, get
 from granforce.study.scan import run
-from granforce.study.schema import VARIABLES
+from granforce.study.schema import attributes
 from granforce.study.series import ends_of, over_frames, pair_names
 from granforce.study.store import open_store
 from granforce.types import Progress
 
-
-def _of_schema(*names: str) -> dict[str, tuple[str, str]]:
-    return {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in names}
-
-
-# Numbers of a snapshot with units and meaning; those in the schema take them from there.
+# Attributes of the numbers of a snapshot.
 SCALARS = {
-    "time": ("", "timestep, or time"),
-    "grains": ("1", "number of grains whose balance is required"),
-    "contacts": ("1", "number of contacts that carry force"),
-    **_of_schema("rattlers", "packing_fraction", "pressure"),
-    "mean_normal_force": ("force", "mean normal force of the backbone"),
-    **_of_schema("coordination", "dimension", "eta1", "eta2", "eta3"),
-    "residual": ("mean normal force", "largest unbalance of the simulation's own forces"),
+    "time": {"units": "", "long_name": "timestep, or time"},
+    "grains": {"units": "1", "long_name": "number of grains whose balance is required"},
+    "contacts": {"units": "1", "long_name": "number of contacts that carry force"},
+    **{name: attributes(name) for name in ("rattlers", "packing_fraction", "pressure")},
+    "mean_normal_force": {
+        **attributes("force_scale"),
+        "long_name": "mean normal force of the backbone",
+    },
+    **{name: attributes(name) for name in ("coordination", "dimension", "eta1", "eta2", "eta3")},
+    "residual": {
+        **attributes("residual"),
+        "long_name": "largest unbalance of the simulation's own forces",
+    },
 }
 _FORCES = {"forces": "of the simulation", "low": "least in S", "high": "largest in S"}
 
@@ -133,11 +134,10 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
     rows = [_scalars(number, snapshot.packing, *results) for number, snapshot, results in done]
     variables: dict[str, Any] = {}
     for name, meaning in _FORCES.items():
-        attributes = {"units": "force", "long_name": meaning}
-        variables[name] = (("frame", "contact", "component"), arrays[name], attributes)
-    for name, (units, meaning) in SCALARS.items():
-        numbers = [row[name] for row in rows]
-        variables[name] = (("frame",), numbers, {"units": units, "long_name": meaning})
+        described = {**attributes(name), "long_name": meaning}
+        variables[name] = (("frame", "contact", "component"), arrays[name], described)
+    for name, described in SCALARS.items():
+        variables[name] = (("frame",), [row[name] for row in rows], described)
     coordinates = {"frame": [number for number, *_ in done], "component": ["f_n", "f_t"]}
     notes = {str(number): snapshot.packing.info.get("notes", []) for number, snapshot, _ in done}
     return xr.Dataset(variables, coordinates | ends_of(pairs), {"notes": json.dumps(notes)})

@@ -121,11 +121,10 @@ def labelled(arrays: Mapping[str, Any], attrs: Mapping[str, Any] | None = None) 
     variables = {}
     for name, values in arrays.items():
         row = declared(name)
-        described = {"units": row.units, "long_name": row.long_name}
         array = np.asarray(values, dtype=row.dtype)
         if array.ndim != len(row.dims):
             raise ValueError(f"{name!r} must have dims {row.dims}, got shape {array.shape}")
-        variables[name] = xr.Variable(row.dims, array, described)
+        variables[name] = xr.Variable(row.dims, array, attributes(name))
     return xr.Dataset(variables, attrs=attrs)
 
 
@@ -134,6 +133,11 @@ def declared(name: str) -> Variable:
     if name not in VARIABLES:
         raise ValueError(f"{name!r} is not declared: add it to granforce.quantities.QUANTITIES")
     return VARIABLES[name]
+
+
+def attributes(name: str) -> dict[str, str]:
+    """The unit and the meaning of a quantity, as attributes of an array."""
+    return {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name}
 
 
 def packing_dataset(packing: Packing) -> xr.Dataset:

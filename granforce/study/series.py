@@ -26,6 +26,7 @@ from granforce.experiment.remeasured import remeasured
 from granforce.experiment.repair import KINDS
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
+from granforce.quantities import FORCE
 from granforce.records import (
     InputError,
     InputWarning,
@@ -39,7 +40,7 @@ from granforce.study import entries
 from granforce.study.cells import Kind, StudyCell, get
 from granforce.study.keys import Parameters
 from granforce.study.scan import run
-from granforce.study.schema import labelled, packing_dataset, to_builtin
+from granforce.study.schema import attributes, labelled, packing_dataset, to_builtin
 from granforce.study.store import Store, is_store, open_store
 from granforce.system.files import expanded, sibling
 from granforce.types import Floats, Integers, Progress
@@ -268,23 +269,25 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
         for note in one.get("notes", [])
     ]
     forces, single = ("frame", "contact", "component"), ("frame",)
-    unit = {"units": "force", "long_name": "mean measured normal force"}
+    unit = {"units": FORCE, "long_name": "mean measured normal force"}
     counts = {"units": "1", "long_name": "grains, contacts and repairs, by kind"}
     variables: dict[str, Any] = {
-        name: (forces, values, {"units": "force"}) for name, values in arrays.items()
+        name: (forces, values, attributes(name)) for name, values in arrays.items()
     }
     variables |= {
-        "added": (forces[:2], added, {"units": "1", "long_name": "contact was not listed"}),
-        "change": (forces, change, {"units": "force", "long_name": "since the frame before"}),
-        "chi_square": (single, [float(one["chi_square"]) for _, one in done], {"units": "1"}),
-        "freedom": (single, [int(one["freedom"]) for _, one in done], {"units": "1"}),
+        "added": (forces[:2], added, attributes("added")),
+        "change": (forces, change, {"units": FORCE, "long_name": "since the frame before"}),
+        **{
+            name: (single, [one[name].item() for _, one in done], attributes(name))
+            for name in ("chi_square", "freedom")
+        },
         "unit": (single, [one["mean_measured_normal_force"] for one in accounts], unit),
         "account": (("frame", "kind"), counted, counts),
     }
     if "standard_error" in arrays:
         change_error, error = np.full(shape, np.nan), arrays["standard_error"]
         change_error[1:] = np.hypot(error[1:], error[:-1])
-        variables["change_error"] = forces, change_error, {"units": "force"}
+        variables["change_error"] = forces, change_error, {"units": FORCE}
     return xr.Dataset(
         variables,
         {

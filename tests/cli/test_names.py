@@ -71,7 +71,9 @@ def test_fields_of_records_with_the_name_of_a_stored_quantity_are_it():
 
 def test_numbers_of_snapshots_mean_what_the_store_says():
     same = SCALARS.keys() & QUANTITIES.keys()
-    assert {name for name in same if SCALARS[name][1] != QUANTITIES[name].meaning} == {"residual"}
+    assert {name for name in same if SCALARS[name]["long_name"] != QUANTITIES[name].meaning} == {
+        "residual"
+    }
 
 
 def test_relaxations_have_one_name_where_people_read_them():
