@@ -135,7 +135,7 @@ def declared(name: str) -> Variable:
     return VARIABLES[name]
 
 
-def attributes(name: str) -> dict[str, str]:
+def attributes(name: str) -> dict[str, Any]:
     """The unit and the meaning of a quantity, as attributes of an array."""
     return {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name}
 
