@@ -68,8 +68,10 @@ QUANTITIES = {
     "levers": Field("contact end", LENGTH, "offset along t of the contact point, from i and j"),
     "friction_ratio": Field("contact", "", "friction coefficient over μ"),
     "forces": Field("contact component", FORCE, "original force network"),
-    "corners": Field("corner axis", LENGTH, "corners of all polygons, body by body"),
-    "sides": whole("grain", "number of corners of the body, 0 for a disk"),
+    "corners": Field("corner axis", LENGTH, "corners of all polygons, part by part"),
+    "sides": whole("part", "number of corners of the part, 0 for a disk"),
+    "part_body": whole("part", "body to which the part belongs"),
+    "circles": Field("part circle", LENGTH, "x, y and radius of the circle around the part"),
     "mass": Field("grain", "mass", "masses of the bodies"),
     "inertia": Field("grain", "mass*length**2", "moments of inertia of the bodies"),
     # states of the ensemble: the contact dimension is that of the backbone

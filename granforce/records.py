@@ -37,6 +37,8 @@ MOST_WORKERS = 4096
 
 P = ParamSpec("P")
 T = TypeVar("T")
+# Corners of a disk that is a part of a body, as drawn.
+_CIRCLE = np.exp(2j * np.pi * np.arange(48) / 48)[:, None].view(float)
 # Kinds of array elements that are not real numbers, by numpy's letters.
 _KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "text", "V": "records"}
 
@@ -134,16 +136,45 @@ class Contacts(NamedTuple):
 
 @record
 class Shapes(NamedTuple):
-    """Shapes and inertia of N bodies: convex polygons, and disks."""
+    """Shapes and inertia of N bodies; their parts are convex polygons, and disks."""
 
     corners: Annotated[Floats, quantity("corners", label="", note="anticlockwise")]
     sides: Annotated[Integers, quantity("sides", label="")]
     mass: Annotated[Floats, quantity("mass", label="")]
     inertia: Annotated[Floats, quantity("inertia", label="", note="about the centre of mass")]
+    body: Annotated[
+        Integers | None, quantity("part_body", label="", note="None: each body is one part")
+    ] = None
+    circles: Annotated[
+        Floats | None, quantity("circles", label="", note="None: those of the bodies")
+    ] = None
+
+    def part_corners(self) -> list[Floats]:
+        """The corners (k, 2) of each part; empty for a disk."""
+        return np.split(self.corners, np.cumsum(self.sides)[:-1])
 
     def polygons(self) -> list[Floats]:
-        """The corners (k, 2) of each body; empty for a disk."""
-        return np.split(self.corners, np.cumsum(self.sides)[:-1])
+        """The corners (k, 2) of each body; empty for a disk.
+
+        Of several parts one path, which passes from one to the next where their corners are
+        closest, and back.
+        """
+        if self.body is None or self.circles is None:
+            return self.part_corners()
+        paths = [np.empty((0, 2))] * len(self.mass)
+        for body, corners, circle in zip(self.body, self.part_corners(), self.circles, strict=True):
+            part = corners if len(corners) else circle[:2] + circle[2] * _CIRCLE
+            paths[body] = _path_through(paths[body], part)
+        return paths
+
+
+def _path_through(path: Floats, part: Floats) -> Floats:
+    """The closed path with the closed path of one more part."""
+    if not len(path):
+        return part
+    apart = np.hypot(*np.moveaxis(path[:, None] - part, -1, 0))
+    at, first = np.unravel_index(np.argmin(apart), apart.shape)
+    return np.concatenate([path[: at + 1], part[first:], part[: first + 1], path[at:]])
 
 
 @record
@@ -588,7 +619,7 @@ def make_contacts_at(
     Raises
     ------
     InputError
-        As `make_contacts`, and for normals that point away from body j.
+        As `make_contacts`.
     """
     x = float_array(x, (-1, 2), "centres of mass")
     contacts = make_contacts(i, j, normal, np.ones(np.shape(i)), np.ones(len(x)))
@@ -596,14 +627,11 @@ def make_contacts_at(
     gap = np.zeros(len(point)) if gap is None else float_array(gap, contacts.i.shape, "gaps")
     from_i, from_j = point - x[contacts.i], point - x[contacts.j]
     arms = [np.sum(from_i * contacts.normal, axis=1), -np.sum(from_j * contacts.normal, axis=1)]
-    length = arms[0] + arms[1]
-    for c in np.flatnonzero(length <= 0)[:1]:
-        raise InputError(
-            f"the normal of contact {c} points away from body {contacts.j[c]}: give it from i to j"
-        )
     levers = np.stack(
         [np.sum(part * contacts.tangent, axis=1) for part in (from_i, from_j)], axis=1
     )
+    # Bodies that hook into each other may have arms, and a length, below 0.
+    length = arms[0] + arms[1]
     return contacts._replace(length=length, gap=gap, arm_i=arms[0], arm_j=arms[1], levers=levers)
 
 
@@ -698,15 +726,20 @@ def make_packing(
 
 
 def _shapes(shapes: Shapes, bodies: int) -> Shapes:
-    sides = np.asarray(shapes.sides)
-    if sides.shape != (bodies,) or not are_whole(sides).all():
-        raise InputError(f"shapes must give the number of corners of {bodies} bodies")
+    sides, body, circles = np.asarray(shapes.sides), shapes.body, shapes.circles
+    if sides.shape != ((bodies,) if body is None else np.shape(body)) or not are_whole(sides).all():
+        raise InputError(f"shapes must give the number of corners of {bodies} bodies, or each part")
+    if body is not None:
+        if not are_whole(body, bodies - 1).all() or circles is None:
+            raise InputError(f"parts must have circles, and be of bodies 0 … {bodies - 1}")
+        body = np.asarray(body, dtype=np.int64)
+        circles = float_array(circles, (len(sides), 3), "circles of parts")
     corners = float_array(shapes.corners, (int(sides.sum()), 2), "corners of shapes")
     mass = float_array(shapes.mass, (bodies,), "masses")
     inertia = float_array(shapes.inertia, (bodies,), "moments of inertia")
     if np.any(mass <= 0) or np.any(inertia <= 0):
         raise InputError("masses and moments of inertia must be above 0")
-    return Shapes(corners, sides.astype(np.int64), mass, inertia)
+    return Shapes(corners, sides.astype(np.int64), mass, inertia, body, circles)
 
 
 def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
@@ -777,7 +810,14 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
     """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
-    place = np.where(contacts.i > contacts.j, -contacts.offsets[:, 1], contacts.offsets[:, 0])
+    place = np.where(
+        (contacts.i > contacts.j)[:, None],
+        np.column_stack([contacts.arm_j, -contacts.offsets[:, 1]]),
+        np.column_stack([contacts.arm_i, contacts.offsets[:, 0]]),
+    )
+    reach = np.abs(contacts.arm_i) + np.abs(contacts.arm_j)
+    if contacts.levers is None:
+        place[:, 0] = 0.0  # disks are round, and images of a pair have one arm
     order = np.lexsort((high, low))
     pairs: list[tuple[int, int]] = []
     for apart in range(1, min(len(order), 9)):
@@ -785,7 +825,7 @@ def repeated(contacts: Contacts) -> tuple[int, int] | None:
         same = (low[a] == low[b]) & (high[a] == high[b])
         if not same.any():
             break
-        same &= np.abs(place[a] - place[b]) <= TOUCHING * contacts.length[a]
+        same &= np.abs(place[a] - place[b]).max(axis=1) <= TOUCHING * reach[a]
         alike = np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75))
         for first in alike[np.argsort(b[alike])][:1]:
             pairs.append((int(a[first]), int(b[first])))

@@ -82,7 +82,9 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     r, shapes = packing.r[:, None], packing.shapes
     ends = np.concatenate([x - r, x + r])
     if shapes is not None:
-        ends = np.concatenate([ends[np.tile(shapes.sides == 0, 2)], shapes.corners])
+        corners = shapes.polygons()
+        round_ones = np.array([len(body) == 0 for body in corners])
+        ends = np.concatenate([ends[np.tile(round_ones, 2)], *corners])
     low = np.where(periodic, corner, ends.min(axis=0))
     high = np.where(periodic, opposite, ends.max(axis=0))
     middle, half = (low + high) / 2, (high - low).max() / 2 + margin

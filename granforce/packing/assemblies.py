@@ -1,15 +1,16 @@
-"""Assemblies of rigid bodies: convex polygons and disks that rest on each other and on fixed ones.
+"""Assemblies of rigid bodies that rest on each other and on fixed ones.
 
-Contacts follow from the geometry (`polygons`). Fixed bodies are those whose load is NaN, so that
-their balance is not required; contacts between two of them are left out, as no equation contains
-them. Each other body carries its weight downwards.
+A body is a convex polygon, a disk, or several of these parts. Contacts follow from the geometry
+(`polygons`). Fixed bodies are those whose load is NaN, so that their balance is not required;
+contacts between two of them are left out, as no equation contains them. Each other body carries its
+weight downwards.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, Decimal
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -47,14 +48,23 @@ from granforce.types import Floats, Integers, Mask
 _NEARLY, _MISSED = 100.0, 0.01
 
 
+class _Parts(NamedTuple):
+    """The parts of all bodies, body by body."""
+
+    outlines: list[Floats]  # corners (k, 2), or x, y, r of a disk
+    body: Integers  # (P,) number of the body
+    circles: Floats  # (P, 3) x, y, r of the circle around the part
+
+
 def blocks(
-    bodies: Sequence[npt.ArrayLike],
+    bodies: Sequence[Any],
     mu: Any,
     *,
     fixed: npt.ArrayLike = (),
     weights: npt.ArrayLike | None = None,
     materials: Sequence[Any] | None = None,
     friction: Mapping[Any, Any] | None = None,
+    normals: Mapping[Any, Any] | None = None,
     tolerance: float | None = None,
     balanced: bool = True,
     names: Sequence[str] | None = None,
@@ -65,9 +75,10 @@ def blocks(
 
     Parameters
     ----------
-    bodies : sequence of array
-        Corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for each; a
-        fixed body may be a thin wall, (2, 2).
+    bodies : sequence of array, or of lists of arrays
+        Corners (k, 2) of a convex polygon, in either direction, or (x, y, r) of a disk, for each;
+        or a list of such parts, which move as one, whether they touch or not. Where parts overlap,
+        their areas add up. A fixed body may be a thin wall, (2, 2).
     mu : float or (N_c,) array
         Friction coefficient, or those of all contacts.
     fixed : array of int, default ()
@@ -78,6 +89,9 @@ def blocks(
         Labels of the materials of the bodies.
     friction : mapping, optional
         μ of pairs of materials if it is not mu, {("stone", "wood"): 0.4, …}.
+    normals : mapping, optional
+        Directions of contact normals, in degrees from +x, where bodies meet corner on corner:
+        {(0, 1): 90} if the normal from body 0 to body 1 points up.
     tolerance : float, optional
         Distance up to which surfaces touch or may overlap, in the unit of the bodies; by default
         10⁻⁹ times the largest body.
@@ -95,7 +109,7 @@ def blocks(
     Raises
     ------
     InputError
-        For bodies that overlap.
+        For bodies that overlap, parts that are not convex, and normals where none is missing.
     NotJammedError
         If nothing balances the weights.
     UndecidedError
@@ -109,22 +123,23 @@ def blocks(
     names = [str(k) for k in range(len(bodies))] if names is None else names
     if len(names) != len(bodies):
         raise InputError(f"give the name of each of the {len(bodies)} bodies")
-    outlines = [_outline(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]
-    if not outlines:
+    if not bodies:
         raise InputError("there are no bodies; give at least one")
-    held = _fixed(fixed, len(outlines))
-    thin = np.array([body.shape == (2, 2) for body in outlines])
-    for k in np.flatnonzero(thin & ~held)[:1]:
+    parts, area, x, polar, r = _measured(bodies, names)
+    held = _fixed(fixed, len(bodies))
+    thin = [len(one) == 2 for one in parts.outlines]
+    for k in np.setdiff1d(parts.body[thin], np.flatnonzero(held))[:1]:
         raise InputError(f"body {names[k]} has two corners; only a fixed body can be a thin wall")
-    area, x, polar, r = (np.array(part) for part in zip(*map(_measured, outlines), strict=True))
-    if materials is not None and len(materials) != len(outlines):
-        raise InputError(f"give the material of each of the {len(outlines)} bodies")
+    if materials is not None and len(materials) != len(bodies):
+        raise InputError(f"give the material of each of the {len(bodies)} bodies")
     weights = area if weights is None else float_array(weights, area.shape, "weights")
     for k in np.flatnonzero((weights <= 0) & ~held)[:1]:
         raise InputError(f"body {names[k]} has a weight ≤ 0: every body that can move needs a mass")
     weights = np.where(held, area, weights)
     tolerance = TOUCHING * r.max() if tolerance is None else positive(tolerance, "tolerance")
-    i, j, touches, doubts = _contacts(outlines, x, r, held, tolerance, names)
+    i, j, touches, doubts = _contacts(
+        parts, held, tolerance, names, normals=_normals(normals, held)
+    )
     number = [len(touch.gap) for touch in touches]
     points, gap = (
         np.concatenate([np.empty(shape), *(getattr(touch, name) for touch in touches)])
@@ -135,7 +150,8 @@ def blocks(
     load = np.zeros((len(x), 3))
     load[:, 1] = -weights
     load[held] = np.nan
-    polygonal = [body if body.ndim == 2 else np.empty((0, 2)) for body in outlines]
+    polygonal = [one if one.ndim == 2 else np.empty((0, 2)) for one in parts.outlines]
+    several = len(polygonal) > len(x)
     packing = make_packing(
         x,
         r,
@@ -147,9 +163,11 @@ def blocks(
         info={"bodies": len(x), "tolerance": float(tolerance), **doubts},
         shapes=Shapes(
             corners=np.concatenate(polygonal),
-            sides=np.array([len(body) for body in polygonal]),
+            sides=np.array([len(one) for one in polygonal]),
             mass=weights,
             inertia=weights * polar / area,
+            body=parts.body if several else None,
+            circles=parts.circles if several else None,
         ),
     )
     if not balanced:
@@ -203,35 +221,31 @@ def _frictions(
 
 def _missed(packing: Packing, names: Sequence[str]) -> str:
     """Words on bodies that touch nothing, and on pairs that may be contacts."""
-    shapes, tolerance = packing.shapes, packing.info["tolerance"]
-    assert shapes is not None
-    outlines = [
-        body if len(body) else np.append(x, r)
-        for body, x, r in zip(shapes.polygons(), packing.x, packing.r, strict=True)
-    ]
-    held = left_open_in(packing)
+    parts, tolerance, held = _parts_of(packing), packing.info["tolerance"], left_open_in(packing)
     near = _MISSED * packing.r.max()
-    doubts = _contacts(outlines, packing.x, packing.r, held, tolerance, near=near)[3]
+    doubts = _contacts(parts, held, tolerance, near=near)[3]
     words = ""
     if gaps := [gap for _, _, gap in doubts["nearly_touching"]]:
         words += "; " + nearly_touching(gaps, tolerance)
     if pairs := [f"{names[i]} and {names[j]}" for i, j in doubts["corner_on_corner"]]:
         words += (
             f"; bodies {brief_list(pairs)} meet corner on corner, where no normal is determined, "
-            "which is no contact: move one so that a corner meets an edge"
+            "which is no contact: move one so that a corner meets an edge, or give the normal "
+            '(normals={(0, 1): degrees}, or "normals" in JSON)'
         )
     doubted = [body for some in doubts.values() for pair in some for body in pair[:2]]
     touching = [*packing.contacts.i, *packing.contacts.j, *doubted]
     for k in np.setdiff1d(np.flatnonzero(~held), touching)[:1]:
+        own, other = parts.body == k, parts.body != k
         gaps = [
-            np.inf if j == k else _meeting(outlines[k], outlines[j], tolerance).gap
-            for j in range(len(outlines))
+            (_meeting(parts.outlines[a], parts.outlines[b], tolerance).gap, parts.body[b])
+            for a in np.flatnonzero(own)
+            for b in np.flatnonzero(other)
         ]
-        if len(gaps) > 1:
-            nearest = int(np.argmin(gaps))
+        for gap, closest in sorted(gaps)[:1]:
             words += (
-                f"; body {names[k]} touches no other: the nearest, body {names[nearest]}, is "
-                f"{gaps[nearest]:.3g} away; move it until they touch"
+                f"; body {names[k]} touches no other: the nearest, body {names[closest]}, is "
+                f"{gap:.3g} away; move it until they touch"
             )
     return words
 
@@ -275,18 +289,90 @@ def _outline(body: npt.ArrayLike, name: str) -> Floats:
     return disk
 
 
-def area(body: npt.ArrayLike, name: str) -> float:
-    """The area of a body as `blocks` takes it, with its name for messages."""
-    return _measured(_outline(body, f"body {name}"))[0]
+def _outlines(body: Any, name: str) -> list[Floats]:
+    """The outline of each part of a body: of itself, if it is no list of parts."""
+    try:
+        given = list(body)
+    except TypeError:
+        given = []
+    if not given:
+        raise InputError(f"{name} has no parts; give corners (k, 2), or a disk (x, y, r)")
+    if not any(map(_is_part, given)):
+        return [_outline(body, name)]
+    several = len(given) > 1
+    return [
+        _outline(one, f"part {k} of {name}" if several else name) for k, one in enumerate(given)
+    ]
 
 
-def _measured(body: Floats) -> tuple[float, Floats, float, float]:
+def _is_part(given: Any) -> bool:
+    """Whether it is no number and no corner, but a disk, or a list of corners."""
+    if not np.iterable(given) or isinstance(given, str) or not len(given):
+        return False
+    return len(given) == 3 or np.iterable(given[0])
+
+
+def areas(bodies: Sequence[Any], names: Sequence[str]) -> Floats:
+    """The areas (N,) of bodies as `blocks` takes them, with their names for messages."""
+    return _measured(bodies, names)[1]
+
+
+def _measured(
+    bodies: Sequence[Any], names: Sequence[str]
+) -> tuple[_Parts, Floats, Floats, Floats, Floats]:
+    """The parts of bodies; their areas, centres, polar second moments, and radii around these."""
+    each = [_outlines(body, f"body {name}") for body, name in zip(bodies, names, strict=True)]
+    number = np.repeat(np.arange(len(each)), [len(some) for some in each])
+    outlines = [outline for some in each for outline in some]
+    one, centre, own, radius = (
+        np.array(values) for values in zip(*map(_moments, outlines), strict=True)
+    )
+    area = np.bincount(number, one)
+    x = np.stack([np.bincount(number, one * along) for along in centre.T], axis=1) / area[:, None]
+    away = centre - x[number]
+    polar = np.bincount(number, own + one * np.sum(away**2, axis=1))
+    r = np.zeros(len(each))
+    for body, outline in zip(number, outlines, strict=True):
+        points, more = (outline, 0.0) if outline.ndim == 2 else (outline[None, :2], outline[2])
+        r[body] = max(r[body], np.hypot(*(points - x[body]).T).max() + more)
+    return _Parts(outlines, number, np.column_stack([centre, radius])), area, x, polar, r
+
+
+def _moments(part: Floats) -> tuple[float, Floats, float, float]:
     """Area, centre, polar second moment of area, and circumscribed radius."""
-    if body.ndim == 1:
-        r = body[2]
-        return np.pi * r**2, body[:2], 0.5 * np.pi * r**4, r
-    area, centre, polar = polygons.moments(body)
-    return area, centre, polar, float(np.hypot(*(body - centre).T).max())
+    if part.ndim == 1:
+        r = part[2]
+        return np.pi * r**2, part[:2], 0.5 * np.pi * r**4, r
+    area, centre, polar = polygons.moments(part)
+    return area, centre, polar, float(np.hypot(*(part - centre).T).max())
+
+
+def _parts_of(packing: Packing) -> _Parts:
+    shapes = packing.shapes
+    assert shapes is not None
+    circles = np.column_stack([packing.x, packing.r]) if shapes.circles is None else shapes.circles
+    body = np.arange(len(packing.r)) if shapes.body is None else shapes.body
+    outlines = [
+        corners if len(corners) else circle
+        for corners, circle in zip(shapes.part_corners(), circles, strict=True)
+    ]
+    return _Parts(outlines, body, circles)
+
+
+def _normals(given: Mapping[Any, Any] | None, held: Mask) -> dict[tuple[int, int], float]:
+    """Angles (radians) of the normals of pairs (i, j), i < j, as `blocks` takes them."""
+    if not isinstance(given, Mapping | None):
+        raise InputError(f"normals must be {{(0, 1): 90, …}}, got {brief(given)}")
+    angles = {}
+    for pair, angle in ({} if given is None else given).items():
+        numbers = np.asarray(pair)
+        if numbers.shape != (2,) or not are_whole(numbers, len(held) - 1).all():
+            last = len(held) - 1
+            raise InputError(f"normals are of pairs of bodies 0 … {last}, not {brief(pair)}")
+        i, j = numbers.astype(int).tolist()
+        turned = np.radians(float(float_array(angle, (), f"the normal of bodies {i} and {j}")))
+        angles[min(i, j), max(i, j)] = turned + (np.pi if i > j else 0.0)
+    return angles
 
 
 def _fixed(fixed: npt.ArrayLike, count: int) -> Mask:
@@ -299,30 +385,42 @@ def _fixed(fixed: npt.ArrayLike, count: int) -> Mask:
 
 
 def _contacts(
-    outlines: Sequence[Floats],
-    x: Floats,
-    r: Floats,
+    parts: _Parts,
     held: Mask,
     tolerance: float,
     names: Sequence[str] = (),
     *,
     near: float | None = None,
+    normals: Mapping[tuple[int, int], float] | None = None,
 ) -> tuple[Integers, Integers, list[Touch], dict[str, Any]]:
-    """Pairs i, j (k,) that touch, their Touch, and the doubtful pairs, with gaps up to near."""
+    """Pairs i, j (k,) that touch, their Touch, and the doubtful pairs, with gaps up to near.
+
+    normals: angles at pairs that meet corner on corner.
+    """
+    x, r, body, normals = parts.circles[:, :2], parts.circles[:, 2], parts.body, dict(normals or {})
     near = _NEARLY * tolerance if near is None else near
     cell = make_cell([np.inf, np.inf])
     first, second, _ = find_pairs(x, r, cell, near)
-    pairs = [
-        (i, j)
-        for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True))
-        if not (held[i] and held[j])
-    ]
-    touching: list[tuple[int, int, Touch]] = []
+    ends = body[np.sort(np.stack([first, second]), axis=0)]
+    apart = (ends[0] != ends[1]) & ~held[ends].all(axis=0)
+    pairs = sorted(zip(*np.sort(np.stack([first, second]), axis=0)[:, apart].tolist(), strict=True))
+    touching: dict[tuple[int, int], list[Touch]] = {}
     doubts: dict[str, Any] = {"corner_on_corner": [], "nearly_touching": []}
-    for i, j in pairs:
-        met = _meeting(outlines[i], outlines[j], tolerance)
+    beyond = _beyond(parts)
+    for a, b in pairs:
+        i, j = int(body[a]), int(body[b])
+        met = _meeting(parts.outlines[a], parts.outlines[b], tolerance, beyond[a], beyond[b])
+        if met.cornered and (i, j) in normals:
+            angle = normals.pop((i, j))
+            touch = polygons.corners_meet(parts.outlines[a], parts.outlines[b], angle, met.gap)
+            if touch is None:
+                raise InputError(
+                    f"the normal of bodies {names[i]} and {names[j]} at {np.degrees(angle):g} "
+                    "degrees does not point from one to the other: correct normals"
+                )
+            met = met._replace(touch=touch)
         if met.touch is not None:
-            touching.append((i, j, met.touch))
+            touching.setdefault((i, j), []).append(met.touch)
         elif met.cornered:
             doubts["corner_on_corner"].append([i, j])
         elif met.gap < 0:
@@ -337,13 +435,36 @@ def _contacts(
             )
         elif met.gap <= near:
             doubts["nearly_touching"].append([i, j, met.gap])
-    i, j = np.array([one[:2] for one in touching], dtype=np.int64).reshape(-1, 2).T
-    return i, j, [one[2] for one in touching], doubts
+    for i, j in normals:
+        raise InputError(
+            f"bodies {names[i]} and {names[j]} do not meet corner on corner, so that no normal is "
+            "missing: leave it out of normals"
+        )
+    every = [
+        (pair, touch)
+        for pair, some in sorted(touching.items())
+        for touch in (polygons.united(some, tolerance) if len(some) > 1 else some)
+    ]
+    i, j = np.array([pair for pair, _ in every], dtype=np.int64).reshape(-1, 2).T
+    return i, j, [touch for _, touch in every], doubts
 
 
-def _meeting(a: Floats, b: Floats, tolerance: float) -> Meeting:
+def _beyond(parts: _Parts) -> list[Mask | None]:
+    """Where surfaces go on, as by `goes_on`; None for disks, and bodies of one part."""
+    count, begin = np.bincount(parts.body)[parts.body], np.searchsorted(parts.body, parts.body)
+    return [
+        None
+        if count[k] == 1 or one.ndim == 1
+        else polygons.goes_on(
+            one, [parts.outlines[o] for o in range(begin[k], begin[k] + count[k]) if o != k]
+        )
+        for k, one in enumerate(parts.outlines)
+    ]
+
+
+def _meeting(a: Floats, b: Floats, tolerance: float, *beyond: Mask | None) -> Meeting:
     if a.ndim == 2 and b.ndim == 2:
-        return polygons.polygons_meet(a, b, tolerance)
+        return polygons.polygons_meet(a, b, tolerance, *beyond)
     if a.ndim == 1 and b.ndim == 1:
         return polygons.disks_meet(a[:2], a[2], b[:2], b[2], tolerance)
     if a.ndim == 1:

@@ -453,7 +453,7 @@ def test_bodies_are_read_from_both_kinds_of_file_as_from_arrays():
         ),
         (ROWS.replace("ball,0.5,1.3", "ball,0.5,1.9"), {}, "the bodies are 0 ground, 1 7, 2 ball"),
         (ROWS.replace(",2,0", ",-2,0"), {}, "the density of body 7"),
-        (GIVEN.replace("corners", "corner"), {}, 'either "corners" or "disk"'),
+        (GIVEN.replace("corners", "corner"), {}, 'either "corners", "disk" or "parts"'),
         (GIVEN.replace("density", "mass"), {}, "body 1 has 'mass'"),
         (GIVEN.replace("true", "1"), {}, "fixed of body 0 must be true or false"),
         (GIVEN[:-1], {}, "not JSON"),

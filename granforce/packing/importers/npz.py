@@ -30,6 +30,7 @@ _GRAINS = ("x", "r", "P", "mu")
 _ARMS = "arm_i", "arm_j"
 _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
 _SHAPES = "corners", "sides", "mass", "inertia"
+_PARTS = "part_body", "circles"  # of bodies of several parts
 
 # Most bytes of the unpacked arrays: a small archive may declare far more than fits into memory.
 _UNPACKED = 10**9
@@ -127,7 +128,11 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
             for name in ("levers", "friction_ratio")
             if (values := getattr(contacts, name)) is not None
         },
-        **dict(zip(_SHAPES, packing.shapes or (), strict=False)),
+        **{
+            name: values
+            for name, values in zip(_SHAPES + _PARTS, packing.shapes or (), strict=False)
+            if values is not None
+        },
         "info": np.array(info),
         **_seed(packing.info),
     }
@@ -226,16 +231,16 @@ def _shapes(arrays: dict[str, npt.NDArray[Any]]) -> Shapes | None:
     missing = [key for key in _SHAPES if key not in arrays]
     if 0 < len(missing) < len(_SHAPES):
         raise InputError(f"no array {', '.join(missing)}; give all of {', '.join(_SHAPES)}")
-    return None if missing else Shapes(*(arrays[key] for key in _SHAPES))
+    return None if missing else Shapes(*(arrays.get(key) for key in _SHAPES + _PARTS))
 
 
 def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, Any]) -> Contacts:
     i, j = arrays["i"], arrays["j"]
     normal = [float_array(arrays[key], i.shape[:1], key) for key in ("nx", "ny")]
     normal = np.column_stack(normal)
-    contacts = make_contacts(i, j, normal, arrays["branch"], r)
     if "levers" in arrays:
-        return _of_bodies(contacts, normal, arrays)
+        return _of_bodies(make_contacts(i, j, normal, np.ones(np.shape(i)), r), normal, arrays)
+    contacts = make_contacts(i, j, normal, arrays["branch"], r)
     check_contacts(contacts, r, "contact {}".format, _gap_allowed(info))
     if not set(_ARMS) <= set(arrays):
         return contacts
@@ -261,9 +266,10 @@ def _of_bodies(contacts: Contacts, normal: Floats, arrays: dict[str, Any]) -> Co
     if missing:
         raise InputError(f"contacts with levers also need {', '.join(missing)}")
     count = len(contacts.i)
-    gap, arm_i, arm_j = (float_array(arrays[key], (count,), key) for key in ("gap", *_ARMS))
+    names = {"length": "branch", "gap": "gap", **dict(zip(_ARMS, _ARMS, strict=True))}
+    given = {name: float_array(arrays[key], (count,), key) for name, key in names.items()}
     levers = float_array(arrays["levers"], (count, 2), "levers")
-    return contacts._replace(normal=normal, gap=gap, arm_i=arm_i, arm_j=arm_j, levers=levers)
+    return contacts._replace(normal=normal, levers=levers, **given)
 
 
 def _gap_allowed(info: dict[str, Any]) -> float:
