@@ -11,7 +11,6 @@ from granforce.figures.indeterminacy import correlations, extents, indeterminacy
 from granforce.figures.networks import (
     force_densities,
     overlaid,
-    places,
     possible_forces,
     ratio_counts,
 )
@@ -19,14 +18,11 @@ from granforce.figures.response import perturbation
 from granforce.figures.style import save
 from granforce.figures.variations import (
     distances,
-    effort,
-    frozen,
     opened,
     resting,
     samplers,
     sizes,
     stresses,
-    tails,
     volumes,
 )
 
@@ -35,15 +31,12 @@ __all__ = [
     "correlations",
     "displacement",
     "distances",
-    "effort",
     "extents",
     "force_densities",
-    "frozen",
     "indeterminacy",
     "opened",
     "overlaid",
     "perturbation",
-    "places",
     "possible_forces",
     "ratio_counts",
     "resting",
@@ -51,6 +44,5 @@ __all__ = [
     "save",
     "sizes",
     "stresses",
-    "tails",
     "volumes",
 ]

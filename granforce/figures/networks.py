@@ -116,48 +116,13 @@ def _ratios(
     return style.frame(drawn, backend, title=title, ylim=(0, largest), **axes)
 
 
-def places(
-    groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]],
-    *,
-    backend: str = "bokeh",
-    part: float = 0.1,
-) -> hv.Layout:
-    """Figure 5: the positions of the strongest and the least determined contacts.
-
-    groups: {μ: (packing, contacts, normal, extent)}: a Packing, positions in its contact list, and
-    their f_n and ΔF_n, in any unit. A fraction `part` of the contacts is marked: those with the
-    largest f_n on the left, with the largest ΔF_n on the right.
-    """
-    style.ready(backend)
-    frames = []
-    for mu in sorted(groups):
-        packing, contacts, normal, extent = groups[mu]
-        at = packing.contact_points[contacts]
-        marks = (("strongest", normal, style.COLOURS[1]), ("least determined", extent, "#0072B2"))
-        for word, values, colour in marks:
-            count = max(1, round(part * len(at)))
-            chosen = np.argsort(-np.asarray(values), kind="stable")[:count]
-            drawn = [
-                style.dots(at, "contacts", style.GREY, backend, size=4),
-                style.dots(at[chosen], word, colour, backend, size=5),
-            ]
-            frames.append(
-                style.frame(
-                    drawn + outline(packing, backend),
-                    backend,
-                    title=f"μ = {mu:g}: {word} {100 * part:g} %",
-                    **_axes(packing, backend),
-                )
-            )
-    return style.page(frames, backend, columns=2)
-
-
 def overlaid(
     groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]], *, backend: str = "bokeh"
 ) -> hv.Layout:
     """Figure 5: the positions of contacts with f_n > 2⟨f_n⟩ (strong), and with ΔF_n > ⟨ΔF_n⟩.
 
-    groups: as for `places`; both are drawn in one frame, and the title counts them.
+    groups: {μ: (packing, contacts, normal, extent)}: a Packing, positions in its contact list, and
+    their f_n and ΔF_n, in any unit; the title counts the contacts.
     """
     style.ready(backend)
     frames = []

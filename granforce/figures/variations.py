@@ -6,11 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import holoviews as hv
-import numpy as np
 import pandas as pd
 
 from granforce.figures import style
-from granforce.figures.style import Points
 from granforce.measures import statistics
 from granforce.measures.statistics import Table
 
@@ -25,16 +23,6 @@ def samplers(groups: Mapping[str, Table], *, backend: str = "bokeh") -> hv.Layou
     """
     sources = [(word, rows, "solid") for word, rows in groups.items()]
     return _frames(sources, backend, _MEASURES, "right", columns=3)
-
-
-def effort(groups: Mapping[str, Table], *, backend: str = "bokeh") -> hv.Layout:
-    """Acceptance of attempts and sweeps per state against μ, for walks by sweeps alone.
-
-    groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
-    """
-    sources = [(word, rows, "solid") for word, rows in groups.items()]
-    names = (("acceptance", "acceptance rate", 1.0), ("mean_sweeps", "sweeps per network", 1.0))
-    return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
 def sizes(rows: Table, *, exact: Table = (), backend: str = "bokeh") -> hv.Layout:
@@ -91,23 +79,6 @@ def opened(rows: Table, packed: Table, *, backend: str = "bokeh") -> hv.Layout:
     sources = (("made at μ = 0", rows, "solid"), ("made at μ", packed, "dashed"))
     names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
     return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
-
-
-def frozen(
-    periodic: Table, inner: Table, larger: Table = (), *, backend: str = "bokeh"
-) -> hv.Layout:
-    """Fraction of contacts without a unique force, and their clusters, against μ.
-
-    periodic: rows (dicts with mu, undetermined_part, clusters) with only the pressure prescribed;
-    inner: with the forces on all contacts outside an inner part fixed; larger: the same in packings
-    of more disks, with their number n.
-    """
-    sources = [("periodic", periodic, "solid"), ("frozen boundary", inner, "dashed")]
-    larger = pd.DataFrame(larger)
-    if len(larger):
-        sources.append((f"the same, N = {larger['n'].iloc[0]}", larger, "dotted"))
-    names = (("undetermined_part", "undetermined fraction", 1.0), ("clusters", "clusters", 1.0))
-    return _frames(sources, backend, names, "right")
 
 
 def distances(rows: Table, *, backend: str = "bokeh") -> hv.Overlay:
@@ -212,35 +183,6 @@ def volumes(rows: Table, larger: Table = (), *, backend: str = "bokeh") -> hv.La
     if series:
         axes = {"x": "N", "y": "ln V / grain", "logx": True, "legend": "right"}
         frames.append(style.graph(series, backend, title="Dependence on N", **axes))
-    return style.page(frames, backend, columns=2)
-
-
-def tails(groups: Mapping[str, Mapping[float, Points]], *, backend: str = "bokeh") -> hv.Layout:
-    """P(f_n/⟨f_n⟩) of uniform states, semi-logarithmic, one frame for each word.
-
-    groups: {word: {μ: [(f, P), …]}}. Exponential and Gaussian forces of mean 1 are drawn too.
-    """
-    style.ready(backend)
-    points = [point for curves in groups.values() for some in curves.values() for point in some]
-    least, f = min(p for _, p in points), np.linspace(0, max(f for f, _ in points), 200)
-    laws = {
-        "exponential": ("dashed", np.exp(-f)),
-        "Gaussian": ("dotted", 2 / np.pi * np.exp(-(f**2) / np.pi)),
-    }
-    frames = []
-    for last, (word, curves) in enumerate(groups.items(), 1 - len(groups)):
-        drawn = []
-        for k, (mu, some) in enumerate(curves.items()):
-            colour, marker = style.COLOURS[k], style.MARKERS[k]
-            drawn.append(style.line(some, f"μ = {mu:g}", colour, backend))
-            drawn.append(style.dots(some, f"μ = {mu:g}", colour, backend, marker, size=4))
-        for law, (dash, density) in laws.items():
-            dense = density >= least
-            ends = list(zip(f[dense], density[dense], strict=True))
-            drawn.append(style.line(ends, law, style.GREY, backend, dash))
-        legend = None if last else "right"
-        axes: dict[str, Any] = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}
-        frames.append(style.frame(drawn, backend, title=word, **axes))
     return style.page(frames, backend, columns=2)
 
 

@@ -57,7 +57,6 @@ CONTENTS = {
     "size": "nearest-network walks, other numbers of disks",
     "size_sweeps": "the paper's walk, other numbers of disks",
     "size_exact": "exact intervals, other numbers of disks",
-    "tails": "uniform networks of large packings, for the distribution of f_n",
 }
 # Numbers that may depend on the preparation, the ending of their parts, and their names in rows.
 _PREPARED = (

@@ -201,7 +201,7 @@ def paper_figures() -> str:
 
 def _figure(name: str, head: str = "") -> str:
     """A figure with its caption, without what the page says of all figures."""
-    caption = CAPTIONS[name].format(walk="paper's walk", tails="").replace(f"; {POINTS}", "")
+    caption = CAPTIONS[name].format(walk="paper's walk").replace(f"; {POINTS}", "")
     escaped = caption.replace("|", "\\|").replace("*", "\\*")
     return f"![{name}]({FIGURES}/{name}.png)\n\n*{head}{escaped}*\n"
 

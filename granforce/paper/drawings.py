@@ -9,7 +9,6 @@ import pandas as pd
 
 from granforce import figures
 from granforce.measures import statistics
-from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn, outside, positive
 from granforce.paper.resting import resting_rows
 from granforce.paper.tables import StudyTable
@@ -50,35 +49,19 @@ CAPTIONS = {
     "Dotted: ± two standard deviations of its mean for shuffled forces and as many packings.",
     "samplers": "Indeterminacy η1, η2 and 0.15 η3 of networks drawn in several ways, against μ; "
     f"{POINTS}.",
-    "effort": "Acceptance rate of the attempts, and sweeps per accepted network, of walks by "
-    f"Gauss–Seidel sweeps alone that end at several residuals; {POINTS}.",
-    "figure1_exact": "As Figure 1 for the nearest-network walk. Dashed: 0.15 η3 of the exact "
-    "intervals. Dotted: the width V^(1/h)/√(2πe) of S, from its volume V.",
-    "figure1_uniform": "As Figure 1 for the nearest-network walk. Dashed: uniform networks.",
-    "figure4_mean": f"Distribution of ΔF_n in units of its mean ({{walk}}): {_TAILS}.",
-    "figure4_exact": f"Distribution of the exact ΔF_n/⟨f_n⟩: {_TAILS}.",
     "figure6_exact": "As Figure 6 for the nearest-network walk, with exact intervals and uniform "
     "networks.",
-    "places": "Where the tenth of the contacts with the largest f_n is, and the tenth with the "
-    "largest ΔF_n ({walk}). Grey: all contacts.",
     "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the nearest-network walk, and 0.15 η3 of the "
     f"exact intervals (dashed), against the number N of disks; {POINTS}.",
     "resting": "Dimension h and exact η3 of packings of 100 disks against the imbalance of forces "
     f"below which drag replaces inertia; {POINTS}.",
     "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
     f"of packings made with μ; {POINTS}.",
-    "frozen": "Fraction of contacts without a unique force, and number of their clusters, where "
-    "only the pressure is prescribed and where the forces of the surroundings are held; "
-    f"{POINTS}.",
     "stresses": "Shear stress over pressure against μ: the largest in S, and that of the original "
     "network. The latter, and that of uniform networks, as fractions of the largest in the same "
     f"packing; {POINTS}.",
     "volumes": "Width V^(1/h)/√(2πe) of S in ⟨f_n⟩ against μ, from its volume V, and ln V per "
     f"grain of the backbone against the number N of disks; {POINTS}.",
-    "tails": "Distribution of the normal forces of uniform networks, in ⟨f_n⟩, where the "
-    "pressure and where the whole stress is prescribed, semi-logarithmic. Grey: exponential and "
-    "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "
-    "the last bin with ten forces or more: {tails}.",
     "distances": "Distance of the original network and of the nearest-network walk from the centre "
     f"of S, over that of uniform networks; {POINTS}.",
 }
@@ -107,12 +90,11 @@ def paper_sampler(table: StudyTable) -> str:
 def captions(table: StudyTable) -> dict[str, str]:
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
-    fits = tails.described(table) or "–"
     beyond = outside(table, SAMPLERS[paper_sampler(table)])
     if beyond:
         walk += f"; crosses or left out at μ = {', '.join(f'{mu:g}' for mu in beyond)}, where the "
         walk += "networks lie outside of S by more than its extent"
-    return {name: caption.format(walk=walk, tails=fits) for name, caption in CAPTIONS.items()}
+    return {name: caption.format(walk=walk) for name, caption in CAPTIONS.items()}
 
 
 def draw(
@@ -186,37 +168,18 @@ def _beyond_S(table: StudyTable, part: str) -> pd.DataFrame:
 def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures that the paper does not have."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
-    part, drawings = SAMPLERS[paper_sampler(table)], {}
+    drawings = {}
     sources = {_DRAWN.get(name, name): drawn(table, name) for name in SAMPLERS}
     packings = {name: rows["seed"].nunique() for name, rows in sources.items()}
     enough = max(1, ENOUGH * max(packings.values()))
     sources = {name: rows for name, rows in sources.items() if packings[name] >= enough}
     if len(sources) > 1:
         drawings["samplers"] = _later(figures.samplers, sources)
-    efforts = {words: table.part(p) for p, words in _SWEPT.items() if len(table.part(p))}
-    if efforts:
-        drawings["effort"] = _later(figures.effort, efforts)
     if len(walk) and len(exact):
-        sources = {"exact": exact, "volume": table.part("volume")}
-        drawings["figure1_exact"] = _later(figures.indeterminacy, walk, compare=sources)
         both = {"exact": exact} | ({"uniform": uniform} if len(uniform) else {})
         drawings["figure6_exact"] = _later(
             figures.correlations, walk, compare=both, walk=_WALKS["nearest"]
         )
-    if len(walk) and len(uniform):
-        drawings["figure1_uniform"] = _later(
-            figures.indeterminacy, walk, compare={"uniform": uniform}
-        )
-    groups = _some(_loose(_in_S(table, part)))
-    if groups:
-        drawings["figure4_mean"] = _later(figures.extents, groups)
-    groups = _some(_loose(table.extents("exact")))
-    if groups:
-        options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
-        drawings["figure4_exact"] = _later(figures.extents, groups, **options)
-    places = _shown_places(table, part)
-    if places:
-        drawings["places"] = _later(figures.places, places)
     if len(table.part("size")):
         drawings["sizes"] = _later(
             figures.sizes, _with_sizes(table), exact=table.part("size_exact", "exact")
@@ -225,10 +188,6 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
         drawings["resting"] = _later(figures.resting, resting_rows(table))
     if len(table.part("opened")):
         drawings["opened"] = _later(figures.opened, table.part("opened"), walk)
-    if len(table.part("frozen")):
-        periodic = positive(exact, "mu")
-        inner = table.part("frozen"), table.part("frozen_large")
-        drawings["frozen"] = _later(figures.frozen, periodic, *inner)
     if uniform["walk_ratio"].notna().any():
         drawings["distances"] = _later(figures.distances, uniform)
     if len(table.part("stress")):
@@ -238,17 +197,7 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
         drawings["volumes"] = _later(
             figures.volumes, table.part("volume"), table.part("volume_size")
         )
-    if table.tails:
-        drawings["tails"] = _later(figures.tails, _densities(table))
     return drawings
-
-
-def _densities(table: StudyTable) -> dict[str, dict[float, list[tuple[float, float]]]]:
-    """{word: {μ: [(f, P), …]}} for uniform states of large packings."""
-    return {
-        word: {mu: tails.densities(packings) for mu, packings in known.items()}
-        for word, known in tails.counts(table).items()
-    }
 
 
 def _chance(rows: pd.DataFrame) -> dict[float, float]:

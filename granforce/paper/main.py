@@ -120,7 +120,7 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
         given: dict[str, Any] = {name: whole(value, name.replace("_", " "), _LEAST.get(name, 0))}
         plan = plan._replace(**given)
     if arguments.n is not None:
-        plan = plan._replace(frozen_large=4 * plan.n, tails_n=4 * plan.n)
+        plan = plan._replace(frozen_large=4 * plan.n)
     if arguments.mu is not None:
         plan = _at(plan, _numbers("mu", arguments.mu, lambda mu: friction(number(mu))))
     if arguments.sizes is not None:
@@ -137,10 +137,7 @@ def _at(plan: Plan, frictions: tuple[float, ...]) -> Plan:
     """The plan for other friction coefficients; additions at some μ are kept for those of them."""
     some: dict[str, Any] = {
         name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
-        for name in (
-            *("frozen_large_frictions", "prepared_frictions", "repeat_frictions"),
-            "tails_frictions",
-        )
+        for name in ("frozen_large_frictions", "prepared_frictions", "repeat_frictions")
     }
     return plan._replace(frictions=frictions, **some)
 

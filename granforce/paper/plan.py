@@ -13,8 +13,7 @@ and "stress_uniform" (uniform states, for their stresses); "frozen" and "frozen_
 intervals of the inner part with all forces outside fixed); "volume" (ln V of S) and "volume_size"
 (the same for other numbers of disks); "sweeps_1e-4" and "sweeps_1e-6" (sweeps that end later);
 "repeat_…" (repeated and longer walks); "size", "size_sweeps" and "size_exact" (other numbers of
-disks); "tails" and "tails_stress" (uniform states of large packings, with the pressure and with the
-whole stress prescribed, for the distribution of f_n).
+disks).
 """
 
 import itertools
@@ -119,12 +118,6 @@ class Plan(NamedTuple):
     size_packings: int = 10
     size_frictions: tuple[float, ...] = (0.1, 1.0)
     largest_exact: int = 800  # largest size for exact intervals
-    tails_n: int = 1600
-    tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
-    # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. In a narrow S
-    # the largest forces are those of few contacts, so many packings are needed, not many states.
-    tails_packings: int = 16
-    tails_states: int = 200
 
 
 QUICK = Plan(
@@ -147,10 +140,6 @@ QUICK = Plan(
     sizes=(20, 80),
     size_frictions=(0.1,),
     largest_exact=80,
-    tails_n=80,
-    tails_frictions=(0.1, 1),
-    tails_packings=1,
-    tails_states=40,
 )
 
 
@@ -419,18 +408,6 @@ def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
     return _task(part, kinds.VOLUME, n, seed, mu, accuracy)
 
 
-def _tails(plan: Plan, seed: int) -> list[Task]:
-    if seed > plan.tails_packings:
-        return []
-    n, states = plan.tails_n, plan.tails_states
-    parts: dict[str, Any] = {"tails": {}, "tails_stress": {"prescribed": "stress"}}
-    return [
-        _task(part, kinds.UNIFORM, n, seed, mu, states, **conditions)
-        for mu in plan.tails_frictions
-        for part, conditions in parts.items()
-    ]
-
-
 # The families of parts, which are computed by name, in this order.
 _PARTS = {
     "exact": _exacts,
@@ -447,7 +424,6 @@ _PARTS = {
     "residuals": _residuals,
     "repeat": _repeated,
     "size": _sizes,
-    "tails": _tails,
 }
 
 PARTS = tuple(_PARTS)

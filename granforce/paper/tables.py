@@ -34,9 +34,6 @@ SAMPLED = (
     *("prepared_late_drag", "prepared_late_drag_exact"),
 )
 WALKED = (*plans.SWEEPS, "walk")
-# Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
-TAILED = ("tails", "tails_stress")
-FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
 COLUMNS = [name.removeprefix("row_") for name in VARIABLES if name.startswith("row_")]
 
@@ -59,8 +56,6 @@ class StudyTable(NamedTuple):
     shown: list[tuple[int, Integers]]
     packings: dict[int, Packing]  # {row: Packing} of those walks
     skipped: dict[str, int]  # counts of the plan's cells missing from the store
-    # {row: counts of f_n of its states, in bins up to FORCES}
-    tails: Mapping[int, Floats] = MappingProxyType({})
     # {row: (shells, 2) radii in mean diameters and mean |u| in the range of the fit of α}
     decays: Mapping[int, Floats] = MappingProxyType({})
 
@@ -104,7 +99,6 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     packings: dict[int, Packing] = {}
     centres: dict[tuple[float, int], tuple[Floats, dict[str, Any]]] = {}
     exact: dict[tuple[float, int], xr.Dataset] = {}
-    tails: dict[int, Floats] = {}
     decays: dict[int, Floats] = {}
     every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
@@ -121,8 +115,6 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
             rows[k] |= _shears(packing, dataset)
         if task.part in SAMPLED and _has_states(dataset):
             samples.append(_samples(k, dataset))
-        if task.part in TAILED:
-            tails[k] = _counted(dataset)
         if task.part == "uniform":
             centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
         first = task.part in plans.SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
@@ -142,7 +134,6 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
         shown=shown,
         packings=packings,
         skipped={"missing_cells": int(missing)},
-        tails=tails,
         decays=decays,
     )
 
@@ -265,12 +256,6 @@ def no_samples() -> pd.DataFrame:
     return pd.DataFrame(columns=SAMPLES, dtype=float).astype(whole)
 
 
-def _counted(dataset: xr.Dataset) -> Floats:
-    """Counts of f_n of the states, in the bins with edges FORCES."""
-    normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
-    return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
-
-
 def packings_at_each(rows: pd.DataFrame) -> str:
     """The number of packings at each μ, in words: "10", or "10 to 30"."""
     made_at = rows["packing_mu"].fillna(rows["mu"])  # packings may share the friction of cones
@@ -302,7 +287,6 @@ def merged(new: StudyTable, old: StudyTable) -> StudyTable:
         shown=new.shown + [(place[k], counts) for k, counts in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
         skipped={"missing_cells": new.skipped["missing_cells"] - len(place)},
-        tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
         decays=dict(new.decays) | {place[k]: d for k, d in old.decays.items() if k in place},
     )
 
@@ -414,9 +398,6 @@ def _dataset(table: StudyTable) -> xr.Dataset:
     if table.shown:
         arrays["shown_row"] = np.concatenate([np.full(len(s), k) for k, s in table.shown])
         arrays["shown_count"] = np.concatenate([s for _, s in table.shown])
-    if table.tails:
-        arrays["tail_row"], arrays["tail_force"] = list(table.tails), FORCES
-        arrays["tail_count"] = np.stack(list(table.tails.values()))
     if table.decays:
         shells = [len(decay) for decay in table.decays.values()]
         arrays["decay_row"] = np.repeat(list(table.decays), shells)
@@ -444,10 +425,6 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
             chosen = dataset["shown_row"].values == k
             shown.append((k, dataset["shown_count"].values[chosen]))
             packings[k] = _packing(store, rows.loc[k])
-    tails = {}
-    if "tail_row" in dataset:
-        counts = dataset["tail_count"].values
-        tails = dict(zip(dataset["tail_row"].values.tolist(), counts, strict=True))
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
     decays = {}
     if "decay_row" in dataset:
@@ -455,7 +432,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> StudyTable:
         both = np.column_stack([dataset["decay_radius"], dataset["decay_size"]])
         decays = {int(k): both[at == k] for k in np.unique(at)}
     skipped = json.loads(dataset.attrs["skipped"])
-    return StudyTable(plan, rows, samples, shown, packings, skipped, tails, decays)
+    return StudyTable(plan, rows, samples, shown, packings, skipped, decays)
 
 
 def _packing(store: Store, row: pd.Series) -> Packing:

@@ -8,7 +8,7 @@ from packings import packed, skewed
 import granforce as gf
 from granforce.figures import style
 from granforce.figures.displacement import LONGEST_ARROW, displacement
-from granforce.figures.networks import overlaid, places
+from granforce.figures.networks import overlaid
 
 pytestmark = pytest.mark.fast
 
@@ -63,6 +63,5 @@ def test_tilted_cells_are_outlined_and_grains_lie_inside():
         parts = packing.cell.parts(points)
         assert parts.min() > -1e-12 and parts.max() < 1 + 1e-12
     groups = {0.3: (packing, np.arange(len(at)), packing.forces[:, 0], packing.forces[:, 0])}
-    for drawn in (places(groups), overlaid(groups)):
-        frames = drawn.traverse(lambda element: element, [hv.Overlay])
-        assert frames and all(frame.traverse(lambda e: e, [hv.Curve]) for frame in frames)
+    frames = overlaid(groups).traverse(lambda element: element, [hv.Overlay])
+    assert frames and all(frame.traverse(lambda e: e, [hv.Curve]) for frame in frames)

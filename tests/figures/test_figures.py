@@ -14,7 +14,6 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.path import Path
 from matplotlib.text import Text
-from packings import packed
 from PIL import Image
 
 import granforce as gf
@@ -231,27 +230,6 @@ def test_a_legend_in_a_picture_shows_symbols():
     assert [handle.get_marker() for handle in legend.legend_handles] == ["o", "s", "^"]
 
 
-def test_places_mark_the_largest_at_their_points_of_contact():
-    packing = packed(30, 0.3)
-    contacts = np.arange(0, len(packing.contacts.i), 2)
-    normal, extent = np.arange(len(contacts)), -np.arange(len(contacts))
-    figure = figures.places({0.3: (packing, contacts, normal, extent)}, part=0.1)
-    count = round(0.1 * len(contacts))
-    for frame, chosen in zip(frames(figure), (contacts[-count:], contacts[:count]), strict=True):
-        marked = frame.traverse(lambda e: e, [hv.Scatter])[1]
-        at = np.column_stack([marked.dimension_values(k) for k in (0, 1)])
-        assert np.all((at >= 0) & (at <= packing.box))
-        # Every mark lies on the rims of both disks of one of the contacts chosen.
-        for point in at:
-            reach = []
-            for c in chosen:
-                ends = packing.contacts.i[c], packing.contacts.j[c]
-                step = np.array([point - packing.x[g] for g in ends])
-                step -= packing.box * np.round(step / packing.box)
-                reach.append(np.abs(np.linalg.norm(step, axis=1) - packing.r[list(ends)]).max())
-            assert min(reach) < 1e-6
-
-
 def test_variations_show_what_the_rows_hold():
     rows = [{"mu": mu, "n": n, "eta2": n * mu, "eta3": 1} for mu in (0.1, 1) for n in (100, 400)]
     small, large = frames(figures.sizes(rows, exact=[{"mu": 0.1, "n": 100, "eta3": 2.0}]))
@@ -262,18 +240,6 @@ def test_variations_show_what_the_rows_hold():
     eta2, _ = frames(figures.opened(rows, rows[:1]))
     np.testing.assert_allclose(curves(eta2)["made at μ = 0"], ([0.1, 1], [25, 250]))
     np.testing.assert_allclose(curves(eta2)["made at μ"], ([0.1], [10]))
-    inner = [{"mu": 0.1, "undetermined_part": 0.0, "clusters": 3}]
-    part, clusters = frames(figures.frozen([], inner))
-    np.testing.assert_allclose(curves(part)["frozen boundary"], ([0.1], [0]))
-    np.testing.assert_allclose(curves(clusters)["frozen boundary"], ([0.1], [3]))
-    larger = [{"mu": 1, "n": 80, "undetermined_part": 0.5, "clusters": 2}]
-    part, _ = frames(figures.frozen([], inner, larger))
-    np.testing.assert_allclose(curves(part)["the same, N = 80"], ([1], [0.5]))
-    walks = [{"mu": mu, "acceptance": mu, "mean_sweeps": 1e4 * mu} for mu in (0.1, 1)]
-    walks.append({"mu": 10, "acceptance": 0.0})  # out of reach: told, and without sweeps
-    part, sweeps = frames(figures.effort({"to 1e-3": walks}))
-    np.testing.assert_allclose(curves(part)["to 1e-3"], ([0.1, 1, 10], [0.1, 1, 0]))
-    np.testing.assert_allclose(curves(sweeps)["to 1e-3"], ([0.1, 1], [1e3, 1e4]))
     *_, eta3 = frames(figures.samplers({"some": [{"mu": 0.1, "eta3": 2.0}]}))
     np.testing.assert_allclose(curves(eta3)["some"], ([0.1], [0.3]))
     carried = [{"mu": mu, "seed": 1, "friction": mu, "own_shear": mu / 4} for mu in (0.1, 2)]
@@ -303,7 +269,7 @@ def test_every_figure_of_the_study_has_a_caption(shipped):
     assert {f"figure{k}" for k in range(1, 7)} <= set(shipped) <= set(drawings.CAPTIONS)
 
 
-OFTEN = "figure1", "figure3", "figure4", "places", "distances"  # one of each kind
+OFTEN = "figure1", "figure3", "figure4", "figure5", "distances"  # one of each kind
 
 
 @pytest.mark.parametrize("often", [True, pytest.param(False, marks=pytest.mark.slow)])

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from granforce.paper import claims, findings, tables, tails
+from granforce.paper import claims, findings, tables
 from granforce.paper.claims import contacts, groups, verdicts
 from granforce.paper.claims.table import AFTER, BEFORE, CLAIMS, TOPICS
 
@@ -438,22 +438,6 @@ def test_every_claim_has_a_reason_and_known_samplers():
 
 def test_without_data_there_is_no_verdict():
     assert {one["verdict"] for one in claims.judged(study())} == {verdicts.MISSING}
-
-
-@pytest.mark.parametrize("power", [1, 2])
-def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
-    rng = np.random.default_rng(0)
-    forces = rng.exponential(1.0, 10**6) if power == 1 else np.abs(rng.normal(0, 1.6, 10**6))
-    counted = np.histogram(forces, np.append(0.0, tables.FORCES))[0]
-    tail = tails.fitted([counted * 0.5, counted * 0.5])
-    assert tail.power == pytest.approx(power, abs=0.15 * power) and tail.low == 2.0
-    right, wrong = tail.off_exponential, tail.off_gaussian
-    right, wrong = (right, wrong) if power == 1 else (wrong, right)
-    assert tail.off <= right < 0.3 * wrong
-    assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
-    row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
-    table = study([row], tails={0: counted.astype(float)})
-    assert tails.described(table).startswith("whole stress prescribed, μ = 0.1: b = ")
 
 
 def test_volumes_tell_where_they_are_largest_and_what_they_follow():

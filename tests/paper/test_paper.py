@@ -62,10 +62,6 @@ TINY = plans.Plan(
     size_packings=2,
     size_frictions=(0.1,),
     largest_exact=12,
-    tails_n=20,
-    tails_frictions=(0.1, 0.3),
-    tails_packings=1,
-    tails_states=8,
 )
 WORDS = [
     *("study", "-n", "20", "--mu", "0,0.1,0.3", "--packings", "2", "--states", "6"),
@@ -289,7 +285,7 @@ def test_a_part_of_the_cells_makes_a_part_of_the_table(done):
     table = tables.reduce(done / "cells.zarr", larger)
     assert table.skipped["missing_cells"] == len(plans.tasks(larger)) - len(plans.tasks(TINY))
     with pytest.raises(InputError, match="no results of this study"):
-        tables.reduce(done / "cells.zarr", TINY._replace(n=21, sizes=(), tails_n=21))
+        tables.reduce(done / "cells.zarr", TINY._replace(n=21, sizes=()))
 
 
 def test_rows_that_a_store_lacks_come_from_the_older_table(done):
@@ -328,9 +324,7 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
 def test_every_figure_of_the_table_is_made(table):
     made = drawings.all_figures(table)
     assert {"figure1", "figure3", "figure4", "figure5", "figure6"} <= made.keys()
-    assert {"figure1_uniform", "opened", "frozen", "sizes", "distances"} <= made.keys()
-    assert {"volumes", "tails"} <= made.keys()
-    assert {"samplers", "effort", "places"} <= made.keys()
+    assert {"samplers", "opened", "sizes", "distances", "volumes"} <= made.keys()
     assert made.keys() <= drawings.captions(table).keys()
     assert "Gauss–Seidel" in drawings.captions(table)["figure1"]
     for name, figure in made.items():
