@@ -18,11 +18,12 @@ follow where the whole stress is prescribed.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
+from scipy import linalg, sparse
 
 from granforce.records import (
     Contacts,
@@ -37,8 +38,8 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
 
-# Up to this many rows, ranks come from eigenvalues of dense matrices, relative to the largest.
-LARGEST_RANK, _LEAST_EIGENVALUE = 3000, 1e-12
+# Up to this many rows, ranks come from pivots of dense matrices, relative to the largest row sum.
+LARGEST_RANK, _LEAST_PIVOT = 3000, 1e-12
 
 
 def prescribed_stress(
@@ -247,8 +248,14 @@ def frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
 
 
 def left_free(rows: sparse.csr_matrix) -> int:
-    """Unknowns less independent rows, of rows (k, unknowns) of order 1."""
+    """Unknowns less independent rows, of rows (k, unknowns) of order 1.
+
+    The rank is that of a Cholesky factor with complete pivoting (Higham, Accuracy and stability of
+    numerical algorithms, 2nd ed., 10.3).
+    """
     if not all(rows.shape):  # everything is pinned, or no grain has to balance
         return rows.shape[1]
-    square = cancelling.apart(np.linalg.eigvalsh, (rows @ rows.T).toarray())
-    return rows.shape[1] - int(np.sum(square > _LEAST_EIGENVALUE * square[-1]))
+    square = (rows @ rows.T).toarray()
+    least = _LEAST_PIVOT * np.abs(square).sum(axis=1).max()
+    _, _, rank, _ = cancelling.apart(partial(linalg.lapack.dpstrf, tol=least), square)
+    return rows.shape[1] - int(rank)

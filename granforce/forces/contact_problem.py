@@ -268,12 +268,13 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
     """y (n,), corrected to A y = b by the least change relative to y + away.
 
-    With D = diag(y + away) the change is D s of the least |s|, from (1, D Aᵀ; A D, −ε) (s, λ) =
+    With D ∝ diag(|y| + away) the change is D s of the least |s|, from (1, D Aᵀ; A D, −ε) (s, λ) =
     (0, b − A y); ε > 0 keeps rows that depend on others solvable.
     """
     rows, columns = A.shape
     for _ in range(_RESTORED):
         size = np.abs(y) + away
+        size /= size.max(initial=1e-300)
         scaled = A @ sparse.diags(size)
         both = [
             [sparse.identity(columns), scaled.T],
