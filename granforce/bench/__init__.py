@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from granforce.bench import packings
-from granforce.bench.conditions import inference, knowledge
+from granforce.bench.conditions import inference
 from granforce.bench.exact import REFERENCES, interval_methods
 from granforce.bench.frames import frames
-from granforce.bench.kernel import growth, kernel, pushes, starts
+from granforce.bench.kernel import growth, pushes, starts
 from granforce.bench.masonry import SMALL, masonry
 from granforce.bench.packings import (
     compaction,
@@ -23,9 +23,8 @@ from granforce.bench.packings import (
 )
 from granforce.bench.report import environment, table
 from granforce.bench.runner import note
-from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling
-from granforce.bench.states import batches, intervals, walks
+from granforce.bench.states import intervals
 from granforce.bench.uniform import uniform, uniform_growth
 from granforce.system.files import make_folder, written
 from granforce.system.wording import json_text
@@ -55,7 +54,6 @@ PARTS = dict(
             sweeps=100_000,
         ),
         _part(scaling, "One relaxation against the number of disks", tiles=(1, 2, 4), patience=2.0),
-        _part(kernel, "Factorisation: part of what the machine can do", tiles=(1, 2)),
         _part(starts, "Nearest networks: PIQP, one at a time, and in lanes", n=100, repeats=2),
         _part(pushes, "Critical forces: one contact at a time, and in lanes", n=60, contacts=10),
         _part(
@@ -63,7 +61,6 @@ PARTS = dict(
             "Set-up, relaxation and exact bound against the number of disks",
             tiles=(1, 2, 4),
         ),
-        _part(batches, "Chains of one packing on one and two threads", n=100, states=100),
         _part(
             compaction,
             "Compaction: run time and overlap by time step and sweeps",
@@ -85,7 +82,6 @@ PARTS = dict(
             sizes=(50, 100, 200),
             seeds=2,
         ),
-        _part(skips, "What skipping is worth", n=100),
         _part(
             intervals,
             "Intervals seen by walks against exact ones",
@@ -103,9 +99,7 @@ PARTS = dict(
             n=100,
             packings=2,
         ),
-        _part(knowledge, "What is prescribed and known, beside HiGHS and PIQP", n=100, every=1),
         _part(masonry, "Dry-stone walls beside HiGHS", size=SMALL),
-        _part(walks, "Random walks by solver", n=100, packings=3, states=50),
     ]
 )
 Parts = Mapping[str, Part]

@@ -1,10 +1,6 @@
-"""Prescribed, known and measured quantities: bounds beside HiGHS, pulls and inference beside PIQP.
-
-All methods get the same programs; rows include the error of their results.
-"""
+"""Inference beside PIQP and HiGHS, which get the same programs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,66 +8,15 @@ import highspy
 import numpy as np
 from scipy import sparse
 
-from granforce.bench.exact import plain_loop
-from granforce.bench.runner import Methods, Row, compared, note, packings
-from granforce.explore.intervals import intervals
-from granforce.explore.pull import pull
+from granforce.bench.runner import Row, compared, packings
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.knowledge import Known
 from granforce.forces.likeliest import checked, fitted
 from granforce.numerics import highs as programs
-from granforce.types import Floats, Integers
+from granforce.types import Floats
 
-# Fraction of contacts with known forces, and the width of their bounds; values of a pull, as
-# fractions of its interval.
-KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1
-VALUES = np.linspace(0.05, 0.95, 8)
 # Errors of f_n and f_t in ⟨f_n⟩, and the time limit of HiGHS in seconds.
 ERRORS, PATIENCE = (0.2, 0.1), 120.0
-
-
-def knowledge(
-    n: int = 400, mu: float = 0.1, seed: int = 1, every: int = 6, pulled: int = 3, repeats: int = 3
-) -> list[Row]:
-    """Rows: seconds of the same programs by granforce and by the baseline, and their errors.
-
-    Bounds are those of every n-th contact (`every`). ratio: seconds of the baseline, HiGHS or PIQP,
-    over those of the row. gap: largest certified duality gap; off: how far a bound of the baseline
-    is outside the certified ones, or the largest difference between forces; residual: largest
-    unbalance, all in ⟨f_n⟩; above: largest relative excess of the minimised sum of squares over
-    that of the other method.
-    """
-    ((case, S),) = packings("knowledge", n, [mu], seed)
-    rng = np.random.default_rng(seed)
-    ensembles = {
-        "bounds, pressure prescribed": S,
-        "bounds, stress prescribed": ensemble(S.packing, prescribed="stress"),
-        "bounds, a tenth of the forces known": ensemble(S.packing, known=_known(S, rng)),
-    }
-    rows = []
-    for task, one in ensembles.items():
-        rows += _bounds(case | {"task": task}, one, one.index[::every])
-    contacts = rng.choice(S.index, pulled, replace=False)
-    rows += _pulls(case, S, contacts, repeats)
-    m, sigma = _measurement(S, rng, seed)
-    methods: Methods = {
-        "granforce": lambda: contact_program(S, m, sigma)[None],
-        "PIQP": lambda: piqp(S, m, sigma)[None],
-    }
-    case = case | {"task": "inference, everything measured", "programs": 1}
-    return rows + _networks(case, S, methods, lambda f: ((f - m) / sigma) ** 2, repeats)
-
-
-def _known(S: Ensemble, rng: np.random.Generator) -> Known:
-    """Normal forces of some contacts, within a tenth of the packing's own."""
-    count = max(1, round(KNOWN_PART * len(S.index)))
-    places = np.sort(rng.choice(len(S.index), count, replace=False))
-    forces = S.original[places]
-    reach = np.full_like(forces, np.inf)
-    reach[:, 0] = KNOWN_WITHIN * forces[:, 0]
-    return Known(S.index[places], forces - reach, forces + reach)
 
 
 def _measurement(S: Ensemble, rng: np.random.Generator, seed: int) -> tuple[Floats, Floats]:
@@ -79,77 +24,6 @@ def _measurement(S: Ensemble, rng: np.random.Generator, seed: int) -> tuple[Floa
     sigma = np.array(ERRORS) * S.force_scale
     truth = sample_uniform(S, 8, seed=seed).flat[-1]
     return truth + sigma * rng.standard_normal(truth.shape), sigma
-
-
-def _bounds(case: Row, S: Ensemble, contacts: Integers) -> list[Row]:
-    note(f"knowledge: {case['task']}")
-    intervals(S, contacts[:1])  # compiles
-    S = replace(S)  # without prepared data
-    methods: Methods = {
-        "granforce": lambda: intervals(S, contacts),
-        "HiGHS": lambda: plain_loop(S, contacts),
-    }
-
-    def measure(name: str, results: Row) -> Row:
-        exact, bounds = results.values()
-        if name == "granforce":
-            return {"gap": exact.max_gap}
-        # The optimum is between the value attained and its bound.
-        beyond = np.abs([bounds[0] - exact.low, bounds[1] - exact.high]) / S.force_scale
-        outside = np.maximum(beyond - np.moveaxis(exact.gap, -1, 0), 0.0)
-        return {"off": float(outside.max())}
-
-    return compared(case | {"programs": 4 * len(contacts)}, methods, measure, "HiGHS")
-
-
-def _pulls(case: Row, S: Ensemble, contacts: Integers, repeats: int) -> list[Row]:
-    note("knowledge: pulls")
-    exact = intervals(S, contacts)
-    ends = zip(contacts, exact.low[:, 0], exact.high[:, 0], strict=True)
-    targets = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
-    methods: Methods = {
-        "granforce": lambda: np.concatenate(
-            [pull(S, c, values, S.original).states for c, values in targets]
-        ),
-        "PIQP": lambda: np.array(
-            [_pulled_by_piqp(S, c, value) for c, values in targets for value in values]
-        ),
-    }
-    case = case | {"task": "pulls", "programs": len(targets) * len(VALUES)}
-    return _networks(case, S, methods, lambda states: (states - S.original) ** 2, repeats)
-
-
-def _networks(
-    case: Row, S: Ensemble, methods: Methods, squares: Callable[[Floats], Floats], repeats: int
-) -> list[Row]:
-    """Rows of two methods for the same networks (k, N_c, 2), which minimise a sum of squares."""
-
-    def measure(name: str, results: Row) -> Row:
-        sums = {name: squares(states).sum(axis=(1, 2)) for name, states in results.items()}
-        ours, theirs = results.values()
-        return {
-            "off": float(np.abs(ours - theirs).max() / S.force_scale),
-            "residual": float(np.max(S.residual(results[name]))),
-            "above": float(np.max(sums[name] / np.minimum(*sums.values()) - 1)),
-        }
-
-    return compared(case, methods, measure, "PIQP", repeats=repeats + 1)  # the first run compiles
-
-
-def _pulled_by_piqp(S: Ensemble, contact: int, value: float) -> Floats:
-    """The network nearest to the original with this f_n."""
-    A, b, T = S.scaled_form
-    normal = T.tocsr()[S.per_contact * S.positions([contact])]
-    solver = programs.quadratic_solver(400)
-    solver.setup(
-        sparse.csc_matrix(T.T @ T),
-        -(T.T @ S.to_vector(S.original)) / S.force_scale,
-        sparse.vstack([A, normal], format="csc"),
-        np.append(b, value / S.force_scale),
-        x_l=np.zeros(A.shape[1]),
-    )
-    solver.solve()
-    return S.to_forces(T @ np.maximum(solver.result.x, 0.0) * S.force_scale)
 
 
 def inference(

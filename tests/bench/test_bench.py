@@ -7,7 +7,7 @@ import pytest
 from packings import packed
 
 from granforce import bench
-from granforce.bench import report, runner, siconos, solvers, states
+from granforce.bench import report, runner, siconos, solvers
 from granforce.forces.build import ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
@@ -145,31 +145,6 @@ def test_pushed_contacts_are_compared_at_the_same_critical_forces():
     assert all(row["seconds_per_contact"] > 0 and row["differ"] == 0 for row in rows)
 
 
-def test_chains_on_two_threads():
-    (row,) = bench.batches(states=6, **SMALL)
-    assert min(row["per_second"], row["per_second_2"], row["ceiling"]) > 0
-    assert row["ratio"] == pytest.approx(row["per_second_2"] / row["per_second"])
-
-
-def test_walks_of_one_optimum_agree_and_others_need_not():
-    rows = bench.walks(packings=2, states=4, **SMALL)
-    assert [row["solver"] for row in rows] == list(states.WALKS)
-    piqp, ours = (named(rows, "solver", s) for s in ("nearest (PIQP)", "nearest"))
-    for row in rows:
-        assert row["failed"] == 0 and 0 < row["acceptance"] <= 1
-        assert row["eta3_error"] >= 0 and row["distance"] > 0 and row["original"] > 0
-    for key in ("eta1", "eta2", "eta3", "distance"):
-        assert ours[key] == pytest.approx(piqp[key], rel=1e-4)
-
-
-def test_a_walk_that_fails_is_counted():
-    alone = states.WALKS["Gauss–Seidel alone"] | {"max_iterations": 2}
-    ways = {"cut short": alone, "nearest": states.WALKS["nearest"]}
-    rows = bench.walks(packings=1, states=2, ways=ways, **SMALL)
-    assert [row["failed"] for row in rows] == [1, 0]
-    assert "eta3" not in rows[0]
-
-
 def test_intervals_of_walks_grow_towards_the_exact_ones():
     rows = bench.intervals(n=30, frictions=(0.3,), states=(5, 20))
     exact = named(rows, "method", "exact")
@@ -231,25 +206,6 @@ def test_environment_names_machine_and_versions():
 def test_table_aligns_and_leaves_out_empty_columns():
     text = report.table("T", [{"a": 1.23456, "b": None, "c": True}, {"a": 10, "b": "", "c": False}])
     assert text.splitlines() == ["T", "-", "a     c", "1.23  yes", "10"]
-
-
-def test_knowledge_compares_the_same_programs():
-    rows = bench.knowledge(n=30, mu=0.3, every=1, pulled=1, repeats=1)
-    tasks = list(dict.fromkeys(row["task"] for row in rows))
-    assert len(tasks) == 5 and len(rows) == 10
-    for task in tasks:
-        ours, baseline = (row for row in rows if row["task"] == task)
-        assert ours["method"] == "granforce"
-        assert baseline["method"] == ("HiGHS" if "bounds" in task else "PIQP")
-        assert ours["ratio"] == pytest.approx(baseline["seconds"] / ours["seconds"])
-        assert baseline["ratio"] == 1
-        assert ours["programs"] == baseline["programs"]
-        if "bounds" in task:
-            assert ours["gap"] <= 1e-8 and baseline["off"] <= 1e-7
-        else:
-            assert max(ours["residual"], baseline["residual"]) <= 1e-9
-            assert 0 <= ours["above"] < 1e-6 and baseline["off"] < 1e-4
-    assert rows[0]["programs"] == 4 * len(ensemble(packed(30, 0.3)).index)
 
 
 def test_frames_are_nearer_to_the_truth_when_inferred():

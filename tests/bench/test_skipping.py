@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from packings import lattice
 
-from granforce import bench
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
 from granforce.packing import pair_list
@@ -38,9 +37,3 @@ def test_tangential_unknowns_left_out_are_zero_without_friction():
     assert np.ptp([one.low[0, 0], one.high[0, 0]]) > 0.1
     assert np.abs(one.low - other.low).max() < 1e-5 * without.force_scale
     assert np.abs(one.high - other.high).max() < 1e-5 * without.force_scale
-
-
-def test_the_benchmark_counts_every_skip():
-    rows = bench.skips(n=40, mu=0.3)
-    assert len(rows) == 6
-    assert all(row["count"] >= 0 and row["ratio"] > 0 for row in rows)
