@@ -1,4 +1,4 @@
-"""The results for the states on screen as two tables: indeterminacy, and the packing."""
+"""The results for the states on screen: one line, and two tables with errors that it unfolds."""
 
 import math
 from collections.abc import Iterable
@@ -21,15 +21,18 @@ from .result_values import Quantity
 
 MEASURE = '<button type="button" class="soft">measure</button>'
 UNIT = {"extent": " ⟨fₙ⟩"}
+FOLD = '<button type="button" class="fold" aria-label="all numbers, with their meaning"></button>'
 
 
 class Results(Scripted):
     """Numbers with symbol and name, seen and exact; see results_line.js.
 
-    The volume of S is looked up in the stores, and computed on request.
+    In low windows the tables are closed, to leave the room to the tabs. The volume of S is looked
+    up in the stores, and computed on request.
     """
 
     html = param.String()
+    open = param.Boolean(doc="whether the tables are open in a low window, too")
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
@@ -40,6 +43,7 @@ class Results(Scripted):
             self._tell, state, "exact", "shown", "missing", "work.computation.running",
             "knowledge.known", "knowledge.narrowed", "work.measuring.running",
         )  # fmt: skip
+        state.looks.sync_opened(self, "results")
         self._look()
 
     def _look(self, *events: Any) -> None:
@@ -59,7 +63,7 @@ class Results(Scripted):
         replay = self._state.replay
         if replay is not None:
             free = replay.summary["dimension"] > 0 and not self._work.measuring.running
-            self.html = tables(self._state, self._volume, free)
+            self.html = results(self._state, self._volume, free)
 
     @from_browser(measure=True)
     def _measure(self) -> None:
@@ -69,7 +73,7 @@ class Results(Scripted):
             self._work.measuring.start(work, self._take)
 
 
-def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
+def results(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume.
 
     While other states are being computed, dashes, except for what is known of their packing.
@@ -80,7 +84,9 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     measures = result_values.measures(state)
     sampling = result_values.sampling(state)
     count = f"{state.replay.summary['states']} networks"
-    heading = f"seen in all of S ({count})" if known else f"seen in all {count}"
+    heading = f"seen in all {count}"
+    if known:
+        heading = f"seen{known} ({count})" if state.obeying else f"seen in all of S ({count})"
     if not state.replay.summary["dimension"]:
         heading = "the only network"
     if sampling and sampling.verdict:
@@ -91,31 +97,50 @@ def tables(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     elif any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
-    values = [_named(one, one.exact or (MEASURE if offered else "–")) for one in packing]
+    values = [one.exact or (MEASURE if offered else "–") for one in packing]
     doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
     doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
     now, was = Shown(state.cell, state.replay, state.exact), state.before
     change = "" if was is None else f'<p class="was">{result_values.changes(was, now)}</p>'
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
-    return (
-        _table(["How undetermined", *_titles(measures)], rows)
-        + _table(_titles(packing), [values])
-        + doubt
-        + change
-        + left
-    )
+    return _laid_out(heading, measures, packing, rows, values, left) + doubt + change
 
 
 def coming(state: AppState) -> str:
-    """The tables while the requested states are being computed."""
+    """The numbers while the requested states are being computed: those that stay the same."""
+    same, heading = not state.requested, "seen: being computed"
     measures, packing = result_values.measures(state), result_values.packing(state)
+    measures = [one._replace(seen="–", exact=one.exact if same else "") for one in measures]
+    packing = [
+        one._replace(exact=one.exact if (same or state.growing) and one.exact else "–")
+        for one in packing
+    ]
+    rows = [[heading, *_dashes(measures)], ["exact", *_values(measures, "exact")]]
     was = Shown(state.cell, state.replay, state.exact)
-    found = [_named(one, one.exact if state.growing and one.exact else "–") for one in packing]
-    rows = [[words, *_dashes(measures)] for words in ("seen: being computed", "exact")]
+    before = f'<p class="was">Before: {result_values.changes(was)}</p>'
+    return _laid_out(heading, measures, packing, rows, [one.exact for one in packing]) + before
+
+
+def _laid_out(
+    heading: str,
+    measures: Iterable[Quantity],
+    packing: Iterable[Quantity],
+    rows: list[list[str]],
+    values: list[str],
+    left: str = "",
+) -> str:
+    """The line and the tables; rows, values: of the tables; left: what the numbers leave out."""
+    seen = [(one, one.seen, f" (exact {one.exact})" * bool(one.exact)) for one in measures]
+    parts = [*seen, *((one, one.exact, "") for one in packing if one.exact)]
+    line = "".join(
+        f"<span>{term(one.key, one.symbol)} <b>{value}</b>{more}</span>"
+        for one, value, more in parts
+    )
     return (
-        _table(["How undetermined", *_titles(measures)], rows)
-        + _table(_titles(packing), [found])
-        + f'<p class="was">Before: {result_values.changes(was)}</p>'
+        f'<p class="line"><span class="of">{heading}</span>{line}{FOLD}</p><div class="tables">'
+        + _table(["How undetermined", *_titles(measures)], rows)
+        + _table(_titles(packing), [values])
+        + f"{left}</div>"
     )
 
 
@@ -125,17 +150,11 @@ def _titles(quantities: Iterable[Quantity]) -> list[str]:
 
 def _values(quantities: Iterable[Quantity], of: str) -> list[str]:
     values = [(one, getattr(one, of).replace("±", term("error", "±"))) for one in quantities]
-    return [_named(one, value + UNIT.get(one.key, "")) if value else "" for one, value in values]
+    return [value + UNIT.get(one.key, "") if value else "" for one, value in values]
 
 
 def _dashes(quantities: Iterable[Quantity]) -> list[str]:
-    return [_named(one, "–") for one in quantities]
-
-
-def _named(quantity: Quantity, value: str) -> str:
-    """A value after its symbol and name, seen where a low window leaves no room for titles."""
-    name = f'<span class="name"> {quantity.words}</span>'
-    return f'<i class="symbol">{term(quantity.key, quantity.symbol)}{name}</i> {value}'
+    return ["–" for _ in quantities]
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
