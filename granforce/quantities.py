@@ -150,6 +150,9 @@ QUANTITIES = {
     "opened": whole("contact", "contacts that the first motion opens"),
     "slid": whole("contact", "contacts that slide in the first motion"),
     "kept": whole("contact", "contacts that stick in the first motion"),
+    "contact_motion": whole(
+        "contact carrying", "each contact in the first motion: 0 sticks, 1 slides, 2 opens"
+    ),
     "loads_at_rest": whole("contact", "loads that ended at rest"),
     "loads_moving": whole("contact", "loads that ended in steady motion"),
     "loads_undecided": whole("contact", "loads that ended in unsteady motion"),

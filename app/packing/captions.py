@@ -11,6 +11,7 @@ from ..state.view_settings import WIDTHS
 from .legend import colour_bar, colours, quantities
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
+MOTION = "Arrows: first motion at F_crit; rings: contacts that open; blue dots: those that slide."
 PACKED = "network as packed"
 NAMED = 4  # known forces in a caption
 
@@ -29,6 +30,7 @@ def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
             f"colour: {quantities(state, colours(state))[looks.colour]}.",
             origin(state.cell),
             *([] if moving else [f"{network(state)}."]),
+            *([] if state.motion is None else [MOTION]),
             *known_words(state),
             f"granforce ?{state.link()}",
         ],

@@ -9,6 +9,7 @@ import { extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
 import { plain } from "../browser/to_object.js"
 import { Pins } from "./drawing/pins.js"
+import { drawMotion } from "./drawing/first_motion.js"
 import { drawThrust } from "./drawing/thrust.js"
 import { Plots } from "./drawing/bokeh_plots.js"
 import { Playback } from "./replay/playback.js"
@@ -59,10 +60,15 @@ class Player {
     this.thrust = plain(model.thrust)
     this.scene.onMarks = (context, scene) => {
       this.drawThrust(context)
+      this.drawMotion(context)
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
     }
-    this.scene.onSheet = (sheet, scene) => { this.drawThrust(sheet); this.pins.onSheet(sheet, scene) }
+    this.scene.onSheet = (sheet, scene) => {
+      this.drawThrust(sheet)
+      this.drawMotion(sheet)
+      this.pins.onSheet(sheet, scene)
+    }
     this.split = new Split(this)
     this.sway = new Sway(this.scene)
     this.pushed = new Pushed(this)
@@ -77,6 +83,11 @@ class Player {
   drawThrust(context) {
     const { replay, scene, pushed } = this // networks under a push are outside S
     if (replay && !scene.frozen && !pushed.load) drawThrust(context, scene, this.thrust, replay.mixed)
+  }
+
+  drawMotion(context) {
+    const { pushed: { motion }, scene } = this
+    if (motion && !scene.frozen) drawMotion(context, scene, motion)
   }
 
   /** Whether the tab for pushing a contact is open: playing would distract. */
@@ -378,7 +389,7 @@ class Player {
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),
       keepable: loaded(() => this.tellTrack()),
-      displacement: () => this.pushed.tellMotion(),
+      motion: () => this.pushed.tellMotion(),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
       plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
@@ -436,6 +447,6 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["opened", "legend", "source", "busy", "requested", "plane", "twin", "walk", "displacement"]) changes[name]()
+  for (const name of ["opened", "legend", "source", "busy", "requested", "plane", "twin", "walk", "motion"]) changes[name]()
   return player.buttons.root
 }

@@ -97,7 +97,7 @@ class Player(Scripted, Appearance):
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)
-    displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
+    motion = param.Dict(default={}, doc="flat field (2N,), contacts (N_c,), animated; see Motion")
 
     def __init__(self, state: AppState, document: Document | None = None) -> None:
         """document: provides the timer of `stream`; without one, call its `tick` yourself."""
@@ -124,7 +124,8 @@ class Player(Scripted, Appearance):
             "looks.full",
         )  # fmt: skip
         observe(self._pin, state, "replay", "knowledge.known", "knowledge.ranked")
-        observe(self._displace, state, "displacement")
+        observe(self._move, state, "motion")
+        observe(self._compare_held, state, "shown", "replay", "knowledge.known")
         observe(self._accompany, state, "comparison.twin")
         dress = self.param.update
         observe(lambda event: dress(plane=projection(event.new)), state, "plane")
@@ -228,10 +229,20 @@ class Player(Scripted, Appearance):
     def _pin(self, *events: Any) -> None:
         self.pins = pins(self._state.knowledge)
 
-    def _displace(self, event: Any) -> None:
-        field = event.new
-        flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
-        self.displacement = flat
+    def _compare_held(self, *events: Any) -> None:
+        self.ignoring = not self._state.obeying
+
+    def _move(self, event: Any) -> None:
+        motion = event.new
+        self.motion = (
+            {}
+            if motion is None
+            else {
+                "field": motion.field.astype(np.float32).ravel(),
+                "contacts": motion.contacts.astype(np.int8),
+                "animated": motion.animated,
+            }
+        )
 
     def _explain(self, *events: Any) -> None:
         if self._state.work.moving:

@@ -63,7 +63,7 @@ class AppState(param.Parameterized):
     before = param.Parameter(doc="the Shown before the last change if only μ changed, or None")
     source = param.String(doc="where the states on screen come from, in words")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
-    displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
+    motion = param.Parameter(doc="the perturbations.Motion drawn on the packing, or None")
 
     def __init__(
         self,
@@ -331,10 +331,10 @@ class AppState(param.Parameterized):
             self.param.update(
                 selection=cell.selection, missing=False, before=self._before(cell), cell=cell,
                 replay=replay, shown=replay, exact=exact, source=self._source(cell),
-                displacement=None, loads=self.loads if self.replay is replay else None,
+                motion=None, loads=self.loads if self.replay is replay else None,
                 plane=self.plane if self.replay is replay else None,
             )  # fmt: skip
-            self._look(fresh | fitting(view or {}, replay))
+            self._look(fresh)
 
     def _before(self, cell: Cell) -> Shown | None:
         """The states on screen if those of a cell differ only by μ."""
@@ -431,8 +431,8 @@ class AppState(param.Parameterized):
         source = f"μ = {selection.mu:g}, {label} (as they are sampled)"
         with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
-            self.param.update(shown=replay, plane=None, source=source, displacement=None)
-            self._look(self._unseen)
+            self.param.update(shown=replay, plane=None, source=source, motion=None)
+            self._look(self._new_view(selection))
 
     def follow(self) -> Following | Arriving | None:
         """The computation in progress, from `work`; if it failed, the previous view returns."""

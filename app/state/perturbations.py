@@ -12,7 +12,7 @@ from granforce.study import kinds
 from granforce.study.cells import entries
 from granforce.study.keys import Parameters
 from granforce.study.responses import moved_grains
-from granforce.types import Floats
+from granforce.types import Floats, Integers
 
 from ..background.jobs import Job
 from ..results import geometry
@@ -34,6 +34,14 @@ class Loads(NamedTuple):
     seconds: float
 
 
+class Motion(NamedTuple):
+    """A first motion to draw, still or animated."""
+
+    field: Floats  # (N, 2) displacements
+    contacts: Integers  # (N_c,) as those of Pushed
+    animated: bool
+
+
 class Pushed(NamedTuple):
     """The effect of a force pair that pushes the grains of one contact apart.
 
@@ -50,6 +58,7 @@ class Pushed(NamedTuple):
         str, Any
     ]  # networks under loads from 0 to `low`, nearest to the original, for scripts
     displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
+    contacts: Integers  # (N_c,) 0 holds, 1 slides, 2 opens; all 0 in results of earlier versions
     distance: Floats  # (k,) of the backbone's grains from the contact
     size: Floats  # (k,) |u| of those grains
     radius: Floats  # (shells,)
@@ -123,6 +132,9 @@ def _pushed(dataset: xr.Dataset, packing: Packing, under: Any) -> Pushed:
         kept=count("kept"),
         path=path(under, scale),
         displacement=np.nan_to_num(u),
+        contacts=dataset["contact_motion"].values[0]
+        if "contact_motion" in dataset
+        else np.zeros(under.states.shape[1], dtype=int),
         distance=distance / length,
         size=size,
         radius=dataset["shell_radius"].values / length,

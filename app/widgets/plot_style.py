@@ -75,6 +75,7 @@ def palettes(dark: bool) -> dict[str, Any]:
             "edge": EDGE,
             "strong": "#ffffff" if dark else "#101720",
             "selected": "#ff5ca8" if dark else DOT,
+            "slides": "#5ba3ff" if dark else BLUE,
             "known": "#4dd0b5" if dark else "#00695c",
             **dict(zip(("across", "up"), lines(dark), strict=True)),
             "halo": "rgba(20, 24, 30, 0.8)" if dark else "rgba(255, 255, 255, 0.85)",

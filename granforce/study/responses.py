@@ -30,6 +30,7 @@ def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> x
             "opened": [moved.opened.sum()],
             "slid": [moved.slid.sum()],
             "kept": [moved.kept.sum()],
+            "contact_motion": [moved.slid + 2 * moved.opened],
             "shell_radius": (edges[1:] + edges[:-1]) / 2,
             "profile": decay.profile(S.packing, moved.displacement, contact, edges)[None],
             **{name: [count] for name, count in critical.counts.items()},

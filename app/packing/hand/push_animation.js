@@ -4,6 +4,7 @@
 
 import { FORCES } from "../replay/live.js"
 import { networkAt } from "../replay/replay.js"
+import { plain } from "../../browser/to_object.js"
 
 export class Pushed {
   constructor(player) {
@@ -62,6 +63,16 @@ export class Pushed {
     return { normal, tangential, residual: walk.residual[0], place: walk.origin }
   }
 
-  /** Disks move only under a sufficient push. */
-  tellMotion() { this.player.sway.take(this.moves ? this.player.model.displacement : null) }
+  /** The first motion; null before the push suffices. */
+  get motion() {
+    const motion = this.moves ? plain(this.player.model.motion ?? {}) : {}
+    return motion.field ? motion : null
+  }
+
+  /** Show the first motion as a still, or animated. */
+  tellMotion() {
+    const { player: { scene, sway }, motion } = this
+    sway.take(motion?.animated ? motion.field : null)
+    if (scene.style) scene.drawMarks()
+  }
 }

@@ -738,14 +738,19 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert ("up to the limit load" if apart >= 1 else "only at the limit load") in numbers
     assert f"{pushed.limit:.4g}" in numbers and len(view.plots.objects) == 1
     assert f"{pushed.opened} contacts open" in view.lead.object
-    assert state.displacement is None  # before the slider is at its end
+    assert state.motion is None  # before the slider is at its end
     view.load.hear({"reached": True})
     backbone = int((state.replay.disks.contacts[~state.replay.disks.image] > 0).sum())
     assert len(pushed.size) == backbone
     assert np.sqrt(np.mean(pushed.size**2)) == pytest.approx(1)
     contacts = state.replay.summary["contacts"]
     assert pushed.opened + pushed.slid + pushed.kept == contacts
-    assert state.displacement is pushed.displacement
+    motion = state.motion
+    assert motion.field is pushed.displacement and not motion.animated
+    assert (np.sum(motion.contacts == 2), np.sum(motion.contacts == 1)) == (
+        pushed.opened,
+        pushed.slid,
+    )
 
 
 def test_what_is_held_is_said_not_to_be_respected_by_a_push(state):
@@ -783,17 +788,16 @@ def pushed(state):
 
 def test_the_field_moves_only_while_its_tab_is_seen(state):
     view = pushed(state)
-    field = state.displacement
-    assert field is not None
+    motion = state.motion
+    assert motion is not None
     state.looks.tab = "intervals"
-    assert state.displacement is None
+    assert state.motion is None
     state.looks.tab = "perturb"
-    assert state.displacement is field
-    view.animate.value = False
-    assert state.displacement is None
+    assert state.motion == motion
     view.animate.value = True
+    assert state.motion.animated
     state.looks.contact = 4
-    assert view.pushed is None and state.displacement is None
+    assert view.pushed is None and state.motion is None
 
 
 def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):

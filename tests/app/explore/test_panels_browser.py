@@ -134,13 +134,12 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit, serv
     page.get_by_text("contacts open,").first.wait_for()
     end = scene(page, "scene.hand.player.pushed.load")
     assert load < end == pytest.approx(float(slider.get_attribute("max")))
-    until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
-    assert scene(page, "scene.offset.field.length") == 2 * DISKS
+    until(page, "scene.hand.player.pushed.motion !== null")
+    assert scene(page, "scene.offset") is None  # a still, with arrows
     drawn(page)
     page.get_by_label("animate the first motion").click()
-    until(page, "scene.offset === null")
-    page.get_by_label("animate the first motion").click()
-    until(page, "scene.offset !== null")
+    until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
+    assert scene(page, "scene.offset.field.length") == 2 * DISKS
     slider.evaluate("e => { e.value = 0; e.dispatchEvent(new Event('input')) }")
     until(page, "scene.offset === null")
     page.locator(".state").get_by_text("as packed").wait_for()

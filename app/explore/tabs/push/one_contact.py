@@ -10,7 +10,7 @@ from ....results.replays import Replay
 from ....state.perturbations import Pushed
 from ....widgets.hints import term
 from ....widgets.parts import figure
-from ....widgets.plot_style import DARK, DOT, ORIGINAL, legend_above
+from ....widgets.plot_style import BLUE, DARK, DOT, ORIGINAL, legend_above
 from ...result_values import between
 
 F_CRIT = term("critical_force", "critical force F_crit").replace("F_crit", "F<sub>crit</sub>")
@@ -23,11 +23,16 @@ ASKED = (
     "it. Click another line to push that contact."
 )
 FOUND = (
-    "<b>At F<sub>crit</sub> {opened} contacts open, {slid} slide and {kept} hold.</b> At the end "
-    "of the slider the packing shows the first motion, scaled so that the fastest disk "
-    "({most:.3g} times the rms motion) moves back and forth by one mean radius. "
-    "Rotations are not drawn."
+    "<b>At F<sub>crit</sub> {opened} contacts open {ring}, {slid} slide {spot} and {kept} "
+    "hold.</b> Arrows {arrow}: the first motion, {most:.3g} times its rms for the fastest disk; "
+    "rotations are not drawn."
 )
+MARKS = {
+    "ring": '<span style="display:inline-block;width:8px;height:8px;border:2px solid;'
+    'border-radius:50%" aria-hidden="true"></span>',
+    "spot": f'<span style="color:{BLUE}">●</span>',
+    "arrow": "→",
+}
 HELD = " Held forces are ignored here: {} may change like all others."
 COMPUTED = (
     "Of all sets of forces that balance the push, those nearest to the forces as packed are "
@@ -50,8 +55,9 @@ def sentence(replay: Replay, contact: int, pushed: Pushed | None, held: int) -> 
         text += ASKED.format(now=replay.normal[0, contact])
     else:
         text += FOUND.format(
-            opened=pushed.opened, slid=pushed.slid, kept=pushed.kept, most=_farthest(pushed)
-        )
+            opened=pushed.opened, slid=pushed.slid, kept=pushed.kept, most=_farthest(pushed),
+            **MARKS,
+        )  # fmt: skip
     count = "the held one" if held == 1 else f"the {held} held ones"
     return text + (HELD.format(count) if held else "")
 

@@ -12,7 +12,7 @@ from ....results.library import Cell, Library
 from ....results.replays import Replay, worded
 from ....state import perturbations
 from ....state.app_state import AppState
-from ....state.perturbations import Loads, Pushed
+from ....state.perturbations import Loads, Motion, Pushed
 from ....state.view_settings import PUSHES
 from ....widgets.contact_scatter import ContactScatter
 from ....widgets.parts import PRIMARY, TabView, folded, note, plotted, question
@@ -48,7 +48,7 @@ class View(TabView):
         self.load = LoadSlider(self._push, self._give_way)
         self.every = pmui.Button(label="Compute for all contacts", margin=(4, 8), **PRIMARY)
         self.animate = pmui.Switch(
-            label="animate the first motion", value=True, size="small", margin=(4, 10)
+            label="animate the first motion", value=False, size="small", margin=(4, 10)
         )
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.numbers, self.details = note(), note(), note()
@@ -147,11 +147,12 @@ class View(TabView):
         return Shown(lead, [one_contact.decay(pushed, bool(replay.outlines))], numbers, text)
 
     def _animate(self, *events: Any) -> None:
-        """Animate the first motion to and fro on the packing while this tab is visible."""
-        shown = self.visible and self.what.value == "one" and self.animate.value and self.reached
-        field = self.pushed[0].displacement if shown and self.pushed is not None else None
-        if self.state.displacement is not field:
-            self.state.displacement = field
+        """Show the first motion on the packing while this tab is visible."""
+        shown = self.visible and self.what.value == "one" and self.reached
+        pushed = self.pushed[0] if shown and self.pushed is not None else None
+        self.state.motion = pushed and Motion(
+            pushed.displacement, pushed.contacts, self.animate.value
+        )
 
     # All contacts
 
