@@ -131,7 +131,7 @@ class Controls:
         if self._following or state.selection is None:
             return
         try:
-            state.ask(self._selection(), at_once=True)
+            state.ask(state.given_held(self._selection()), at_once=True)
         except InputError as error:
             self.work.message = str(error)
 

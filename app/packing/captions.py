@@ -40,13 +40,14 @@ def caption(state: AppState, moving: bool = False) -> dict[str, Any]:
 
 def network(state: AppState) -> str:
     """The network on screen, in words, and whether it has the held forces."""
-    number, known = _number(state), state.knowledge.known
+    number, held = _number(state), state.knowledge.known
     words = f"network {number} of {state.replay.summary['states']}" if number else PACKED
     if _pushed(state):
         words += ", under a push"
     elif state.hand.held is not None:
-        return f"Pulled by hand from the {words}" + (", with the held forces" if known else "")
-    return f"{words.capitalize()}, which ignores the held forces" if known else words.capitalize()
+        return f"Pulled by hand from the {words}" + (", with the held forces" if held else "")
+    ignored = held and not (number and state.obeying)
+    return words.capitalize() + (", which ignores the held forces" if ignored else "")
 
 
 def _pushed(state: AppState) -> bool:

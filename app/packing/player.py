@@ -88,6 +88,7 @@ class Player(Scripted, Appearance):
     plane = param.Dict(default={}, doc="of force space on screen, see legend.projection")
     palettes = param.Dict(default={}, doc="colours, see plot_style.palettes")
     scales = param.Dict(default=SCALES, doc="width and full colours of chains, see chain_style.js")
+    ignoring = param.Boolean(doc="whether forces are held that the networks do not have")
     live = param.Boolean(doc="whether something is being computed that can be seen")
     requested = param.String(doc="the requested selection if it is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
@@ -142,6 +143,7 @@ class Player(Scripted, Appearance):
         self._accompany()
         self._bound_thrust()
         self._pin()
+        self._compare_held()
         self._explain()
         self.stream = Stream(state, self, document)
 
@@ -163,6 +165,7 @@ class Player(Scripted, Appearance):
     # f_n of a contact, and ± its error bar, is taken for known.
     _hold = forward("_state.knowledge.hold", hold=[int, float, float])
     _release = forward("_state.knowledge.release", release=int)
+    _sample = forward("_state.sample_held", sample=True)
     _choose_tab = forward("_state.looks.choose_tab", tab=int)
     _fit = forward("_state.looks.fit", wide=bool)
     # All networks of the walk are stored, then the one with this number is shown.

@@ -151,7 +151,7 @@ VOLUME_ERROR = 0.1
 
 def _volume_parameters(cell: Cell) -> Parameters:
     selection = cell.selection
-    return kinds.VOLUME.parameters(selection.packing, VOLUME_ERROR, mu=selection.mu)
+    return kinds.VOLUME.parameters(selection.packing, VOLUME_ERROR, **selection.conditions)
 
 
 def known_volume(library: Library, cell: Cell) -> Callable[[Job], tuple[Cell, xr.Dataset | None]]:

@@ -159,6 +159,8 @@ class Library:
         if entry is None or not study.is_current(SOURCES[entry.kind], entry):
             return None
         selection = selected(entry.kind, entry.params)
+        if selection is None:
+            return None
         called = self.series(selection, entry.params)
         return Cell(selection, called, entry.params, store, name)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from granforce.packing.scenes import BLOCKS
@@ -26,11 +27,15 @@ OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "drag_be
 WORDS = {"accuracy": "step-accuracy"}  # those with other names on the command line
 # Approximate limit for stored states; measures always use all states.
 KEPT_BYTES = 64e6
+# The least and the largest f_n of a held force, after the contact's number in the packing; force.
+Bound = tuple[int, float, float]
 # Disks times (disks, for the packing, and states) up to which states appear quickly, and the
 # relative cost of a state of each kind.
 EASY = 500_000
 _WEIGHTS = {"nearest": 1, "uniform": 2, "nearest_piqp": 3, "gauss_seidel": 10}
 _WEIGHTS["gauss_seidel_only"] = 10
+KNOWN_FILE = "known.csv"
+NO_BOUNDS = [None, None]  # of f_t
 
 
 class Selection(NamedTuple):
@@ -42,6 +47,7 @@ class Selection(NamedTuple):
     relax: str = "nearest"  # of the walk
     states: int = 200
     seed: int = 0  # of the walk or sample
+    held: tuple[Bound, ...] = ()  # forces that all states have, by contact
 
     @property
     def imported(self) -> bool:
@@ -59,14 +65,31 @@ class Selection(NamedTuple):
         return self.packing["mu"] == self.mu
 
     def at(self, mu: Any) -> Selection:
-        """The same at another μ; the packing's friction also changes if it was the same."""
+        """The same at another μ; the packing's friction also changes if it was the same.
+
+        Held forces belong to one packing and μ, and are left out.
+        """
         mu = friction(mu)
         if self.imported or not self.same_mu:
-            return self._replace(mu=mu)
+            return self._replace(mu=mu, held=())
         packing = kinds.PACKING.parameters(
             self.packing["n"], mu, self.packing["seed"], **unusual(self.packing)
         )
-        return self._replace(mu=mu, packing=packing)
+        return self._replace(mu=mu, packing=packing, held=())
+
+    def holding(self, held: tuple[Bound, ...]) -> Selection:
+        """The same with other held forces, in a walk that can have them."""
+        sweeps = held and self.relax.startswith("gauss_seidel")
+        return self._replace(held=held, relax="nearest" if sweeps else self.relax)
+
+    def shares_packing(self, other: Selection) -> bool:
+        """Whether other is of the same packing and μ: all its contacts and exact bounds."""
+        return (self.packing, self.mu) == (other.packing, other.mu)
+
+    @property
+    def conditions(self) -> Parameters:
+        """Parameters of the S of its states, besides the packing."""
+        return {"mu": self.mu, "known": rows(self.held) or None}
 
     @property
     def stored(self) -> int:
@@ -75,7 +98,8 @@ class Selection(NamedTuple):
 
     def parameters(self) -> Parameters:
         """Parameters of the walk or sample, for its kind."""
-        common = {"mu": self.mu, "keep": None if self.states == self.stored else self.stored}
+        keep = None if self.states == self.stored else self.stored
+        common = self.conditions | {"keep": keep}
         if self.kind == "uniform":
             return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
         return kinds.WALK.parameters(
@@ -123,6 +147,7 @@ def differing(requested: Selection, shown: Selection | None) -> str:
         f"packed at μ = {new['mu']:g}": not requested.same_mu and new["mu"] != old["mu"],
         "a random walk" if walks else f"networks {KINDS['uniform']}": requested.kind != shown.kind,
         f"{requested.states} networks": requested.states != shown.states,
+        holding(requested.held): requested.held != shown.held,
         SOLVERS[requested.relax]: walks and shown.kind == "walk" and requested.relax != shown.relax,
     }
     return ", ".join(words for words, differs in parts.items() if differs) or next(iter(parts))
@@ -132,11 +157,24 @@ def _plain(selection: Selection) -> Selection:
     return selection if selection.kind == "walk" else selection._replace(relax="")
 
 
-def selected(kind: str, parameters: Parameters) -> Selection:
-    """The Selection of these parameters of a walk or sample."""
+def selected(kind: str, parameters: Parameters) -> Selection | None:
+    """The Selection of these parameters of a walk or sample; None for conditions it has not."""
     packing, mu = parameters["packing"], float(parameters["mu"])
-    relax = parameters.get("relax", "nearest")
-    return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
+    relax, known = parameters.get("relax", "nearest"), parameters.get("known", [])
+    if "prescribed" in parameters or any(None in row[:3] or row[3:] != NO_BOUNDS for row in known):
+        return None
+    held = tuple((contact, low, high) for contact, low, high, *_ in known)
+    return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"], held)
+
+
+def rows(held: Iterable[Bound]) -> list[list[Any]]:
+    """Held forces as an argument of `conditions`."""
+    return [[*bound, *NO_BOUNDS] for bound in held]
+
+
+def holding(held: Sequence[Bound]) -> str:
+    """The number of held forces, in words."""
+    return f"{len(held) or 'no'} force{'s' * (len(held) != 1)} held"
 
 
 def select(
@@ -185,6 +223,8 @@ def series(
     words.append(f"{selection.states} networks")
     if selection.seed != 0:
         words.append(f"seed {selection.seed} of the networks")
+    if selection.held:
+        words.append(holding(selection.held))
     usual = {"walk": 1, "uniform": 4}[selection.kind]
     chains = (parameters or {}).get("chains", usual)
     if chains != usual:
@@ -197,16 +237,24 @@ def brief(selection: Selection, series: str) -> str:
     """A short form of a series for display over its picture; unchanged for an import."""
     if selection.imported:
         return series
-    return f"{selection.packing['n']} disks, {selection.states} networks"
+    held = f", {holding(selection.held)}" if selection.held else ""
+    return f"{selection.packing['n']} disks, {selection.states} networks{held}"
+
+
+def known_file(held: Iterable[Bound]) -> str:
+    """The command that writes the file of held forces for `--known`."""
+    lines = [f"{contact},{low:.12g},{high:.12g}" for contact, low, high in held]
+    return f"printf '%s\\n' {shlex.join(['contact,f_n_low,f_n_high', *lines])} > {KNOWN_FILE}"
 
 
 def command(selection: Selection) -> str:
-    """The command that computes the same states in a terminal."""
+    """The command that computes the same states in a terminal, after `known_file`."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
         words += ["--walk-seed", selection.seed, "--relax", selection.relax]
     elif selection.seed:
         words += ["--sample-seed", selection.seed]
+    words += ["--known", KNOWN_FILE] if selection.held else []
     return shlex.join(str(word) for word in words)
 
 

@@ -92,6 +92,7 @@ class AppState(param.Parameterized):
         self._linked: tuple[Selection, View] | None = None  # of a link to states in no store
         self.work.computation.param.watch(self._bring_back, ["dismissed", "message"])
         observe(self._forget, self, "cell", "knowledge.known", "hand.pulls")
+        observe(self._follow_held, self, "cell", "knowledge.known")
         if query is not None:
             self.open(query)
 
@@ -115,10 +116,10 @@ class AppState(param.Parameterized):
         new = {name: self._viewed[name].default for name in VIEW}  # what a link omits
         self._look_up(selection, new | view, counted="states" in parse_qs(query.lstrip("?")))
 
-    @property
-    def _unseen(self) -> View:
-        """The part of the view that belongs to the states on screen, for new states."""
-        return {name: self._viewed[name].default for name in OF_A_REPLAY}
+    def _new_view(self, selection: Selection) -> View:
+        """The part of the view that belongs to states, for new states; without what stays."""
+        stays = ("contact", "known") if self._shares_packing(selection) else ()
+        return {name: self._viewed[name].default for name in OF_A_REPLAY if name not in stays}
 
     @property
     def view(self) -> View:
@@ -141,15 +142,38 @@ class AppState(param.Parameterized):
         return self.shown is not self.replay
 
     @property
+    def on_screen(self) -> Selection | None:
+        """The Selection of the states on screen; None without states."""
+        return self.work.live.selection if self.growing else self.cell and self.cell.selection
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether the states on screen are a walk in progress of another packing than `cell`."""
+        return self.growing and not (self.cell and self._shares_packing(self.on_screen))
+
+    def _shares_packing(self, selection: Selection | None) -> bool:
+        """Whether a Selection is of the packing and μ of `cell`."""
+        return bool(self.cell and selection and self.cell.selection.shares_packing(selection))
+
+    @property
+    def obeying(self) -> bool:
+        """Whether the states on screen are those of S with exactly the held forces."""
+        shown, replay = self.on_screen, self.replay
+        if shown is None or replay is None:
+            return False
+        held = known.bounds(replay, self.knowledge.known)
+        return len(held) == len(shown.held) and np.allclose(held, shown.held, rtol=1e-8, atol=0)
+
+    @property
     def free(self) -> Any:
-        """The exact intervals of the Replay on screen, without held forces; or None."""
-        return None if self.growing else self.exact
+        """The exact intervals of the packing on screen, without held forces; or None."""
+        return None if self.elsewhere else self.exact
 
     @property
     def possible(self) -> Any:
-        """The exact intervals of the Replay on screen, given the known forces; or None."""
+        """The exact intervals of the packing on screen, given the known forces; or None."""
         narrowed = self.knowledge.narrowed
-        return self.free if narrowed is None or self.growing else narrowed.after
+        return self.free if narrowed is None or self.elsewhere else narrowed.after
 
     @property
     def bounds(self) -> str:
@@ -185,10 +209,28 @@ class AppState(param.Parameterized):
             return
         try:
             selection.check(LIMITS)
+            selection.parameters()
         except InputError as error:
             self.work.message = str(error)
             return
         self._request(selection, at_once)
+
+    def sample_held(self, *events: Any) -> None:
+        """Select the states of S with the held forces, or of all of S if none are held."""
+        if self.cell is not None and not self.obeying:
+            self.ask(self.given_held(self.cell.selection), at_once=True)
+
+    def given_held(self, selection: Selection) -> Selection:
+        """A Selection with the held forces, if they are those of its packing."""
+        of_packing = self._shares_packing(selection)
+        return selection.holding(
+            known.bounds(self.replay, self.knowledge.known) if of_packing else ()
+        )
+
+    def _follow_held(self, *events: Any) -> None:
+        """Once states with held forces are on screen, they follow what is held."""
+        if self.cell is not None and self.cell.selection.held:
+            self.sample_held()
 
     def _request(self, selection: Selection, at_once: bool) -> None:
         # Announced together: a short `missing` would move the page.
@@ -322,10 +364,14 @@ class AppState(param.Parameterized):
         if view is None and self._linked and cell.selection.names(self._linked[0]):
             view = self._linked[1]
         self._linked = None
-        fresh = self._unseen
+        fresh = self._new_view(cell.selection)
         # A walk that was replaced may have reached numbers that the replay does not have.
         if (self.shown is replay and view is None) or self._is_grown(replay):
             fresh = {}
+        fresh |= fitting(view or {}, replay)
+        held = fresh["known"] if "known" in fresh else self.knowledge.known
+        if not held:
+            fresh["known"] = known.stated(replay, cell.selection.held)
         with as_one(*self.parts, self.work, self):
             self.work.shown(cell.selection)
             self.param.update(
@@ -439,14 +485,15 @@ class AppState(param.Parameterized):
         with as_one(*self.parts, self.work, self):
             if self.work.live is not None and not self.work.computation.running:
                 plane = None if self.growing else self.plane
+                view = self._new_view(self.work.live.selection)
                 self.param.update(shown=self.replay, plane=plane, source=self._source())
-                self._look(self._unseen)
+                self._look(view)
             return self.work.follow()
 
     @property
     def requested(self) -> str:
-        """The requested states that are not on screen yet, in words, or an empty string."""
-        if not self.missing:
+        """The requested packing that is not on screen yet, in words, or an empty string."""
+        if not self.missing or self._shares_packing(self.selection):
             return ""
         words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
         if self.work.computation.running:
@@ -517,10 +564,11 @@ class AppState(param.Parameterized):
     @property
     def command(self) -> str:
         """The commands that compute the requested states, and intervals given the known forces."""
-        lines, statements = command(self.selection), self.knowledge.known
-        if statements and self.replay is not None and not self.missing:
-            lines += "\n" + known.commands(self.selection, self.replay, statements)
-        return lines
+        line, statements = command(self.selection), self.knowledge.known
+        if not statements or self.replay is None or self.missing:
+            return line
+        file, intervals = known.commands(self.selection, self.replay, statements)
+        return f"{file}\n{line}\n{intervals}"
 
     def link(self) -> str:
         """The query of an address that reopens this view."""

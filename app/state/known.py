@@ -20,9 +20,8 @@ from ..background.notifications import as_one
 from ..results import compute
 from ..results.library import Cell, Library, Shown
 from ..results.replays import Replay
-from ..results.selection import Selection, of_packing
-
-Row = list[Any]  # contact, f_n from and to, f_t from and to, as for `conditions`
+from ..results.selection import KNOWN_FILE, Bound, Selection, known_file, of_packing
+from ..results.selection import rows as rows_of
 
 MOST_KNOWN = 32  # statements per page or link
 LARGEST = 1e6  # ⟨fₙ⟩
@@ -132,7 +131,6 @@ class Underway:
 class Ranked(NamedTuple):
     """Contacts whose f_n is most worth measuring next, the best first."""
 
-    replay: Replay  # of this packing
     known: tuple[Statement, ...]  # known forces
     contacts: Integers  # (k,) positions in the backbone
     before: float  # mean interval of f_n now, in ⟨f_n⟩
@@ -151,7 +149,7 @@ class Knowledge(param.Parameterized):
         super().__init__()  # type: ignore[no-untyped-call]  # param has no type hints
         self.state, self.work = state, state.work
         self.task, self.ranking = self.work.task(reported=False), self.work.task()
-        self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
+        self._followed: tuple[Any, tuple[Statement, ...]] = None, ()
         self.param.watch(self._follow, "known")
         state.param.watch(self._follow, "replay")
         self.task.param.watch(self._failed, "message")
@@ -179,14 +177,8 @@ class Knowledge(param.Parameterized):
     def compute(self) -> None:
         """Compute the exact intervals given the known forces, in the background."""
         state = self.state
-        replay, known, cell = state.replay, tuple(self.known), state.cell
-        shown = Shown(cell, replay, state.exact)
-
-        def done(narrowed: Narrowed) -> None:
-            if state.replay is replay:
-                self._narrow(narrowed)
-
-        self.task.start(narrowing(state.library, shown, known), done)
+        known, shown = tuple(self.known), Shown(state.cell, state.replay, state.exact)
+        self.task.start(narrowing(state.library, shown, known), self._narrow)
 
     def rank(self) -> None:
         """Find the contact to measure next, in the background."""
@@ -198,7 +190,7 @@ class Knowledge(param.Parameterized):
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
     def _rank(self, ranked: Ranked | None) -> None:
-        if ranked is not None and ranked.replay is self.state.replay:
+        if ranked is not None:
             self.ranked = ranked if ranked.known == tuple(self.known) else None
 
     def _stated(self, contact: int, value: float, error: float) -> Statement:
@@ -241,16 +233,17 @@ class Knowledge(param.Parameterized):
 
     def _follow(self, *events: Any) -> None:
         """Update intervals for the known forces; statements belong to one packing."""
-        (before, statements), replay = self._followed, self.state.replay
-        self._followed = replay, tuple(self.known)
-        if before is replay and statements == tuple(self.known):
-            return  # both changed at once
+        (before, statements), cell = self._followed, self.state.cell
+        packing = cell and cell.selection.intervals
+        self._followed = packing, tuple(self.known)
+        if before == packing and statements == tuple(self.known):
+            return  # both changed at once, or other networks of the same packing are on screen
         self.ranked = None
         self.ranking.cancel()
-        if before is not replay or not self.known:
+        if before != packing or not self.known:
             self.narrowed = None
         done = self.narrowed.known if self._settled else ()
-        if self.known and replay is not None and tuple(self.known) != done:
+        if self.known and cell is not None and tuple(self.known) != done:
             self.compute()
         else:
             self.task.cancel()
@@ -290,23 +283,37 @@ def _rounded(value: float) -> float:
     return float(f"{value:.9g}")  # as stored in links
 
 
-def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
-    """Statements as arguments of `conditions`: contacts of the packing, forces."""
+def bounds(replay: Replay, known: Iterable[Statement]) -> tuple[Bound, ...]:
+    """Statements as held forces of a Selection."""
     scale, number = replay.force_scale, replay.backbone
+    return tuple(
+        sorted(
+            (int(number[c]), (value - error) * scale, (value + error) * scale)
+            for c, value, error in known
+        )
+    )
+
+
+def rows(replay: Replay, known: Iterable[Statement]) -> list[list[Any]]:
+    """Statements as an argument of `conditions`."""
+    return rows_of(bounds(replay, known))
+
+
+def stated(replay: Replay, held: Iterable[Bound]) -> list[Statement]:
+    """The Statements of the held forces of a Selection."""
+    scale, place = replay.force_scale, replay.backbone.tolist().index
     return [
-        [int(number[c]), (value - error) * scale, (value + error) * scale, None, None]
-        for c, value, error in known
+        Statement(
+            place(contact), _rounded((high + low) / 2 / scale), _rounded((high - low) / 2 / scale)
+        )
+        for contact, low, high in held
     ]
 
 
-def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> str:
+def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> tuple[str, str]:
     """Two lines for a terminal: a file of the known forces, and the intervals with them."""
-    lines = ["contact,f_n_low,f_n_high"]
-    lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
-    words = ["granforce", "intervals", *of_packing(selection), "--known", "known.csv"]
-    return (
-        f"printf '%s\\n' {shlex.join(lines)} > known.csv\n{shlex.join(str(word) for word in words)}"
-    )
+    words = ["granforce", "intervals", *of_packing(selection), "--known", KNOWN_FILE]
+    return known_file(bounds(replay, known)), shlex.join(str(word) for word in words)
 
 
 def narrowing(
@@ -359,7 +366,7 @@ def ranking(
 
     def ranked(contacts: Integers, expected: Floats, before: Any, after: Floats) -> Ranked:
         place = np.searchsorted(replay.backbone, contacts)
-        return Ranked(replay, known, place, before, after, expected)
+        return Ranked(known, place, before, after, expected)
 
     def work(job: Job) -> Ranked:
         selection = cell.selection

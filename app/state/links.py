@@ -15,7 +15,7 @@ from granforce.system.wording import integer, number
 from granforce.types import Integers
 
 from ..results.replays import Replay
-from ..results.selection import KINDS, OPTIONS, SOLVERS, Selection, select, typed, unusual
+from ..results.selection import KINDS, OPTIONS, SOLVERS, Bound, Selection, select, typed, unusual
 from . import known, pulls
 
 View = dict[str, Any]  # parameters stored in links
@@ -43,6 +43,8 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
         given["relax"] = selection.relax
     if selection.seed:
         given["walkseed"] = selection.seed
+    if selection.held:
+        given["given"] = "~".join(":".join(map(repr, bound)) for bound in selection.held)
     return urlencode(given | view)
 
 
@@ -69,7 +71,11 @@ def _read_selection(given: dict[str, str]) -> Selection:
     relax = choice(given.pop("relax", "nearest"), SOLVERS, "relax")
     mu = friction(typed(given.pop("mu")))
     packed = friction(typed(given.pop("packed"))) if "packed" in given else mu
-    rest = {"states": _whole(given, "states", 200), "seed": _whole(given, "walkseed", 0)}
+    rest: Parameters = {
+        "states": _whole(given, "states", 200),
+        "seed": _whole(given, "walkseed", 0),
+        "held": tuple(map(_bound, given.pop("given").split("~"))) if "given" in given else (),
+    }
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
         return Selection(packing, mu, kind, relax, **rest)
@@ -106,6 +112,12 @@ def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
     if len(text) > MOST_DIGITS:
         raise InputError(f"{name} must be a number of few digits, got {brief(text)}")
     return int(text)
+
+
+def _bound(text: str) -> Bound:
+    """The bounds on a held force."""
+    contact, low, high = text.split(":")
+    return integer(contact), number(low), number(high)
 
 
 def _number(given: dict[str, str], name: str) -> float:

@@ -42,7 +42,7 @@ class Held(NamedTuple):
     residual: float
 
 
-def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
+def puller_of(library: Library, cell: Cell, given: list[list[Any]]) -> Puller:
     """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
     key = cell.name, str(given)
     with _lock:

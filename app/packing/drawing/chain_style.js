@@ -42,9 +42,9 @@ export class Look {
     this.reduction = model.reduction?.length === walk.contacts ? model.reduction : null // reduction of ΔFₙ by known forces
   }
 
-  /** The kinds of the intervals, in words: exact bounds obey held forces, networks do not. */
+  /** The kinds of the intervals, in words: exact bounds obey held forces, networks only once sampled with them. */
   get bounds() { return this.reduction ? "exact given the held forces" : "exact" }
-  get seen() { return this.reduction ? "seen in all of S" : "seen" }
+  get seen() { return this.reduction && this.model.ignoring ? "seen in all of S" : "seen" }
 
   /** Least and largest possible fₙ of a contact, as far as known. */
   boundsOf(c) { return this.exact ? [this.exact.low[c], this.exact.high[c]] : [0, Infinity] }

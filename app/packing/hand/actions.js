@@ -10,6 +10,8 @@ export function actions(player) {
     action(replay, given)
   })
   const { model, tell } = player
+  // The networks to be played have the held forces: others are replaced first.
+  const played = (action) => (given) => (model.ignoring ? tell({ sample: true }) : action(given))
   const step = ({ swinging }) => (swinging ? 0.05 : 1)
   return {
     less: loaded(() => player.hand.nudge(-1)),
@@ -18,17 +20,17 @@ export function actions(player) {
     pull: loaded(() => player.hand.pullTo(player.buttons.force)),
     undo: loaded((replay) => { if (replay.held && !player.pushed.held) tell({ undo: true }) }),
     free: loaded(() => player.hand.free()),
-    play: loaded(() => {
+    play: played(loaded(() => {
       player.hand.free()
       player.toggle()
-    }),
-    step: halted((replay) => player.show(Math.floor(replay.position + 1e-9) + step(replay))),
-    back: halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - step(replay))),
+    })),
+    step: played(halted((replay) => player.show(Math.floor(replay.position + 1e-9) + step(replay)))),
+    back: played(halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - step(replay)))),
     restart: halted(() => player.show(0)),
-    end: halted((replay) => player.show(replay.last)),
+    end: played(halted((replay) => player.show(replay.last))),
     next: loaded((replay) => player.choose(replay, 1)),
     previous: loaded((replay) => player.choose(replay, -1)),
-    scrub: halted((replay, to) => player.show(to)),
+    scrub: played(halted((replay, to) => player.show(to))),
     pin: loaded((replay) => {
       model.reference = replay.frame
       model.beside = null

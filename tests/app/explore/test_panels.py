@@ -1050,7 +1050,7 @@ def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):
     assert '"thrust": {"a": [' in page and "where the resultant of a joint can pass" in page
     assert '"outlines": [[' in page
     state.replay.summary["rattlers"] = 2
-    assert ">loose bodies<" in results_line.tables(state, None, False)
+    assert ">loose bodies<" in results_line.results(state, None, False)
 
 
 def test_the_exact_eta3_is_a_named_line_beside_its_growth(state):

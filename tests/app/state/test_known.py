@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from visitor import wait_for
 
-from app.explore.results_line import tables
+from app.explore.results_line import results
 from app.explore.status_line import bounds
 from app.explore.tabs.intervals.intervals import View
-from app.explore.tabs.intervals.known_forces import meaning, words
+from app.explore.tabs.intervals.known_forces import Known, meaning, words
+from app.packing.captions import PACKED, network
 from app.packing.legend import legend
 from app.packing.player import Player
 from app.state import known
@@ -78,7 +79,7 @@ def test_the_command_holds_what_is_known(state, tmp_path):
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value, 0.1)
     wait_for(state)
-    walk, file, intervals = state.command.splitlines()
+    file, walk, intervals = state.command.splitlines()
     assert walk.startswith("granforce walk ") and intervals.endswith("--known known.csv")
     assert intervals.startswith("granforce intervals -n 30 --mu 0.1 --seed 1")
     subprocess.run(["sh", "-c", file], cwd=tmp_path, check=True)
@@ -92,7 +93,7 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     """Networks of all of S exceed bounds given held forces: they are not drawn within them."""
     intervals = View(state)
     held(state, 4)
-    (h, fewer), shown = state.knowledge.narrowed.dimension, tables(state, None, False)
+    (h, fewer), shown = state.knowledge.narrowed.dimension, results(state, None, False)
     assert f"{h} → {fewer} given the held forces" in shown
     assert "exact given the held forces" in shown and "seen in all of S" in shown
     bars, lead = intervals.drawing.bars.data, intervals.lead
@@ -103,7 +104,45 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     state.knowledge.release(4)
     wait_for(state)
     assert np.all(np.isfinite(intervals.drawing.bars.data["high"]))
-    assert f"{h} = " in tables(state, None, False) and "given" not in lead.object
+    assert f"{h} = " in results(state, None, False) and "given" not in lead.object
+
+
+def test_networks_are_sampled_with_what_is_held(state, visited):
+    """A walk and a uniform sample of the smaller S; released, the networks of all of S return."""
+    held(state, 4)
+    all_of_S, (h, fewer) = state.cell, state.knowledge.narrowed.dimension
+    narrowed, player = state.knowledge.narrowed, Player(state)
+    assert not state.obeying and player.ignoring
+    assert "Sample networks" in Known(state).words
+    state.sample_held()
+    assert state.possible is narrowed.after and not state.requested  # of the same packing
+    wait_for(state)
+    value, replay = state.knowledge.known[0].value, state.replay
+    assert replay.normal[1:, 4] == pytest.approx(value, abs=1e-6) and len(replay.normal) == 31
+    assert state.obeying and not player.ignoring and replay.summary["dimension"] == fewer == h - 1
+    shown = Known(state).words
+    assert f"{fewer} of {h}" in shown and "played have it" in shown
+    assert "seen given the held forces (30 networks)" in results(state, None, False)
+    assert state.knowledge.narrowed is narrowed  # not computed again
+    assert np.all(np.isfinite(View(state).drawing.bars.data["high"]))
+    assert network(state) == PACKED.capitalize() + ", which ignores the held forces"
+    state.looks.frame = 3
+    assert network(state) == "Network 3 of 30"
+    assert state.command.splitlines()[1].endswith("--relax nearest_piqp --known known.csv")
+    other = visited(state.link())
+    wait_for(other)
+    assert other.obeying and other.cell == state.cell and other.knowledge.known
+    state.ask(state.cell.selection._replace(kind="uniform"), at_once=True)
+    wait_for(state)
+    assert state.obeying and state.replay.normal[1:, 4] == pytest.approx(value, abs=1e-6)
+    held(state, 9)  # the networks follow
+    assert len(state.cell.selection.held) == 2 and state.cell.kind == "uniform" and state.obeying
+    state.knowledge.known = []
+    wait_for(state)
+    assert not state.cell.selection.held and state.cell.kind == "uniform"
+    state.show(all_of_S)
+    wait_for(state)
+    assert state.cell == all_of_S and state.obeying
 
 
 def test_a_push_shows_no_held_forces(state):

@@ -37,7 +37,8 @@ class Snapshot:
         self._columns = files.contacts(self.replay, self.exact, frame, held, knowledge)
         self._head = files.explained(
             self._columns, self.replay, self.source, network(state),
-            *known_words(state, MOST_KNOWN), files.bounds_of(knowledge), f"This view: ?{self.link}",
+            *known_words(state, MOST_KNOWN), files.bounds_of(knowledge, state.obeying),
+            f"This view: ?{self.link}",
         )  # fmt: skip
         numbers = state.numbers
         self._numbered = self.view if numbers is None else numbers.of(self.view)

@@ -120,15 +120,19 @@ def _meaning(column: str) -> str:
     return f"{COLUMNS[name.removesuffix(FREE)]}{free}"
 
 
-def bounds_of(knowledge: Knowledge) -> str:
-    """The networks to which a table's exact bounds refer, in words; empty without held forces."""
+def bounds_of(knowledge: Knowledge, obeying: bool) -> str:
+    """The networks to which a table's bounds refer, in words; empty without held forces.
+
+    obeying: whether the networks seen have the held forces.
+    """
     if not knowledge.known:
         return ""
     if knowledge.whole is None:
         return f"Bounds given the held forces are still being computed; {FREE[1:]}: without it."
+    seen = "networks with these forces" if obeying else "all of S"
     return (
         f"Bounds are exact given these held forces; {FREE[1:]}: without them. Values seen are "
-        "those of all of S."
+        f"those of {seen}."
     )
 
 

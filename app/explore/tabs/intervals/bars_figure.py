@@ -16,8 +16,9 @@ COLUMNS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low"
 COLUMNS += ("whole_low", "whole_high")  # exact intervals without known forces
 APART = 100  # number of bars up to which there are gaps between them, and large dots
 # Widths of the bars for previously possible, possible and seen forces, in that of one contact, and
-# sizes of the dots now and as packed, px; for few bars, and for many.
-FEW, MANY = (0.8, 0.8, 0.4, 7.5, 5.5), (1.0, 1.0, 0.9, 2.6, 2.5)
+# size of the dots, px; for few bars, and for many, where dots shrink so as not to hide the bars.
+FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.6)
+CLOSE, LEAST_DOT = 300, 1.0  # number of contacts from which dots shrink, and their least size, px
 # Rows of the tooltip, without and with known forces.
 PACKED = ("as packed", "@original{0.000}")
 NOW = ("contact", "@contact"), ("now", "@now{0.000}"), PACKED
@@ -71,21 +72,28 @@ class BarsFigure:
         on_tap(fig, lambda row, data: choose(int(data["at"][row])), *marks)
 
     def show(
-        self, replay: Replay, contacts: Integers, exact: Bounds, before: Bounds, relative: bool
+        self,
+        replay: Replay,
+        contacts: Integers,
+        exact: Bounds,
+        before: Bounds,
+        *,
+        seen: bool,
+        relative: bool,
     ) -> int:
         """Draw these contacts; return how many bars extend beyond the axis.
 
-        before: exact bounds without known forces; relative: forces in units of that as packed.
-        With known forces, the values seen are left out: networks of all of S exceed the bounds.
+        before: exact bounds without known forces; seen: whether to draw what the networks span;
+        relative: forces in units of that as packed.
         """
         self.contacts = contacts
-        seen = {} if before else {"low": replay.low[:, 0], "high": replay.high[:, 0]}
+        spanned = {"low": replay.low[:, 0], "high": replay.high[:, 0]} if seen else {}
         original = replay.normal[0, contacts]
         unit = original if relative else np.ones_like(original)
         ends = {
             **_ends("whole_", before, contacts),
             **_ends("exact_", exact, contacts),
-            **_ends("", seen, contacts),
+            **_ends("", spanned, contacts),
             "now": original,
             "original": original,
         }
@@ -96,12 +104,13 @@ class BarsFigure:
             "at": contacts.astype(np.int32),
             "contact": replay.backbone[contacts].astype(np.int32),
         }
-        *widths, size, packed = FEW if len(contacts) <= APART else MANY
+        *widths, size = FEW if len(contacts) <= APART else MANY
+        size = max(LEAST_DOT, size * min(1.0, float(np.sqrt(CLOSE / max(1, len(contacts))))))
         for renderer, width in zip(self.layers, widths, strict=True):
             renderer.glyph.width = width
         self.dots.glyph.size = size
         # Not hidden by `visible`, which the player sets.
-        self.packed.glyph.size = packed if replay.given else 0
+        self.packed.glyph.size = 0.8 * size if replay.given else 0
         rows = GIVEN if before else FREE
         self.tip.tooltips = [row for row in rows if replay.given or row is not PACKED]
         set_range(self.figure.x_range, 0, len(contacts) + 1)

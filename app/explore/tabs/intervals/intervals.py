@@ -71,8 +71,8 @@ class View(TabView):
         grows = folded_away(GROWS, plotted(self.growth.figure))
         self.looks.sync_opened(grows, "growth")
         return pn.Column(
-            self.lead, plotted(self.drawing.figure), pn.FlexBox(*self.choices, self.exact, **wide),
-            Known(self.state), Contacts(self.looks), grows, **wide,
+            self.lead, Known(self.state), plotted(self.drawing.figure),
+            pn.FlexBox(*self.choices, self.exact, **wide), Contacts(self.looks), grows, **wide,
         )  # fmt: skip
 
     def update(self) -> None:
@@ -88,7 +88,11 @@ class View(TabView):
         named += [] if looks.contact is None else [looks.contact]
         ranks = picked(order.contacts, SOME if looks.drawn == "some" else MOST_BARS, named)
         relative = looks.scale == "own"
-        beyond = self.drawing.show(replay, order.contacts[ranks], exact, before, relative)
+        # Networks of all of S exceed the bounds given held forces.
+        seen = not before or state.obeying
+        beyond = self.drawing.show(
+            replay, order.contacts[ranks], exact, before, seen=seen, relative=relative
+        )
         self.drawing.dots.glyph.update(fill_color=now(looks.dark), line_color=now(looks.dark))
         self.drawing.mark(looks.contact)
         self.drawing.figure.xaxis.axis_label = worded(
@@ -105,10 +109,15 @@ class View(TabView):
         endless = int(np.isinf(exact["high"]).sum()) if exact else 0
         self._drawn = bool(exact), beyond, endless
         self._explain()
-        eta3 = None if state.growing else _exact_eta3(state.exact)
+        eta3 = None if state.growing else _exact_eta3(self._sampled())
         if replay is not self._grown[0] or eta3 != self._grown[1]:
             self._grown = replay, eta3
             self.growth.show(replay, state.growing, eta3)
+
+    def _sampled(self) -> Any:
+        """The exact intervals of the S from which the networks on screen were sampled, or None."""
+        held = self.state.obeying and self.state.knowledge.known
+        return self.state.possible if held else self.state.exact
 
     def _explain(self, *events: Any) -> None:
         """Say what is drawn."""
@@ -141,7 +150,7 @@ def sentence(
         parts.append(mark(PALE, "pale: exact, as bounds are found"))
     count = replay.summary["states"]
     random = "random networks so far" if state.growing else f"{count} random networks"
-    if narrowed is None:
+    if narrowed is None or state.obeying:
         parts.append(mark(DARK, f"dark: {term('seen', 'seen')} in {random}"))
     parts.append(mark(now(state.looks.dark), _dot(state), "50%"))
     if replay.given:
@@ -155,13 +164,13 @@ def sentence(
 
 
 def _dot(state: AppState) -> str:
-    """The network whose forces are dots; only a pulled one is certain to have the held forces."""
-    ignores = state.knowledge.known and not state.hand.pulls
+    """The network whose forces are dots, and whether it may lack the held forces."""
+    ignores = state.knowledge.known and not state.hand.pulls and not state.obeying
     return "dot: now, in a network of all of S" if ignores else "dot: now"
 
 
 def _exact_eta3(exact: Any) -> float | None:
-    """0.15 η3 of all of S, from which networks are drawn even if forces are held."""
+    """0.15 η3 of exact intervals, or None."""
     value = np.nan if exact is None else 0.15 * exact["eta3"].item()
     return value if np.isfinite(value) else None
 

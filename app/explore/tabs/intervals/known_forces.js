@@ -39,7 +39,10 @@ export function render({ model, view }) {
     asking: () => { next.disabled = model.asking },
   }
   next.addEventListener("click", () => tell({ next: true }))
-  words.addEventListener("click", ({ target }) => { if (target.dataset.contact) tell({ choose: Number(target.dataset.contact) }) })
+  words.addEventListener("click", ({ target: { dataset } }) => {
+    if (dataset.contact) tell({ choose: Number(dataset.contact) })
+    if ("sample" in dataset) tell({ sample: true })
+  })
   words.addEventListener("pointerover", ({ target }) => { if (target.dataset.contact) point(Number(target.dataset.contact)) })
   words.addEventListener("pointerout", () => point(null))
   for (const [name, show] of Object.entries(shown)) { model.on(name, show); show() }

@@ -16,10 +16,8 @@ from ....widgets.hints import term
 
 STRONGEST = 5  # number of contacts listed whose interval has shrunk most
 LINK = '<button type="button" class="found" data-contact="{}">{}</button>'
-ASK = (
-    "To treat a force as known, for example from a measurement, hold it (button Hold, or H). All "
-    "other intervals shrink or stay the same."
-)
+SAMPLE = '<button type="button" class="found" data-sample>Sample networks</button>'
+ASK = "Hold a force (H), as if measured: other intervals shrink."
 
 
 class Known(Scripted):
@@ -34,7 +32,7 @@ class Known(Scripted):
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, visible=False, **params)
         self._state = state
-        observe(self._show, state, "shown", "looks.contact")
+        observe(self._show, state, "shown", "replay")
         observe(
             self._show, state.knowledge, "known", "narrowed", "ranked", "task.running",
             "ranking.running",
@@ -43,6 +41,7 @@ class Known(Scripted):
 
     _release = forward("_state.knowledge.release", release=int)
     _rank = forward("_state.knowledge.rank", next=True)
+    _sample = forward("_state.sample_held", sample=True)
 
     @from_browser(choose=int)
     def _choose(self, choose: int) -> None:
@@ -56,11 +55,10 @@ class Known(Scripted):
         number, knowledge = state.replay.backbone, state.knowledge
         best = knowledge.ranked
         self.param.update(
-            visible=not state.growing
-            and state.replay.summary["dimension"] > 0
-            and (state.looks.contact is not None or bool(knowledge.known)),
+            visible=not state.elsewhere
+            and (state.replay.summary["dimension"] > 0 or bool(knowledge.known)),
             chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
-            words=words(knowledge, number),
+            words=words(knowledge, number) + sampled(state),
             ranked=[] if best is None else _ranks(best, number),
             meaning="" if best is None else meaning(best, knowledge.ranking.running),
             asking=knowledge.ranking.running,
@@ -78,23 +76,30 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     if narrowed.left:
         return f"Exact bounds, largest change first: {1 - narrowed.left:.0%}."
     (h, less), (mean, left) = narrowed.dimension, narrowed.mean
-    free = f"<b>{h} → {less}</b>" if less < h else f"stay <b>{h}</b> (an error bar fixes no number)"
     text = (
-        f"{term('h', 'Free dimensions')} {free}; a contact's {term('exact', 'possible')} fₙ spans "
-        f"<b>{mean:.3f} → {left:.3f} × the mean force</b> on average ({_change(mean, left)}); "
-        f"{narrowed.carrying} of {len(narrowed.shortened)} contacts "
-        f"{term('carrying', 'certain to carry force')}."
+        f"<b>{less} of {h}</b> {term('h', 'free dimensions')} are left"
+        f"{'' if less < h else ' (an error bar fixes no number)'}; a contact's "
+        f"{term('exact', 'possible')} fₙ spans <b>{mean:.3f} → {left:.3f} × the mean force</b> on "
+        f"average ({_change(mean, left)}); {narrowed.carrying} of {len(narrowed.shortened)} "
+        f"contacts {term('carrying', 'certain to carry force')}."
     )
     short = narrowed.shortened
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
         most = ", ".join(f"{LINK.format(c, number[c])} (by {short[c]:.2f})" for c in order)
         text += f" Shortened most: contacts {most}."
-    return (
-        text
-        + " Networks that are played are from all of S and ignore the held forces; pulled ones "
-        "obey them."
-    )
+    return text
+
+
+def sampled(state: AppState) -> str:
+    """Whether the networks to be played have the held forces, in words."""
+    held = len(state.knowledge.known)
+    if not held:
+        return ""
+    them = "it" if held == 1 else "them"
+    if state.obeying:
+        return f" The networks played have {them}, too."
+    return f" {SAMPLE} that have {them}."
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
