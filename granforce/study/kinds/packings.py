@@ -24,7 +24,7 @@ from granforce.records import InputError, Packing, friction, moderate, positive,
 from granforce.study.cells import Kind, get, load, packing_version, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
-from granforce.study.keys import Parameters
+from granforce.study.keys import Parameters, canonical
 from granforce.study.kinds import slices
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.study.store import Store
@@ -162,12 +162,26 @@ def cones_of(packing: Parameters, mu: Any, **named: Any) -> Parameters:
     return cones | conditions(**named)
 
 
+# Parameters on which an ensemble depends, and the last ensemble, which the next results of the same
+# packing share.
+_OF_ENSEMBLE = "packing", "mu", "slice", "prescribed", "stress", "known"
+_last: tuple[tuple[str, str], Ensemble] | None = None
+
+
 def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
     """The ensemble of a stored packing and friction, with the forces outside a slice frozen."""
+    global _last
+    named = {name: parameters[name] for name in _OF_ENSEMBLE if parameters.get(name) is not None}
+    key, last = (str(store.path), canonical(named)), _last
+    if last is not None and last[0] == key:
+        return last[1]
+    last = _last = None  # its memory may be needed
     packing, _ = get_packing(store, parameters["packing"])
     slice_ = parameters.get("slice")
     frozen = None if slice_ is None else slices.outside(packing, slice_)
-    return ensemble(packing, parameters["mu"], frozen=frozen, **conditions_of(parameters))
+    S = ensemble(packing, parameters["mu"], frozen=frozen, **conditions_of(parameters))
+    _last = key, S
+    return S
 
 
 def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
