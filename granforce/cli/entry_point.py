@@ -77,6 +77,9 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         return refused(
             f"NUMBA_NUM_THREADS must be at least 1, got {threads[:20]}; change or unset it"
         )
+    if arguments.run == "app":
+        # Several computations share the cores: BLAS threads of each would wait for one another.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from granforce.records import Cancelled, InputError
     from granforce.system.terminal import one_line
 
