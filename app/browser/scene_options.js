@@ -10,8 +10,8 @@ export function sceneOptions(titles, here) {
   return `${options(titles.filter(([, , door]) => door === here))}<optgroup label="opens in ${there}">${options(elsewhere, ` → ${there}`)}</optgroup>`
 }
 
-/** Open the page of a scene, at a friction unless it is null; a visitor's packing at that of its last view. */
-export function openScene(scene, mu) {
+/** The query of a scene, at a friction unless it is null; a visitor's packing at that of its last view. */
+export function sceneQuery(scene, mu) {
   const last = scene === "imported" ? lastPacking() : ""
-  window.location.assign(last || `?${new URLSearchParams(mu === null ? { scene } : { scene, mu })}`)
+  return last || `?${new URLSearchParams(mu === null ? { scene } : { scene, mu })}`
 }

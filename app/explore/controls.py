@@ -66,7 +66,7 @@ class Controls:
     def __init__(self, state: AppState) -> None:
         self.state, self.work = state, state.work
         self._following = False
-        self.scene, self.mu = SceneList(margin=0), FrictionSlider(self._typed, margin=0)
+        self.scene, self.mu = SceneList(state.open, margin=0), FrictionSlider(self._typed, margin=0)
         draw = self.mu.param.update
         self.work.task(reading).start(
             lambda job: study_data.against_friction("eta2"), lambda hill: draw(hill=hill)

@@ -1,5 +1,6 @@
 """The list of scenes, the first of the controls."""
 
+from collections.abc import Callable
 from typing import Any
 
 import param
@@ -8,6 +9,7 @@ from granforce.packing.scenes import EVERY
 from granforce.study.keys import Parameters
 
 from ..browser.bundle import Scripted
+from ..browser.messages import from_browser
 from ..state import scene_links
 
 
@@ -18,9 +20,15 @@ class SceneList(Scripted):
     shown = param.String(default=scene_links.MANY)
     usual = param.Number(doc="μ of the scene on screen, which is not taken along")
 
-    def __init__(self, **params: Any) -> None:
+    def __init__(self, opens: Callable[[str], object], **params: Any) -> None:
+        """opens(query): shows the large packing of a link."""
         super().__init__(titles=scene_links.titles(), **params)
+        self._opens = opens
         self.follow({})
+
+    @from_browser(query=str)
+    def _open(self, query: str) -> None:
+        self._opens(scene_links.request_of(query).query)
 
     def follow(self, packing: Parameters) -> None:
         """Show the scene of a packing with these parameters."""

@@ -2,7 +2,7 @@
 
 import { connectionBanner } from "../../browser/connection_lost.js"
 import { saveBytes } from "../../browser/download.js"
-import { openScene, sceneOptions } from "../../browser/scene_options.js"
+import { sceneOptions, sceneQuery } from "../../browser/scene_options.js"
 import { ask } from "../../browser/send.js"
 import { Bars } from "../drawing/bars.js"
 import { palette } from "../drawing/palette.js"
@@ -381,7 +381,7 @@ class Workbench {
     const { model, view, chosenMu, hand: { mu } } = this
     if (model.large.includes(scene)) {
       clearTimeout(this.resting)
-      return openScene(scene, chosenMu ? Number(mu.toPrecision(6)) : null)
+      return window.location.assign(sceneQuery(scene, chosenMu ? Number(mu.toPrecision(6)) : null))
     }
     if (!this.banner.hidden) { // the page reloads its address once the server is back
       window.history.pushState(null, "", `?scene=${scene}`)
