@@ -27,7 +27,7 @@ from .limits import LIMITS
 from .notifications import as_one
 
 # Time, s, and part of a stage after which its end can be estimated: earlier, it is off by factors.
-ESTIMATED, ESTIMATED_PART = 4.0, 0.05
+ESTIMATED, ESTIMATED_PART = 1.0, 0.05
 LONGEST_LINE = 500  # characters of an error message on a page
 LONG = 3.0  # s after which a job is a long one
 _ASK = 0.2  # s between two polls, and for which a job waits for its turn before it frees the thread
@@ -95,7 +95,7 @@ def _goes_as(job: Job, other: Job | None) -> None:
     job.stage = "already under way"
     if other is not None:
         job.stage += f": {other.stage}"
-        job.fraction, job.seconds_left = other.fraction, other.seconds_left
+        job.fraction, job._left = other.fraction, other.seconds_left
 
 
 class Visitor(NamedTuple):
@@ -232,7 +232,8 @@ class Job:
         self.not_before = 0.0  # earliest time to run (again), as time.monotonic
         self._until = math.inf  # when it is ended
         self.fraction: float | None = None  # done, 0 … 1; None if unknown
-        self.seconds_left: float | None = None  # of this stage
+        self._left: float | None = None  # s of this stage, by its progress
+        self._expected = math.inf  # its end, as time.perf_counter, before there is progress
         self.error = ""
         self.so_far: Any = None  # its partial result, if the work provides one
         self.result: Any = None
@@ -257,10 +258,20 @@ class Job:
             return self.stage
         return f"{WAITING}: {count} {'computation' if count == 1 else 'computations'} before it"
 
-    def begin(self, stage: str) -> None:
-        """Enter a stage, whose bar and remaining time start anew."""
+    def begin(self, stage: str, expected: float = math.inf) -> None:
+        """Enter a stage, whose bar and remaining time start anew.
+
+        expected: its duration, s, to be said until its progress gives a better estimate.
+        """
         self.stage, self._counted = stage, None
-        self.fraction = self.seconds_left = None
+        self.fraction = self._left = None
+        self._expected = time.perf_counter() + expected
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds left of this stage; None if unknown, or if it takes longer than expected."""
+        left = self._expected - time.perf_counter()
+        return left if self._left is None and 0 < left < math.inf else self._left
 
     def tell(
         self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
@@ -271,7 +282,7 @@ class Job:
         stays where it is and nothing is estimated.
         """
         if total is None:
-            self.seconds_left = None
+            self._left = None
             return
         begin, end = part
         reached = begin + (end - begin) * min(1.0, done / total)
@@ -281,7 +292,7 @@ class Job:
             self._counted = now, done
         spent, new = now - self._counted[0], done - self._counted[1]
         known = new > ESTIMATED_PART * (total - self._counted[1]) and spent > ESTIMATED
-        self.seconds_left = spent / new * max(0.0, total - done) if known else None
+        self._left = spent / new * max(0.0, total - done) if known else None
 
     def cancel(self) -> None:
         """Request its end: at once if not yet begun, else within a second unless it is needed."""

@@ -188,7 +188,7 @@ export class Buttons {
     this.root.classList.toggle("two", shown)
   }
 
-  /** keepable: whether the networks that were not stored can be computed. */
+  /** keepable: seconds for computing the networks that were not stored; 0: they cannot be computed. */
   tellTrack(replay, keepable) {
     const between = this.part("between"), { swinging, walk } = replay
     this.bar.showTrack(replay, keepable)

@@ -177,7 +177,7 @@ class Player {
     if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
   }
 
-  tellTrack() { this.buttons.tellTrack(this.replay, this.model.keepable && !this.grows) }
+  tellTrack() { this.buttons.tellTrack(this.replay, this.grows ? 0 : this.model.keepable) }
 
   get speed() { return this.buttons.bar.speed }
 

@@ -92,7 +92,7 @@ class Player(Scripted, Appearance):
     live = param.Boolean(doc="whether something is being computed that can be seen")
     requested = param.String(doc="the requested selection if it is not on screen, in words")
     legend = param.String(doc="HTML: what colour and width show")
-    keepable = param.Boolean(doc="whether more networks of the walk could be stored")
+    keepable = param.Number(doc="expected s for storing all networks of the walk; 0: it is done")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
@@ -278,7 +278,6 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
         "friction": replay.friction,
         "free": replay.summary["dimension"],
         "states": replay.summary["states"],
-        "seconds": replay.summary.get("seconds", 0.0),  # that the walk took
         "box": [float(side) if np.isfinite(side) else -1.0 for side in replay.box],
         "tilt": replay.tilt,
         "window": list(replay.window),

@@ -99,8 +99,7 @@ export class PlayerBar {
     this.missed = null
     this.showStored()
     this.keep.hidden = !(stride > 1 && keepable)
-    // Many machines are faster than the one that took the walk.
-    this.keep.textContent = replay.walk.seconds >= 1 ? `Keep all (up to ${duration(replay.walk.seconds)})` : "Keep all"
+    this.keep.textContent = keepable >= 1 ? `Keep all (about ${duration(keepable)})` : "Keep all"
     this.showRate()
   }
 

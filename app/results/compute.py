@@ -17,11 +17,16 @@ from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 
 from ..background.jobs import Job, Work, in_turn
-from . import progress_feed
+from . import durations, progress_feed
 from .library import SOURCES, Cell, Library, Shown
 from .replays import first_replay
 from .selection import Selection
 
+# What precedes the first states of each kind.
+FIRST_STAGES = {
+    "walk": "finding the contacts that carry force",
+    "uniform": "finding the middle of S, where the samples start",
+}
 # The share of a compaction in the progress bar, and the part of its expected steps, those of
 # another packing, up to which their number can be relied on.
 PACKING_SHARE, NEARLY = 0.5, 0.95
@@ -38,10 +43,10 @@ def load_or_compute(
     if result is None:
         with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
-            job.begin(stage)
-            result, _ = study.get(
-                library.writable_cache, kind, params, **{"progress": job.tell} | options
-            )
+            with durations.expected(job, stage, kind.name, params):
+                result, _ = study.get(
+                    library.writable_cache, kind, params, **{"progress": job.tell} | options
+                )
     return result
 
 
@@ -55,8 +60,8 @@ def states(library: Library, selection: Selection) -> Work:
             cell = library.find(selection.kind, params)
             if cell is None:
                 _make_packing(job, library, selection.packing)
-                job.begin("finding the contacts that carry force")
-                with _naming_friction(selection):
+                stage = FIRST_STAGES[selection.kind]
+                with durations.expected(job, stage, kind.name, params), _naming_friction(selection):
                     dataset, _ = study.get(
                         library.writable_cache,
                         kind,

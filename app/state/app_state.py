@@ -13,7 +13,7 @@ from granforce.records import InputError
 from ..background.jobs import Job, Visitor
 from ..background.limits import LIMITS
 from ..background.notifications import as_one, observe
-from ..results import compute
+from ..results import compute, durations
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from ..results.progress_feed import Arriving, Following, numbers
 from ..results.replays import Replay
@@ -426,9 +426,12 @@ class AppState(param.Parameterized):
             self.compute_exact()
 
     @property
-    def keepable(self) -> bool:
-        """Whether more networks of the walk on screen could be stored."""
-        return self.cell is not None and self.cell.stored < self.cell.selection.stored
+    def keepable(self) -> float:
+        """Expected seconds for all networks of the walk on screen; 0 if no more can be stored."""
+        cell = self.cell
+        if cell is None or cell.stored >= cell.selection.stored:
+            return 0.0
+        return durations.seconds(cell.kind, cell.selection.parameters())
 
     def keep_all(self, number: int) -> None:
         """Compute the networks of the walk on screen that were not stored, keeping the view.

@@ -1109,6 +1109,8 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     assert not line.progress
 
     def work(job):
+        job.begin("counting", 60)
+        assert job.seconds_left == pytest.approx(60, abs=1)  # before there is progress
         job.begin("counting")
         job.tell(0, 100)
         job._counted = job._counted[0] - 400, 0

@@ -18,16 +18,16 @@ def test_a_scene_of_the_other_page_says_where_it_opens(run):
     assert 'value="groove">One disk → Learn</option>' in options
 
 
-def test_the_time_to_keep_all_networks_is_an_upper_limit(run):
+def test_keeping_all_networks_says_how_long_it_takes(run):
     words = run(
         "packing/player_bar",
         """({ PlayerBar }) => {
-            const bar = new PlayerBar({}, () => {}), walk = { seconds: 47, states: 1000 }
-            bar.showTrack({ last: 1, stride: 20, walk }, true)
+            const bar = new PlayerBar({}, () => {}), walk = { states: 1000 }
+            bar.showTrack({ last: 1, stride: 20, walk }, 8.7)
             return bar.keep.textContent
         }""",
     )
-    assert words == "Keep all (up to 47 s)"
+    assert words == "Keep all (about 9 s)"
 
 
 def test_every_script_is_a_module_by_itself(run):

@@ -131,7 +131,7 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit, serv
     until(page, "scene.hand.player.replay.held === null")
     assert slider.evaluate("e => e.value") == "0"
     slider.evaluate("e => { e.value = e.max; e.dispatchEvent(new Event('input')) }")
-    page.get_by_text("contacts open,").first.wait_for()
+    page.get_by_text("contacts open").first.wait_for()
     end = scene(page, "scene.hand.player.pushed.load")
     assert load < end == pytest.approx(float(slider.get_attribute("max")))
     until(page, "scene.hand.player.pushed.motion !== null")

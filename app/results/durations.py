@@ -1,0 +1,43 @@
+"""How long computations take on this machine: at first a guess, then as the last one of a kind."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from granforce.study.keys import Parameters
+
+from ..background.jobs import Job
+
+USUAL_DISKS, USUAL_STATES = 400, 200
+# Seconds for USUAL_DISKS, with USUAL_STATES where states are drawn; replaced by those measured.
+_seconds = {
+    "walk": 1.3, "uniform": 2.5, "intervals": 4.0, "informative": 12.0, "perturbation": 10.0,
+    "limit_loads": 4.0, "volume": 60.0, "outline": 2.0, "stress": 2.0,
+}  # fmt: skip
+
+
+def seconds(kind: str, params: Parameters) -> float:
+    """The expected duration of a computation, s."""
+    return _seconds[kind] * _work(params)
+
+
+@contextmanager
+def expected(job: Job, stage: str, kind: str, params: Parameters) -> Iterator[None]:
+    """Begin a stage of a job with its expected duration, and learn how long it really takes."""
+    begun = time.perf_counter()
+    job.begin(stage, seconds(kind, params))
+    yield
+    _seconds[kind] = (time.perf_counter() - begun) / _work(params)
+
+
+def _work(params: dict[str, Any]) -> float:
+    """The work of a computation, relative to that with USUAL_DISKS and USUAL_STATES.
+
+    It grows like the square of the number of disks for programs over all contacts, and in
+    proportion to it for a state.
+    """
+    disks = params["packing"].get("n", USUAL_DISKS) / USUAL_DISKS
+    if "states" not in params or "check" in params:
+        return float(disks**2)
+    return float(disks * (disks + params["states"] / USUAL_STATES) / 2)
