@@ -184,7 +184,7 @@ class Knowledge(param.Parameterized):
         """Find the contact to measure next, in the background."""
         state = self.state
         replay, known = state.replay, tuple(self.known)
-        if replay is None or state.growing:
+        if replay is None or state.elsewhere:
             return
         self.work.message = ""
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
