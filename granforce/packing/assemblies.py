@@ -307,7 +307,9 @@ def _outlines(body: Any, name: str) -> list[Floats]:
 
 def _is_part(given: Any) -> bool:
     """Whether it is no number and no corner, but a disk, or a list of corners."""
-    if not np.iterable(given) or isinstance(given, str) or not len(given):
+    if isinstance(given, np.ndarray):
+        return given.ndim == 2 or given.shape == (3,)
+    if not isinstance(given, list | tuple) or not given:
         return False
     return len(given) == 3 or np.iterable(given[0])
 
@@ -327,10 +329,10 @@ def _measured(
     one, centre, own, radius = (
         np.array(values) for values in zip(*map(_moments, outlines), strict=True)
     )
-    area = np.bincount(number, one)
-    x = np.stack([np.bincount(number, one * along) for along in centre.T], axis=1) / area[:, None]
-    away = centre - x[number]
-    polar = np.bincount(number, own + one * np.sum(away**2, axis=1))
+    begin = np.flatnonzero(np.diff(number, prepend=-1))
+    area = np.add.reduceat(one, begin)
+    x = np.add.reduceat(one[:, None] * centre, begin) / area[:, None]
+    polar = np.add.reduceat(own + one * np.sum((centre - x[number]) ** 2, axis=1), begin)
     r = np.zeros(len(each))
     for body, outline in zip(number, outlines, strict=True):
         points, more = (outline, 0.0) if outline.ndim == 2 else (outline[None, :2], outline[2])

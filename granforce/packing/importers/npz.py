@@ -231,7 +231,9 @@ def _shapes(arrays: dict[str, npt.NDArray[Any]]) -> Shapes | None:
     missing = [key for key in _SHAPES if key not in arrays]
     if 0 < len(missing) < len(_SHAPES):
         raise InputError(f"no array {', '.join(missing)}; give all of {', '.join(_SHAPES)}")
-    return None if missing else Shapes(*(arrays.get(key) for key in _SHAPES + _PARTS))
+    if missing:
+        return None
+    return Shapes(*(arrays[key] for key in _SHAPES), *(arrays.get(key) for key in _PARTS))
 
 
 def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, Any]) -> Contacts:
@@ -266,10 +268,17 @@ def _of_bodies(contacts: Contacts, normal: Floats, arrays: dict[str, Any]) -> Co
     if missing:
         raise InputError(f"contacts with levers also need {', '.join(missing)}")
     count = len(contacts.i)
-    names = {"length": "branch", "gap": "gap", **dict(zip(_ARMS, _ARMS, strict=True))}
-    given = {name: float_array(arrays[key], (count,), key) for name, key in names.items()}
-    levers = float_array(arrays["levers"], (count, 2), "levers")
-    return contacts._replace(normal=normal, levers=levers, **given)
+    length, gap, arm_i, arm_j = (
+        float_array(arrays[key], (count,), key) for key in ("branch", "gap", *_ARMS)
+    )
+    return contacts._replace(
+        normal=normal,
+        length=length,
+        gap=gap,
+        arm_i=arm_i,
+        arm_j=arm_j,
+        levers=float_array(arrays["levers"], (count, 2), "levers"),
+    )
 
 
 def _gap_allowed(info: dict[str, Any]) -> float:
