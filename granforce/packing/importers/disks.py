@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from granforce.packing.assemblies import with_network
 from granforce.packing.importers.geometry import (
     check_disks,
     largest_gap,
@@ -19,6 +20,7 @@ from granforce.packing.scenes import places_behind
 from granforce.records import (
     InputError,
     Packing,
+    Shapes,
     brief,
     float_array,
     friction,
@@ -29,7 +31,7 @@ from granforce.records import (
     real_array,
 )
 from granforce.tolerances import LARGEST_UNIT, LISTED_TOUCHING
-from granforce.types import Floats
+from granforce.types import Floats, Integers
 
 WALLS = ("floor", "box")
 
@@ -45,6 +47,7 @@ def from_disks(
     walls: str | npt.ArrayLike | None = None,
     gravity: float = 0.0,
     pressure: float | None = None,
+    clumps: npt.ArrayLike | None = None,
     tolerance: float = LISTED_TOUCHING,
 ) -> Packing:
     """A Packing of disks, with the force network nearest to equal normal forces.
@@ -58,17 +61,22 @@ def from_disks(
     mu : float
         Friction coefficient.
     box : (2,) array, optional
-        Sides L_x, L_y of a periodic cell. By default the set is open and needs walls and gravity.
+        Sides L_x, L_y of a periodic cell, inf in an open direction. A set that is not periodic in
+        both needs walls and gravity. By default it is open.
     tilt : float, default 0
         x component of the cell's second vector.
     walls : str or (k, 4) array, optional
-        "floor", "box" (a floor and two sides), at the extent of the disks, or segments x, y, x, y.
+        "floor", "box" (a floor and two sides), at the extent of the disks, or segments x, y, x, y;
+        in a box periodic in x, "floor".
         Walls are held: behind each place that a disk touches is one more grain, whose balance is
         not required.
     gravity : float, default 0
         g times the mass density, downwards: a disk weighs g π r².
     pressure : float, optional
         P0 of a periodic cell, force per length; by default 1.
+    clumps : (N,) array, optional
+        Labels of rigid bodies: disks with one label move as one, and may overlap. Bodies follow the
+        order of labels; each needs centres that are not wrapped into the cell. Masses add up.
     tolerance : float, default 10⁻⁶
         Disks closer than this, in largest radii, touch.
 
@@ -90,9 +98,11 @@ def from_disks(
     x = float_array(x, (-1, 2), "centres")
     if len(x) != len(r):
         raise InputError(f"disks need a centre and a radius each: {len(x)} centres, {len(r)} radii")
-    x = cell.wrapped(x)
-    check_disks(x, r, cell, lambda k: f"disk {k}")
+    given, x = x, cell.wrapped(x)
+    bodies = np.arange(len(r)) if clumps is None else _bodies(clumps, len(r))
+    check_disks(x, r, cell, lambda k: f"disk {k}", rigid=bodies)
     contacts = touching_contacts(x, r, cell, tolerance)
+    contacts = contacts.picked(bodies[contacts.i] != bodies[contacts.j])
     closed = bool(np.all(np.isfinite(cell.box)))
     if pressure is not None and not closed:
         raise InputError("pressure applies to periodic boxes: leave it out, or give the box")
@@ -107,8 +117,71 @@ def from_disks(
         info={"source": "disks"},
         tilt=cell.tilt,
     )
+    if clumps is not None:
+        if closed:
+            raise InputError("clumps need walls and gravity: leave out the box, or its side L_y")
+        return with_network(_clumped(enclosed(packing, walls, gravity, tolerance), given, bodies))
     packing = with_doubts_noted(packing, tolerance)
     return with_nearest_network(enclosed(packing, walls, gravity, tolerance), forces="found")
+
+
+def _bodies(clumps: npt.ArrayLike, count: int) -> Integers:
+    """The number of the body (N,) of each disk, in the order of the labels."""
+    labels = np.asarray(clumps)
+    if labels.shape != (count,) or labels.dtype.kind not in "iuU":
+        raise InputError(
+            f"clumps must be {count} labels, whole numbers or texts, one for each disk"
+        )
+    return np.unique(labels, return_inverse=True)[1]
+
+
+def _clumped(packing: Packing, x: Floats, body: Integers) -> Packing:
+    """A packing without forces, with its first disks, centres x, joined to bodies (k,)."""
+    disks, more = len(x), len(packing.r) - len(x)
+    count = int(body.max()) + 1
+    of = np.append(body, count + np.arange(more))
+    x, r, c = np.concatenate([x, packing.x[disks:]]), packing.r, packing.contacts
+    mass = np.pi * r**2
+    total = np.bincount(of, mass)
+    centre = np.column_stack([np.bincount(of, mass * along) for along in x.T]) / total[:, None]
+    away = x - centre[of]
+    far, load = np.zeros(len(total)), np.zeros((len(total), 3))
+    np.maximum.at(far, of, np.hypot(*away.T) + r)
+    np.add.at(load, of, packing.load)
+    # The arms and levers of a disk, and from the centre of mass to it.
+    i, j = of[c.i], of[c.j]
+    arm, lever = (
+        [np.sum(away[disk] * along, axis=1) for disk in (c.i, c.j)]
+        for along in (c.normal, c.tangent)
+    )
+    contacts = c._replace(
+        i=i,
+        j=j,
+        length=c.length + arm[0] - arm[1],
+        arm_i=c.arm_i + arm[0],
+        arm_j=c.arm_j - arm[1],
+        levers=np.column_stack(lever),
+    )
+    turning = np.bincount(of, mass * (0.5 * r**2 + np.sum(away**2, axis=1)))
+    shapes = Shapes(
+        corners=np.empty((0, 2)),
+        sides=np.zeros(disks, dtype=np.int64),
+        mass=np.asarray(total, dtype=float),
+        inertia=np.asarray(turning, dtype=float),
+        body=body,
+        circles=np.column_stack([x, r])[:disks],
+    )
+    return make_packing(
+        centre,
+        far,
+        packing.box,
+        contacts,
+        packing.forces,
+        packing.mu,
+        load=load,
+        info=packing.info | {"disks": count},
+        shapes=shapes,
+    )
 
 
 def enclosed(
@@ -119,13 +192,19 @@ def enclosed(
 ) -> Packing:
     """A packing without forces, with walls and gravity as in `from_disks`.
 
-    Raises InputError in a periodic box, without gravity and loads, or if no disk touches a wall.
+    Raises InputError in a box periodic in y, for side walls in one periodic in x, without gravity
+    and loads, or if no disk touches a wall.
     """
     gravity = positive(gravity, "gravity", or_zero=True, most=LARGEST_UNIT)
     if walls is None and not gravity:
         return packing
-    if np.isfinite(packing.box).any():
-        raise InputError("walls and gravity apply to open packings: leave out the box")
+    if np.isfinite(packing.box[1]):
+        raise InputError(
+            "walls and gravity apply to boxes open in y: leave out the box, or give box=[L_x, inf] "
+            "(--box LX inf)"
+        )
+    if np.isfinite(packing.box[0]) and not (isinstance(walls, str) and walls == "floor"):
+        raise InputError('in a box periodic in x, the only wall is a floor: walls="floor"')
     load = packing.load.copy()
     load[:, 1] -= gravity * np.pi * packing.r**2
     if walls is None:
@@ -166,6 +245,8 @@ def _segments(packing: Packing, walls: str | npt.ArrayLike) -> Floats:
         raise InputError.of("walls", walls, words)
     left, bottom = (packing.x - packing.r[:, None]).min(axis=0)
     right, top = (packing.x + packing.r[:, None]).max(axis=0)
+    if np.isfinite(packing.box[0]):
+        left, right = 0.0, packing.box[0]
     floor = (left, bottom, right, bottom)
     sides = [(left, bottom, left, top), (right, bottom, right, top)]
     return np.array([floor, *(sides if walls == "box" else [])])

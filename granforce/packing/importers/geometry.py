@@ -200,9 +200,17 @@ def check_contacts(
 
 
 def check_disks(
-    x: Floats, r: Floats, cell: Cell, place: Callable[[int], str], allowed: float = OVERLAP_ALLOWED
+    x: Floats,
+    r: Floats,
+    cell: Cell,
+    place: Callable[[int], str],
+    allowed: float = OVERLAP_ALLOWED,
+    rigid: Integers | None = None,
 ) -> None:
-    """InputError if radii, positions or cell cannot form a packing; place(g) names grain g."""
+    """InputError if radii, positions or cell cannot form a packing; place(g) names grain g.
+
+    rigid (N,): numbers of the rigid bodies to which disks belong; those of one may overlap.
+    """
     for g in np.flatnonzero(r <= 0)[:1]:
         raise InputError(
             f"{place(g)}: radius {r[g]:g} is not positive; correct or remove the grain"
@@ -225,7 +233,8 @@ def check_disks(
         )
     _check_crowding(x, r, cell)
     i, j, gap = overlapping(x, r, cell)
-    for c in np.flatnonzero(-gap > allowed * np.minimum(r[i], r[j]))[:1]:
+    free = np.ones(len(i), dtype=bool) if rigid is None else rigid[i] != rigid[j]
+    for c in np.flatnonzero(free & (-gap > allowed * np.minimum(r[i], r[j])))[:1]:
         raise InputError(
             f"{place(j[c])}: {_pair(i, j, c)} overlap by {-gap[c]:.3g}, more than "
             f"{allowed:.0%} of a radius; check positions, radii and box, and that their unit of "
