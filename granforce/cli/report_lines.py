@@ -76,6 +76,7 @@ _LINES: dict[str, str | Line] = {
     "noise": "standard deviations of the noise on every force, in units of ⟨f_n⟩",
     "draws_at_rest": "draws that came to rest, for each of these",
     "draws": "draws of noise for each of these",
+    "wedged_grains": "grains that can press on each other without a load",
     "scene": "name of the scene",
     "timestep": "time step of the snapshot",
     "time": "time of the snapshot",
@@ -260,6 +261,7 @@ LOAD_FACTOR = (
 REST = (
     *("at_rest", "reason", "residual", "violation", "distance_to_rest", "noise", "draws_at_rest"),
     "draws",
+    "wedged_grains",
 )
 INFORMATIVE = (
     *("entry", "mean_interval_now", "expected_reduction", "reduction", "mean_interval_after"),

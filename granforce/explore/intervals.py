@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from granforce import measures, notebook
 from granforce.fields import record
-from granforce.forces.contact_problem import make_system
+from granforce.forces.contact_problem import make_system, wedged
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import ordered
 from granforce.forces.nearest import starting_network
@@ -54,6 +54,7 @@ class Intervals(NamedTuple):
     counts: Annotated[
         dict[str, int], "programs solved, skipped by reason, solved again; iterations"
     ]
+    wedged: Annotated[Integers, "grains of S that can press on each other without a load"]
 
     @property
     def bounded(self) -> Mask:
@@ -64,7 +65,7 @@ class Intervals(NamedTuple):
     @property
     def shortfall(self) -> str:
         """Which values could not be certified, and what to do; empty if all were."""
-        nan = np.isnan(self.low + self.high).any(axis=1)
+        nan = (np.isnan(self.low) | np.isnan(self.high)).any(axis=1)
         return "" if self.converged else uncertified(self.contacts[nan])
 
     def _repr_html_(self) -> str:
@@ -81,6 +82,8 @@ class Intervals(NamedTuple):
             whole = {"exact η3": measures.eta3(low, high)}
             lines |= whole if bounded.all() else {"of bounded contacts": len(extent)}
             lines |= {"mean ΔFₙ": extent.mean(), "largest ΔFₙ": extent.max()}
+        if len(self.wedged):
+            lines["wedged grains"] = brief_list(self.wedged.tolist())
         lines |= {"largest duality gap / ⟨fₙ⟩": self.max_gap, **self.counts}
         return notebook.table("Exact intervals over S", lines)
 
@@ -310,7 +313,17 @@ def _intervals(
     max_gap, converged = _judged(gap, accuracy)
     backbone = value[:, 0, 1] > CARRYING * ensemble.force_scale
     low, high = ordered(value[..., 0], value[..., 1], FLAT)
-    return Intervals(ensemble.index[places], low, high, gap, backbone, max_gap, converged, counts)
+    return Intervals(
+        ensemble.index[places],
+        low,
+        high,
+        gap,
+        backbone,
+        max_gap,
+        converged,
+        counts,
+        wedged(ensemble),
+    )
 
 
 @takes(Ensemble)

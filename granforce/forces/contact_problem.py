@@ -14,6 +14,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from granforce.forces import knowledge
+from granforce.forces.balance import left_open_in
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import Polygons
 from granforce.numerics import (
@@ -27,8 +28,9 @@ from granforce.numerics import (
 from granforce.numerics.contact_matrix import Network
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre
-from granforce.records import UnboundedError
+from granforce.records import UnboundedError, UndecidedError, brief_list
 from granforce.system import cancelling
+from granforce.system.wording import counted
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
 
@@ -206,6 +208,32 @@ def make_system(ensemble: Ensemble, *, unbounded: bool = False) -> certified_val
     if shared.system.grows is not None and not unbounded:
         raise UnboundedError(certificates.UNBOUNDED)
     return shared.system
+
+
+def wedged(ensemble: Ensemble) -> Integers:
+    """Grains that can press against each other without a load: wedged, if S is proved unbounded."""
+    if ensemble.has_pressure_row:
+        return np.zeros(0, dtype=np.int64)
+    try:
+        grows = make_system(ensemble, unbounded=True).grows
+    except (UndecidedError, UnboundedError):
+        grows = None
+    if grows is None:
+        return np.zeros(0, dtype=np.int64)
+    pairs = grows.mask[: 2 * len(ensemble.index)].reshape(-1, 2)
+    c = ensemble.contacts.picked(np.flatnonzero(pairs.any(axis=1)))
+    return np.setdiff1d(np.append(c.i, c.j), np.flatnonzero(left_open_in(ensemble.packing)))
+
+
+def prestress(grains: Integers) -> str:
+    """Words on wedged grains; empty without any."""
+    if not len(grains):
+        return ""
+    listed, some = brief_list(grains.tolist()), counted(len(grains), "grain is", "grains are")
+    return (
+        f"{some} wedged ({listed}, counted from 0): forces there can grow without a load, so that "
+        "rest assumes a prestress"
+    )
 
 
 def _new_system(ensemble: Ensemble) -> certified_values.System:

@@ -16,6 +16,7 @@ import numpy as np
 
 from granforce.fields import record
 from granforce.forces.build import ensemble_at
+from granforce.forces.contact_problem import wedged
 from granforce.forces.ensemble import Ensemble
 from granforce.motion import flow
 from granforce.motion.flow import Push
@@ -51,6 +52,9 @@ class Rest(NamedTuple):
         Floats, Field(ALL_CONTACTS, FORCE, "the network reached; while moving if grains move")
     ]
     reason: Annotated[str, "why it is not at rest; empty if it is"]
+    wedged: Annotated[
+        Integers, "grains that can press on each other without a load: rest assumes this prestress"
+    ]
 
 
 @cancelling.cancellable
@@ -110,7 +114,7 @@ def rest(
     if not first.at_rest:
         none = np.zeros((len(noise), draws), dtype=bool)
         why = "grains move under its own forces"
-        return Rest(False, np.nan, noise, none, _on_all(S, first.forces), why)
+        return Rest(False, np.nan, noise, none, _on_all(S, first.forces), why, wedged(S))
     rng = np.random.default_rng(random_seed(seed))
     starts = [
         _from(first.forces + level * rng.standard_normal(forces.shape))
@@ -123,7 +127,15 @@ def rest(
     distance = float(np.abs(first.forces - forces).max())
     why = _reason(noise, draws - stayed.sum(axis=1), draws)
     reasons = [reason for reason in (_elsewhere(S, distance), why) if reason]
-    return Rest(not reasons, distance, noise, stayed, _on_all(S, moving), "; ".join(reasons))
+    return Rest(
+        not reasons,
+        distance,
+        noise,
+        stayed,
+        _on_all(S, moving),
+        "; ".join(reasons),
+        wedged(S),
+    )
 
 
 def _elsewhere(S: Ensemble, distance: float) -> str:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
+from granforce.forces.contact_problem import wedged
 from granforce.forces.nearest import nearest
 from granforce.packing import polygons
 from granforce.packing.neighbours import find_pairs
@@ -46,6 +47,8 @@ from granforce.types import Floats, Integers, Mask
 # Gaps up to this many tolerances are reported as nearly touching; and, in the largest body, those
 # up to which pairs are named if nothing balances.
 _NEARLY, _MISSED = 100.0, 0.01
+# Most contacts up to which wedged bodies are named: beyond, the proof takes minutes.
+_MOST_NAMED = 1000
 
 
 class _Parts(NamedTuple):
@@ -104,7 +107,8 @@ def blocks(
     -------
     Packing
         Doubtful pairs are listed in info: corner_on_corner [i, j], which have no normal and no
-        contact, and nearly_touching [i, j, gap], up to 100 tolerances apart.
+        contact, and nearly_touching [i, j, gap], up to 100 tolerances apart. With a network,
+        wedged lists bodies that can press on each other without a load (up to 1000 contacts).
 
     Raises
     ------
@@ -173,10 +177,12 @@ def blocks(
     if not balanced:
         return packing
     try:
-        return with_network(packing)
+        packing = with_network(packing)
     except NotJammedError as error:
         legend = _legend(names) if "grains" in str(error) else ""
         raise NotJammedError(f"{error}{_missed(packing, names)}{legend}") from None
+    named = wedged(ensemble(packing)).tolist() if len(gap) <= _MOST_NAMED else []
+    return packing._replace(info=packing.info | {"wedged": named})
 
 
 def with_network(packing: Packing) -> Packing:

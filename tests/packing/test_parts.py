@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import linprog
 
 import granforce as gf
+from granforce.cli.entry_point import main
 from granforce.packing.masonry import rectangle
 from granforce.study.kinds.packings import imported_parameters
 from granforce.study.schema import dataset_packing, packing_dataset
@@ -246,3 +247,27 @@ def test_what_are_no_parts_in_a_file_is_one_line(change, words):
     with pytest.raises(gf.InputError, match=words) as refused:
         gf.read_blocks(io.StringIO(text.replace(*change)), mu=0.5)
     assert "\n" not in str(refused.value)
+
+
+def test_wedged_bodies_are_named_everywhere(tmp_path, capsys):
+    """Two stones between fixed walls, beside one that stands free."""
+    stones = [rectangle(0, 0, 1, 1), rectangle(1, 0, 2, 1), [[5, 0], [6, 0], [5.5, 1]]]
+    fixed = [rectangle(-1, -1, 0, 2), rectangle(2, -1, 3, 2), rectangle(4, -1, 7, 0)]
+    packing = gf.blocks([*stones, *fixed], 0.6, fixed=[3, 4, 5])
+    assert packing.info["wedged"] == [0, 1]
+    S = gf.ensemble(packing)
+    exact = gf.intervals(S, [int(S.index[-1])])
+    assert exact.wedged.tolist() == gf.rest(S).wedged.tolist() == [0, 1]
+    assert gf.intervals(gf.ensemble(gf.scene("groove", 0.9))).wedged.size == 0
+    gf.save_packing(packing, tmp_path / "wedged.npz")
+    words = "2 grains are wedged (0, 1, counted from 0)"
+    for command in ("intervals", "rest"):
+        store = ["--cache", str(tmp_path / "store")] if command == "intervals" else []
+        assert main([command, str(tmp_path / "wedged.npz"), *store]) == 0
+        assert words in capsys.readouterr().err
+    bodies = [
+        {"corners": np.array(body).tolist(), "fixed": k > 2}
+        for k, body in enumerate([*stones, *fixed])
+    ]
+    read = gf.read_blocks(io.StringIO(json.dumps({"bodies": bodies})), mu=0.6)
+    assert words in read.info["notes"][0]

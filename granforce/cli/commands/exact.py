@@ -24,6 +24,7 @@ from granforce.explore.intervals import Intervals, LimitLoads, uncertified
 from granforce.explore.stress_outline import StressOutline, stress_inside
 from granforce.forces.balance import left_open_in
 from granforce.forces.build import ensemble
+from granforce.forces.contact_problem import prestress
 from granforce.labelled import from_store, labelled_dataset
 from granforce.motion import rest as motion
 from granforce.packing import importers
@@ -118,6 +119,10 @@ def intervals(arguments: argparse.Namespace) -> None:
     with report_after(lines, arguments.json, listed(bounds)):
         if arguments.out is not None:
             write_table(arguments.out, bounds)
+    if len(growing := dataset["backbone"].values[np.isinf(high[:, 0])]):
+        packing, _ = get_packing(arguments.store, result.parameters["packing"])
+        ends = np.append(packing.contacts.i[growing], packing.contacts.j[growing])
+        print_notes([prestress(np.setdiff1d(ends, np.flatnonzero(left_open_in(packing))))])
     if len(left):
         print_notes([uncertified(left)])
 
@@ -188,7 +193,10 @@ def rest(arguments: argparse.Namespace) -> None:
     lines |= {name: float(check(S.original)) for name, check in checked.items()}
     lines |= {"distance_to_rest": result.distance, "noise": list(result.noise)}
     lines |= {"draws_at_rest": result.stayed.sum(axis=1).tolist(), "draws": result.stayed.shape[1]}
+    lines |= {"wedged_grains": result.wedged.tolist()} if len(result.wedged) else {}
     print_report(lines, arguments.json)
+    if len(result.wedged):
+        print_notes([prestress(result.wedged)])
 
 
 def stress(arguments: argparse.Namespace) -> None:

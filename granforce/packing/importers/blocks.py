@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from granforce.forces.contact_problem import prestress
 from granforce.packing.assemblies import areas, blocks, nearly_touching
 from granforce.packing.importers.notes import packing_noted, with_notes
 from granforce.packing.importers.text import Source, Table, csv_table, read_text
@@ -104,6 +105,8 @@ def _notes(packing: Packing) -> list[str]:
         notes.append(f"{pairs} corner on corner, which is no contact")
     if near := packing.info["nearly_touching"]:
         notes.append(nearly_touching([gap for _, _, gap in near], packing.info["tolerance"]))
+    if words := prestress(np.array(packing.info["wedged"])):
+        notes.append(words)
     return notes
 
 
