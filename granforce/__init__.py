@@ -84,6 +84,8 @@ _BY_QUESTION = {
     "What is known and measured": {
         "Known": "forces.knowledge",
         "read_known": "packing.importers",
+        "grain_pressures": "forces.grain_pressures",
+        "GrainPressures": "forces.grain_pressures",
         "infer": "experiment.infer",
         "Inference": "experiment.infer",
         "Draws": "experiment.infer",

@@ -53,6 +53,8 @@ from granforce.explore.volume import volume as volume
 from granforce.figures.picture import plot as plot
 from granforce.forces.build import ensemble as ensemble
 from granforce.forces.ensemble import Ensemble as Ensemble
+from granforce.forces.grain_pressures import GrainPressures as GrainPressures
+from granforce.forces.grain_pressures import grain_pressures as grain_pressures
 from granforce.forces.knowledge import Known as Known
 from granforce.forces.nearest import nearest as nearest
 from granforce.forces.nearest import nearest_of_many as nearest_of_many

@@ -109,6 +109,10 @@ QUANTITIES = {
     "sigma": Field("contact component", FORCE, "standard errors of measured forces"),
     "inferred": Field("contact component", FORCE, "likeliest admissible network"),
     "deviation": Field("contact component", "", "(inferred − measured)/σ"),
+    "measured_pressure": Field("grain", "force/length", "measured pressures of grains"),
+    "pressure_sigma": Field("grain", "force/length", "their standard errors"),
+    "pressure_deviation": Field("grain", "", "(pressure − measured)/σ, NaN if not measured"),
+    "suspect_grain": whole("beyond_grain", "grains beyond 3 σ"),
     "expected": Field("contact component", FORCE, "mean of the draws"),
     "standard_error": Field("contact component", FORCE, "standard deviation of the draws"),
     "least_normal": Field(

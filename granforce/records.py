@@ -213,6 +213,16 @@ class Packing(NamedTuple):
         return float(np.prod(self.box))
 
     @property
+    def areas(self) -> Floats:
+        """Areas (N,) of the grains, length²."""
+        areas = np.pi * self.r**2
+        for body, corners in enumerate(() if self.shapes is None else self.shapes.polygons()):
+            if len(corners):
+                x, y = (corners - corners.mean(axis=0)).T
+                areas[body] = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return areas
+
+    @property
     def packing_fraction(self) -> float:
         """φ = Σ π r² / V, including rattlers; NaN in an open box."""
         return float(np.pi * np.sum(self.r**2) / self.volume) if self.volume < np.inf else np.nan

@@ -4,9 +4,10 @@ A measurement gives components m of forces with standard errors σ. The network 
 
     χ² = Σ ((f − m)/σ)²
 
-is the most likely one, and S weighted with exp(−χ²/2) is a normal distribution truncated by the
-walls of S: the distribution of the forces given the measurement, balance and Coulomb's law. Draws
-from it give the standard error of every force, including those that were not measured.
+over them, and over measured pressures of grains (`grain_pressures`), is the most likely one. S
+weighted with exp(−χ²/2) is a normal distribution truncated by the walls of S: the distribution of
+the forces given the measurement, balance and Coulomb's law. Draws from it give the standard error
+of every force, including those that were not measured.
 """
 
 from __future__ import annotations
@@ -25,9 +26,10 @@ from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import GrainPressures, Rows, rows_of
 from granforce.forces.likeliest import Likeliest, checked, likeliest, spread_of
 from granforce.quantities import quantity
-from granforce.records import random_seed, takes, whole, worker_count
+from granforce.records import InputError, random_seed, takes, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.types import Cancel, Floats, Integers, Progress
@@ -76,7 +78,9 @@ class Inference(NamedTuple):
     chi_square: Annotated[float, quantity("chi_square", note="Σ ((f − m)/σ)²")]
     freedom: Annotated[int, quantity("freedom")]
     deviation: Annotated[Floats, quantity("deviation", unit="sigma", note="NaN if not measured")]
+    pressure_deviation: Annotated[Floats, quantity("pressure_deviation", label="")]
     suspects: Annotated[Integers, quantity("suspect", label="", note="largest first")]
+    suspect_grains: Annotated[Integers, quantity("suspect_grain", label="", note="largest first")]
     residual: Annotated[float, quantity("residual", "")]
     violation: Annotated[float, quantity("violation", "")]
     draws: Annotated[Draws | None, "None if none were requested"]
@@ -112,9 +116,11 @@ class Inference(NamedTuple):
         """The inference as displayed in notebooks."""
         lines = {
             "measured components": int(np.isfinite(self.deviation).sum()),
+            "measured pressures": int(np.isfinite(self.pressure_deviation).sum()),
             "χ²": self.chi_square,
             "degrees of freedom": self.freedom,
             "contacts beyond 3 σ": len(self.suspects),
+            "grains beyond 3 σ": len(self.suspect_grains),
         }
         if self.draws is not None:
             lines |= {"draws": len(self.draws.flat), "mean standard error": self.error.mean()}
@@ -126,9 +132,10 @@ class Inference(NamedTuple):
 @cancelling.cancellable
 def infer(
     ensemble: Ensemble,
-    measured: npt.ArrayLike,
-    sigma: npt.ArrayLike,
+    measured: npt.ArrayLike | None = None,
+    sigma: npt.ArrayLike | None = None,
     *,
+    pressures: GrainPressures | None = None,
     states: int = 0,
     seed: int = 0,
     unmeasured: float | None = None,
@@ -143,10 +150,13 @@ def infer(
     ----------
     ensemble : Ensemble
         S.
-    measured : (N_c, 2) array
+    measured : (N_c, 2) array, optional
         m, force, of the contacts of S; NaN for components that were not measured.
-    sigma : float, (2,) or (N_c, 2) array
+    sigma : float, (2,) or (N_c, 2) array, optional
         Standard errors σ, force: one, two for f_n and f_t, or one for each component.
+    pressures : GrainPressures, optional
+        Measured pressures p_g = (1/2A_g) Σ f_n a of grains, which count in χ² likewise. Forces that
+        are not in the packing may press on grains whose balance is left open: these have none.
     states : int, default 0
         Minimum number of draws from the normal distribution of the measurement truncated by S, for
         error bars.
@@ -174,7 +184,7 @@ def infer(
     Raises
     ------
     InputError
-        For inconsistent shapes and σ ≤ 0.
+        For inconsistent shapes, σ ≤ 0, or without any measurement.
     NotJammedError
         If S is empty.
     Cancelled
@@ -185,14 +195,15 @@ def infer(
     unmeasured = spread_of(ensemble, unmeasured)
     numbers = checked_numbers(ensemble, numbers)
     m, s = checked(ensemble, measured, sigma)
-    best = likeliest(ensemble, m, s, unmeasured)
+    rows = measured_rows(ensemble, measured, pressures)
+    best = likeliest(ensemble, m, s, unmeasured, rows)
     draws = None
     if numbers[0]:
         # In ⟨f_n⟩, so that χ² = Σ W (f − m)².
         m, s = m / ensemble.force_scale, s / ensemble.force_scale
         weight = np.where(np.isnan(m), unmeasured, s) ** -2.0
-        draws = _draws(ensemble, weight, np.nan_to_num(m), numbers, seed, progress)
-    return inference_of(Inference, ensemble, best, draws, begin)
+        draws = _draws(ensemble, weight, np.nan_to_num(m), rows, numbers, seed, progress)
+    return inference_of(Inference, ensemble, best, rows, draws, begin)
 
 
 def checked_numbers(
@@ -205,20 +216,47 @@ def checked_numbers(
     return draws, chains, workers
 
 
+def measured_rows(ensemble: Ensemble, measured: Any, pressures: GrainPressures | None) -> Rows:
+    """The Rows of pressures; InputError if neither forces nor pressures were measured."""
+    if measured is None and pressures is None:
+        raise InputError(
+            "nothing was measured: give forces of contacts with their errors, or pressures="
+            "gf.GrainPressures(grains, values, sigma)"
+        )
+    return rows_of(ensemble, pressures)
+
+
 def inference_of(
-    kind: type[Kind], ensemble: Ensemble, best: Likeliest, draws: Draws | None, begin: float
+    kind: type[Kind],
+    ensemble: Ensemble,
+    best: Likeliest,
+    rows: Rows,
+    draws: Draws | None,
+    begin: float,
 ) -> Kind:
     """The Inference (or a subclass) with a likeliest network, draws, and elapsed time."""
-    far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
-    beyond = np.flatnonzero(far > SUSPECT)
+    of_grains = np.full(len(ensemble.packing.r), np.nan)
+    of_grains[rows.grains] = best.of_rows
     return kind(
-        *best,
-        ensemble.index[beyond[np.argsort(-far[beyond], kind="stable")]],
+        best.forces,
+        best.chi_square,
+        best.freedom,
+        best.deviation,
+        of_grains,
+        ensemble.index[_beyond(np.nan_to_num(best.deviation).T)],
+        _beyond(np.nan_to_num(of_grains[None])),
         ensemble.residual(best.forces),
         ensemble.violation(best.forces),
         draws,
         time.perf_counter() - begin,
     )
+
+
+def _beyond(deviation: Floats) -> Integers:
+    """Positions with a deviation (parts, k) beyond SUSPECT, the largest first."""
+    far = np.abs(deviation).max(axis=0)
+    beyond = np.flatnonzero(far > SUSPECT)
+    return beyond[np.argsort(-far[beyond], kind="stable")]
 
 
 def judged(
@@ -239,12 +277,13 @@ def _draws(
     ensemble: Ensemble,
     weight: Floats,
     m: Floats,
+    rows: Rows,
     numbers: tuple[int, int, int],
     seed: int,
     progress: Progress | None,
 ) -> Draws:
     begin, (states, chains, workers) = time.perf_counter(), numbers
-    polytope = walls(ensemble, weight, m)
+    polytope = walls(ensemble, weight, m, rows)
     stores, advance = uniform.stores_for(polytope, chains, workers), partial(step, polytope)
     ready = time.perf_counter()
     ends = uniform.start_chains(polytope, chains, seed)
@@ -296,8 +335,8 @@ def step(
 def _drawn(polytope: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
     """Speeds (count, walls) with covariance K, and errors (count, walls) of companions."""
     push, error = (np.empty((count, polytope.count)) for _ in range(2))
-    pull = np.empty((count, polytope.root.size))
+    pull = np.empty((count, polytope.pulls.shape[1]))
     for path in range(count):
         push[path], error[path] = rng.standard_normal((2, polytope.count))
-        pull[path] = polytope.root * rng.standard_normal(polytope.root.size)
-    return polytope.moved(push, pull), error
+        pull[path] = rng.standard_normal(pull.shape[1])
+    return polytope.moved(push, (polytope.pulls @ pull.T).T), error

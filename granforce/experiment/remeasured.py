@@ -20,11 +20,18 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from granforce.experiment.infer import Inference, checked_numbers, inference_of, judged
+from granforce.experiment.infer import (
+    Inference,
+    checked_numbers,
+    inference_of,
+    judged,
+    measured_rows,
+)
 from granforce.explore.mixing import Mixing
 from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import checked, fitted_many, likeliest, spread_of
+from granforce.forces.grain_pressures import GrainPressures, Rows
+from granforce.forces.likeliest import checked, fitted, fitted_many, likeliest, spread_of
 from granforce.numerics.lanes import LANES
 from granforce.quantities import quantity
 from granforce.records import random_seed, takes
@@ -64,9 +71,10 @@ class Remeasured(Inference):
 @cancelling.cancellable
 def remeasured(
     ensemble: Ensemble,
-    measured: npt.ArrayLike,
-    sigma: npt.ArrayLike,
+    measured: npt.ArrayLike | None = None,
+    sigma: npt.ArrayLike | None = None,
     *,
+    pressures: GrainPressures | None = None,
     states: int = 200,
     seed: int = 0,
     unmeasured: float | None = None,
@@ -82,7 +90,7 @@ def remeasured(
 
     Parameters
     ----------
-    ensemble, measured, sigma, seed, chains, progress, cancel
+    ensemble, measured, sigma, pressures, seed, chains, progress, cancel
         As for `infer`.
     states : int, default 200
         Number of draws.
@@ -108,21 +116,23 @@ def remeasured(
     unmeasured = spread_of(ensemble, unmeasured, UNMEASURED)
     numbers = checked_numbers(ensemble, numbers, least=1)
     m, s = checked(ensemble, measured, sigma)
-    best = likeliest(ensemble, m, s, unmeasured)
+    rows = measured_rows(ensemble, measured, pressures)
+    best = likeliest(ensemble, m, s, unmeasured, rows)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
-    repeated = _repeated(ensemble, best.forces, width, *numbers, seed, progress)
+    repeated = _repeated(ensemble, best.forces, width, rows, *numbers, seed, progress)
     # The draws are independent, so mixing is not diagnosed.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
     draws = judged(ensemble, repeated, worth, True, counts, 0.0, time.perf_counter() - ready)
-    return inference_of(Remeasured, ensemble, best, draws, begin)
+    return inference_of(Remeasured, ensemble, best, rows, draws, begin)
 
 
 def _repeated(
     ensemble: Ensemble,
     forces: Floats,
     s: Floats,
+    rows: Rows,
     states: int,
     chains: int,
     workers: int,
@@ -132,12 +142,21 @@ def _repeated(
     """Networks (chains, k, N_c, 2) from repeated measurements, at least `states` in all."""
     each = -(-states // chains)
     streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(chains))
-    errors = np.stack([rng.standard_normal((each, *s.shape)) for rng in streams])
-    measurements = (forces + s * errors).reshape(-1, *s.shape)
-    batches = [measurements[k : k + LANES] for k in range(0, len(measurements), LANES)]
+    drawn = [rng.standard_normal((each, s.size + len(rows.values))) for rng in streams]
+    errors, of_rows = np.split(np.concatenate(drawn), [s.size], axis=1)
+    measurements = forces + s * errors.reshape(-1, *s.shape)
+    sums = rows.matrix @ forces.ravel() + rows.sigma * of_rows
+    width = 1 if len(rows.values) else LANES
     done, draws = 0, []
+
+    def fit(first: int) -> Floats:
+        if not len(rows.values):
+            return fitted_many(ensemble, measurements[first : first + width], s)
+        again = rows._replace(values=sums[first])
+        return fitted(ensemble, measurements[first], s, rows=again)[None]
+
     with cancelling.threads(workers) as pool:
-        for networks in pool.map(lambda batch: fitted_many(ensemble, batch, s), batches):
+        for networks in pool.map(fit, range(0, len(measurements), width)):
             draws.append(networks)
             done += len(networks)
             if progress is not None:

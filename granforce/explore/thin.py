@@ -9,7 +9,7 @@ forces L w of slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from granforce.numerics.lanes import LANES
 from granforce.system import cancelling
@@ -68,11 +68,13 @@ def basis(balance: Floats, dimension: int) -> Basis:
     return Basis(right[len(right) - dimension :].T, inverse)
 
 
-def thin_matrix(basis: Basis, y: Floats, levers: Floats, weight: Floats, count: int) -> ThinMatrix:
-    """The ThinMatrix at y (w,), which may be as small as FLAT; weight (2 N_c,): W on levers."""
+def thin_matrix(
+    basis: Basis, y: Floats, levers: Floats, weight: sparse.csr_matrix, count: int
+) -> ThinMatrix:
+    """The ThinMatrix at y (w,), which may be as small as FLAT; weight (2 N_c, 2 N_c): W."""
     null = cancelling.apart(_orthonormal, basis.free / y[:, None])
     along = levers @ null
-    H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
+    H = np.eye(null.shape[1]) + np.asarray(along.T @ (weight @ along), dtype=np.float64)
     root = np.linalg.solve(np.linalg.cholesky(H), null.T).T
     return ThinMatrix(null, root, levers, basis.inverse / y[:, None], count)
 

@@ -11,13 +11,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from granforce.explore import thin
 from granforce.explore.billiard import BLOCK
+from granforce.explore.row_matrix import RowMatrix, with_rows
 from granforce.explore.thin import ThinMatrix
 from granforce.forces import hull
 from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import Rows, no_rows
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
@@ -30,16 +33,18 @@ _MOST_NEWTON_STEPS = 200
 # Newton's decrement at the centre, which only has to make S round.
 _NEAR_CENTRE = 1e-3
 
+Matrix = WallMatrix | RowMatrix | ThinMatrix
+
 
 class Walls(NamedTuple):
     """y = centre; y[moving] *= s. Walls beyond `moving` are padding with s = 1."""
 
     centre: Floats  # (n,) y°, coordinates of `Ensemble.scaled_form`
     moving: Integers  # (w,) positions in y of coordinates that vary in S
-    matrix: WallMatrix | ThinMatrix  # K of all `count` walls; thin if S is too thin for pivots
+    matrix: Matrix  # K of all `count` walls; thin if S is too thin for pivots
     dimension: int  # h of the affine hull of S
-    pull: Floats  # (2 N_c,) W (m − f°), the pull of a measurement; 0 without one
-    root: Floats  # (2 N_c,) √W
+    pull: Floats  # (2 N_c,) Xᵀ W (m − X f°), the pull of measured sums X f; 0 without a measurement
+    pulls: sparse.csr_matrix  # (2 N_c, 2 N_c + k) Xᵀ √W
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
 
     @property
@@ -71,26 +76,29 @@ class Walls(NamedTuple):
 # Overflows in steps from an invalid centre are detected by its sign.
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")
 def walls(
-    ensemble: Ensemble, weight: Floats | float = 0.0, measured: Floats | float = 0.0
+    ensemble: Ensemble,
+    weight: Floats | float = 0.0,
+    measured: Floats | float = 0.0,
+    rows: Rows | None = None,
 ) -> Walls:
     """The Walls of an ensemble.
 
     weight, measured (N_c, 2): W and m in ⟨f_n⟩ for the centre of exp(−½ Σ W (f − m)²) truncated by
     the walls, which has the largest Σ log y − ½ Σ W (f − m)², instead of the analytic centre; K
-    then has W in its stiffness.
+    then has W in its stiffness. rows: measured sums of forces, which count likewise.
 
     Raises NotJammedError if S is empty, UnboundedError if it is proved to be unbounded,
     UndecidedError if no solver could decide, or S is thinner than rounding.
     """
     y = ensemble.hull.inner
-    setup = _setup(ensemble, weight, measured)
+    setup = _setup(ensemble, weight, measured, rows or no_rows(ensemble))
     centre = _centred(setup, y, _matrix)
     # Without the lost rows no centre may be found, or a wrong one.
     matrix_at: _MatrixAt = _matrix
     if _is_thin(setup, y if centre is None else centre):
         matrix_at = _Thin(setup)
         centre = _centred(setup, y, matrix_at)
-    if centre is None and np.any(weight):
+    if centre is None and setup.weight.any():
         raise UndecidedError(
             "no centre of the measurement was found: its errors are too small, or too different "
             "from each other; use larger errors"
@@ -114,17 +122,14 @@ class _Setup(NamedTuple):
     normal: Floats  # (n, 2) change of each coordinate per unit f_n, f_t/μ
     held: Mask  # (n,) bool
     stiff: Floats  # (N_c, 2) W, of f_n and f_t/μ; PINNED for known forces
-    target: Floats  # (N_c, 2) m, f_t/μ
+    levers: sparse.csr_matrix  # X (2 N_c + k, 2 N_c): the measured sums X f, single forces first
+    weight: Floats  # (2 N_c + k,) W of each, 0 for known forces
+    target: Floats  # (2 N_c + k,) m
 
     @property
     def cones(self) -> int:
         """Number of coordinates of the cones; those of known bounds come after."""
         return self.ensemble.per_contact * len(self.stiff)
-
-    @property
-    def weight(self) -> Floats:
-        """W (N_c, 2), 0 for known forces."""
-        return np.where(self.stiff < PINNED, self.stiff, 0.0)
 
     @property
     def known(self) -> Floats:
@@ -143,15 +148,21 @@ class _Setup(NamedTuple):
         return 0.5 * np.stack([pairs.sum(axis=1), pairs[:, 0] - pairs[:, 1]], axis=1)
 
     def pull(self, y: Floats) -> Floats:
-        """W (m − f) (2 N_c,)."""
-        return (self.weight * (self.target - self.forces(y))).ravel()
+        """Xᵀ W (m − X f) (2 N_c,)."""
+        lacking = self.target - self.levers @ self.forces(y).ravel()
+        return self.levers.T @ (self.weight * lacking)
 
 
-def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float) -> _Setup:
-    contacts, unit = len(ensemble.index), ensemble.units
+def _setup(
+    ensemble: Ensemble, weight: Floats | float, measured: Floats | float, rows: Rows
+) -> _Setup:
+    contacts, unit, scale = len(ensemble.index), ensemble.units, ensemble.force_scale
     stiff, target = np.empty((2, contacts, 2))
     stiff[:], target[:] = weight * unit**2, measured / unit
     stiff = np.maximum(stiff, hull.pinned_stiffness(ensemble))
+    sums = sparse.diags(scale / rows.sigma) @ rows.matrix @ sparse.diags(unit.ravel())
+    levers = sparse.vstack([sparse.identity(2 * contacts), sums], format="csr")
+    single = np.where(stiff < PINNED, stiff, 0.0).ravel()
     problem, affine_hull = independent_problem_of(ensemble), ensemble.hull
     contact, normal = hull.normals(ensemble)
     setup = _Setup(
@@ -161,7 +172,9 @@ def _setup(ensemble: Ensemble, weight: Floats | float, measured: Floats | float)
         normal=normal,
         held=affine_hull.held,
         stiff=stiff,
-        target=target,
+        levers=levers,
+        weight=np.append(single, np.ones(len(rows.sigma))),
+        target=np.append(target, rows.values / rows.sigma),
     )
     if affine_hull.held.any():
         C, _, _ = setup.conductances(_barrier(setup, affine_hull.inner), stiff)
@@ -176,7 +189,7 @@ def _barrier(setup: _Setup, y: Floats) -> Floats:
     return np.where(setup.held, 1.0, y) ** -2.0
 
 
-def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
+def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix | RowMatrix, Integers]:
     """(K at y, positions of its walls in y)."""
     curvature = _barrier(setup, y)
     C, _, free = setup.conductances(curvature, setup.stiff)
@@ -187,17 +200,21 @@ def _matrix(setup: _Setup, y: Floats) -> tuple[WallMatrix, Integers]:
     normal = np.vstack([setup.normal[moving] / y[moving, None], np.zeros((padding, 2))])
     problem = setup.problem
     factors, _ = wall_matrix.factored(problem.network, C, problem.diagonal, 0.0)
-    return WallMatrix(problem.network, contact, normal, C, conductances, factors), moving
+    matrix = WallMatrix(problem.network, contact, normal, C, conductances, factors)
+    rows = slice(2 * len(C), None)
+    if not len(setup.weight[rows]):
+        return matrix, moving
+    return with_rows(matrix, problem.diagonal, setup.levers[rows], setup.weight[rows]), moving
 
 
-def _rest(setup: _Setup, y: Floats) -> tuple[Floats, Floats]:
+def _rest(setup: _Setup, y: Floats) -> Floats:
     """Unbalance b − A f of y, in the rows of the problem and the global rows."""
     S, problem = setup.ensemble, setup.problem
     forces = setup.forces(y) * S.units
     rest = np.zeros(len(problem.b) + len(problem.b_border))
     rest[problem.place] = S.b / S.force_scale - S.A @ S.to_vector(forces)
     rest[: len(problem.b)] *= problem.diagonal == 0
-    return rest[: len(problem.b)], rest[len(problem.b) :]
+    return rest
 
 
 class _Thin:
@@ -211,24 +228,22 @@ class _Thin:
     def __call__(self, setup: _Setup, y: Floats) -> tuple[ThinMatrix, Integers]:
         moving = self.moving
         count = len(moving) + -len(moving) % BLOCK
-        levers = np.array([setup.forces(one).ravel() for one in np.diag(y)[moving]]).T
-        weight = setup.weight.ravel()
-        return thin.thin_matrix(self.basis, y[moving], levers, weight, count), moving
+        forces = np.array([setup.forces(one).ravel() for one in np.diag(y)[moving]]).T
+        stiff = setup.levers.T @ sparse.diags(setup.weight) @ setup.levers
+        return thin.thin_matrix(self.basis, y[moving], forces, stiff, count), moving
 
 
-def _balanced(
-    setup: _Setup, y: Floats, matrix: WallMatrix | ThinMatrix, moving: Integers
-) -> Floats:
+def _balanced(setup: _Setup, y: Floats, matrix: Matrix, moving: Integers) -> Floats:
     """y, corrected to balance."""
     if isinstance(matrix, ThinMatrix):
         A, _, _ = setup.ensemble.scaled_form
         lacking = matrix.inverse @ (setup.ensemble.hull.b - A @ y)
     else:
-        lacking = wall_matrix.balancing(matrix, *_rest(setup, y))[: len(moving)]
+        lacking = matrix.balancing(_rest(setup, y))[: len(moving)]
     return _shifted(y, moving, lacking)
 
 
-_MatrixAt = Callable[[_Setup, Floats], tuple[WallMatrix | ThinMatrix, Integers]]
+_MatrixAt = Callable[[_Setup, Floats], tuple[Matrix, Integers]]
 
 
 def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
@@ -283,7 +298,8 @@ def _centred(
             for _ in range(POLISH):
                 y = _balanced(setup, y, matrix, moving)
             return y
-        slope, curve = float(pull @ change.ravel()), float(np.sum(setup.weight * change**2))
+        slope = float(pull @ change.ravel())
+        curve = float(setup.weight @ (setup.levers @ change.ravel()) ** 2)
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
@@ -305,7 +321,7 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
 def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
     """The Walls around y."""
     ensemble = setup.ensemble
-    matrix: WallMatrix | ThinMatrix
+    matrix: Matrix
     if isinstance(matrix_at, _Thin):
         matrix, moving = matrix_at(setup, y)
         h = matrix.null.shape[1]
@@ -318,11 +334,12 @@ def _walls(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Walls:
         plain = np.maximum(known, ensemble.units**2)
         units = _shape(setup, np.zeros_like(y), plain)[1] - shape
         matrix, moving = _matrix(setup, y)
-        # A copy, or changes to a sample's matrix would change the ensemble's.
-        matrix = matrix._replace(network=copy.deepcopy(matrix.network))
+        if isinstance(matrix, WallMatrix):
+            # A copy, or changes to a sample's matrix would change the ensemble's.
+            matrix = matrix._replace(network=copy.deepcopy(matrix.network))
         matrix = wall_matrix.restored(matrix)
-    root = np.sqrt(setup.weight).ravel()
-    return Walls(y, moving, matrix, h, setup.pull(y), root, units)
+    pulls = sparse.csr_matrix(setup.levers.T @ sparse.diags(np.sqrt(setup.weight)))
+    return Walls(y, moving, matrix, h, setup.pull(y), pulls, units)
 
 
 def _shape(setup: _Setup, curvature: Floats, stiff: Floats) -> tuple[int, float]:

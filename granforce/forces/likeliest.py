@@ -1,7 +1,7 @@
 """The most likely admissible network given measured forces m with standard errors σ.
 
 It minimises χ² = Σ ((f − m)/σ)² over S, as a contact program with weights 1/σ² for each component
-(`contact_program`).
+(`contact_program`). Measured pressures of grains weigh sums of forces; PIQP minimises their χ².
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from granforce.forces.contact_problem import forces_of, problem_of
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import Rows, no_rows
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import likeliest_piqp
 from granforce.numerics import certificates, contact_program, interior_point
 from granforce.numerics.contact_program import PINNED
+from granforce.numerics.highs import symmetric_factor
 from granforce.numerics.interior_point import OPTIMUM
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import InputError, positive
@@ -50,6 +51,7 @@ class Likeliest(NamedTuple):
     chi_square: float  # its Σ ((f − m)/σ)²
     freedom: int  # degrees of freedom: measured components less directions of S it can follow
     deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
+    of_rows: Floats  # (k,) the same of Rows
 
 
 def spread_of(ensemble: Ensemble, given: float | None, bounded: float = UNMEASURED) -> float:
@@ -64,14 +66,16 @@ def spread_of(ensemble: Ensemble, given: float | None, bounded: float = UNMEASUR
 
 def likeliest(
     ensemble: Ensemble,
-    measured: npt.ArrayLike,
-    sigma: npt.ArrayLike,
+    measured: npt.ArrayLike | None,
+    sigma: npt.ArrayLike | None,
     unmeasured: float = UNMEASURED,
+    rows: Rows | None = None,
 ) -> Likeliest:
     """The network of S with the least Σ ((f − m)/σ)²; a Likeliest.
 
     measured, sigma: m and σ as `checked` takes them. unmeasured: standard error, in ⟨f_n⟩, with
-    which components that were not measured count as 0; they are not part of χ².
+    which components that were not measured count as 0; they are not part of χ². rows: measured sums
+    of forces.
 
     Raises InputError as `checked` does, NotJammedError where S is empty.
     """
@@ -79,22 +83,28 @@ def likeliest(
     if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
         words = f"must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}"
         raise InputError.of("unmeasured", unmeasured, words)
-    forces = fitted(ensemble, m, s, unmeasured)
-    deviation = (forces - m) / s
-    freedom = int(np.isfinite(deviation).sum()) - _adapted(ensemble, m, forces)
-    return Likeliest(forces, float(np.nansum(deviation**2)), freedom, deviation)
+    rows = rows or no_rows(ensemble)
+    forces = fitted(ensemble, m, s, unmeasured, rows)
+    deviation, of_rows = (forces - m) / s, rows.deviation(forces)
+    measured_numbers = int(np.isfinite(deviation).sum()) + len(of_rows)
+    freedom = measured_numbers - _adapted(ensemble, m, forces, rows)
+    chi_square = float(np.nansum(deviation**2) + of_rows @ of_rows)
+    return Likeliest(forces, chi_square, freedom, deviation, of_rows)
 
 
 def checked(
-    ensemble: Ensemble, measured: npt.ArrayLike, sigma: npt.ArrayLike
+    ensemble: Ensemble, measured: npt.ArrayLike | None, sigma: npt.ArrayLike | None
 ) -> tuple[Floats, Floats]:
     """m and σ (N_c, 2), NaN in both where nothing was measured.
 
-    measured (N_c, 2), force; sigma likewise, or one number, or two for f_n and f_t. Raises
+    measured (N_c, 2), force; sigma likewise, or one number, or two for f_n and f_t; None for both
+    if no force was measured. Raises
     InputError for shapes that do not fit, infinite numbers, σ ≤ 0, and sizes beyond MEASURED or
     ERRORS.
     """
     shape = (len(ensemble.index), 2)
+    if measured is None and sigma is None:
+        measured = sigma = np.full(shape, np.nan)
     try:
         m = np.array(measured, dtype=np.float64)
         s = np.array(np.broadcast_to(np.asarray(sigma, dtype=np.float64), shape))
@@ -127,9 +137,17 @@ def checked(
     return m, s
 
 
-def fitted(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float = UNMEASURED) -> Floats:
+def fitted(
+    ensemble: Ensemble,
+    m: Floats,
+    s: Floats,
+    unmeasured: float = UNMEASURED,
+    rows: Rows | None = None,
+) -> Floats:
     """The forces (N_c, 2) of `likeliest`, for m and σ that were checked."""
-    return fitted_many(ensemble, m[None], s, unmeasured)[0]
+    if rows is None or not len(rows.values):
+        return fitted_many(ensemble, m[None], s, unmeasured)[0]
+    return _by_piqp(ensemble, m, s, unmeasured, rows)
 
 
 def fitted_many(
@@ -179,8 +197,15 @@ def _otherwise(
     if relaxed is not None and relaxed.converged and relaxed.residual <= BALANCED:
         if np.abs(relaxed.forces - forces).max() <= _NEAR * ensemble.force_scale:
             return relaxed.forces
+    return _by_piqp(ensemble, m, s, unmeasured)
+
+
+def _by_piqp(
+    ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float, rows: Rows | None = None
+) -> Floats:
+    """The most likely network by PIQP; the error that can be proved if there is none."""
     spread = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
-    forces = likeliest_piqp(ensemble, 1 / spread, m)
+    forces = likeliest_piqp(ensemble, 1 / spread, m, rows)
     if ensemble.admits(forces):
         return forces
     if ensemble.member is not None and ensemble.dimension == 0:
@@ -188,19 +213,20 @@ def _otherwise(
     raise certificates.why_unsolved(*ensemble.scaled_form[:2], slack=ensemble.slack)
 
 
-def _adapted(ensemble: Ensemble, m: Floats, forces: Floats) -> int:
+def _adapted(ensemble: Ensemble, m: Floats, forces: Floats, rows: Rows) -> int:
     """Dimensions in which the measured part of a network could follow the measurement.
 
-    The rank of the measured components on the null space of the balance, with cone coordinates held
-    that are 0 there.
+    The rank of the measured components and rows on the null space of the balance, with cone
+    coordinates held that are 0 there.
     """
     free = np.flatnonzero(ensemble.coordinates(forces) > _ON_THE_WALL)
     A, _, T = ensemble.scaled_form
+    sums = sparse.csr_matrix(rows.unknowns(ensemble) @ T)[:, free]
     A, T = sparse.csc_matrix(A)[:, free], sparse.csr_matrix(T)[:, free]
     T = T[np.flatnonzero(np.isfinite(ensemble.to_vector(m)))]
     if ensemble.mu > 0:
         T.data = np.sign(T.data)  # a rank does not depend on units
-    return _rank(sparse.vstack([A, T], format="csr")) - _rank(A)
+    return _rank(sparse.vstack([A, T, sums], format="csr")) - _rank(A)
 
 
 def _rank(rows: sparse.csr_matrix) -> int:
@@ -221,7 +247,4 @@ def _rank(rows: sparse.csr_matrix) -> int:
 
 
 def _log_determinant(square: sparse.csc_matrix) -> float:
-    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
-    options["options"] = {"SymmetricMode": True}
-    factors = splu(sparse.csc_matrix(square), **options)
-    return np.log(np.abs(factors.U.diagonal())).sum()
+    return np.log(np.abs(symmetric_factor(square).U.diagonal())).sum()

@@ -14,6 +14,7 @@ from scipy import sparse
 
 from granforce.forces.contact_problem import in_balance
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import Rows, no_rows
 from granforce.numerics import highs as programs
 from granforce.records import Relaxation, positive, takes, whole
 from granforce.system import cancelling
@@ -69,18 +70,24 @@ def nearest_piqp(
     )
 
 
-def likeliest_piqp(ensemble: Ensemble, weights: Floats, target: Floats) -> Floats:
-    """The forces (N_c, 2) of S with the least Σ (weights (f − target))², balanced to rounding.
+def likeliest_piqp(
+    ensemble: Ensemble, weights: Floats, target: Floats, rows: Rows | None = None
+) -> Floats:
+    """The forces (N_c, 2) of S with the least Σ (weights (f − target))² + Σ of `rows` likewise.
 
-    weights (N_c, 2), 1/force; target (N_c, 2), force, NaN counts as 0. The caller checks whether
-    they are admitted.
+    They are admitted, or balance to rounding, which the caller checks. weights (N_c, 2), 1/force;
+    target (N_c, 2), force, NaN counts as 0.
     """
-    target = np.nan_to_num(target)
-    weigh = ensemble.to_vector(weights) * ensemble.force_scale
-    weigh = weigh / weigh.max(initial=1e-300)
-    W = sparse.diags(weigh) @ ensemble.scaled_form[2]
-    y, _, _ = _least(ensemble, W, weigh * ensemble.to_vector(target), 200)
-    return restored(ensemble, y)
+    rows = rows or no_rows(ensemble)
+    target, unit = ensemble.to_vector(np.nan_to_num(target)), ensemble.force_scale
+    forces = sparse.diags(ensemble.to_vector(weights)), rows.unknowns(ensemble)
+    W = sparse.vstack([forces[0], sparse.diags(1 / rows.sigma) @ forces[1]])
+    right = np.append(forces[0] @ target, rows.values / rows.sigma) * unit
+    scale = unit * np.abs(W).max() if W.nnz else 1.0
+    W = sparse.csc_matrix(unit / scale * W @ ensemble.scaled_form[2])
+    y, _, _ = _least(ensemble, W, right / scale, 200)
+    forces = ensemble.pin(ensemble.to_forces(ensemble.scaled_form[2] @ y * unit))
+    return forces if ensemble.admits(forces) else restored(ensemble, y)
 
 
 def restored(ensemble: Ensemble, y: Floats) -> Floats:

@@ -19,6 +19,7 @@ and `cone_projection`, use.
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from granforce.numerics import contact_matrix
 from granforce.numerics.blocks import NO_PIVOT
@@ -192,6 +193,18 @@ def _rows(network: Network) -> Integers:
     """Rows (N_c, 2, 2, 3) of the entries of `columns`, by component and grain."""
     first = 3 * np.stack([network.high, network.low], axis=1)
     return (first[:, None, :, None] + np.arange(3)).repeat(2, axis=1)
+
+
+def balance_matrix(network: Network) -> sparse.csr_matrix:
+    """A (rows and global rows, 2 N_c) of a network."""
+    count, m = len(network.high), network.border.shape[1] // 2
+    rows = 3 * len(network.layout.position)
+    below = np.broadcast_to(rows + np.arange(m), (count, 2, m))
+    row = np.concatenate([_rows(network).reshape(count, 2, 6), below], axis=2)
+    values = [network.columns.reshape(count, 2, 6), network.border.reshape(count, 2, m)]
+    force = np.repeat(np.arange(2 * count), 6 + m)
+    entries = np.concatenate(values, axis=2).ravel(), (row.ravel(), force)
+    return sparse.csr_matrix(entries, shape=(rows + m, 2 * count))
 
 
 def diagonal_of(network: Network) -> Floats:

@@ -10,7 +10,7 @@ import highspy
 import numpy as np
 import piqp
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from granforce.system import cancelling
 from granforce.tolerances import PROGRAM
@@ -170,6 +170,12 @@ def _interrupt(model: highspy.Highs) -> None:
     """
     for event in (model.cbSimplexInterrupt, model.cbIpmInterrupt):
         event.subscribe(lambda step: step.interrupt())
+
+
+def symmetric_factor(square: sparse.csr_matrix) -> SuperLU:
+    """The sparse factor of a symmetric positive matrix."""
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+    return splu(sparse.csc_matrix(square), **options, options={"SymmetricMode": True})
 
 
 def basis(model: highspy.Highs) -> tuple[Integers, Integers] | None:

@@ -12,7 +12,7 @@ feasible changes of all slacks, in slacks y = D s with Ã y = b̃. It needs no b
 factor of A C Aᵀ (`cholesky`). One factor serves eight right-hand sides in lanes.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -94,6 +94,16 @@ class WallMatrix(NamedTuple):
         """The nearest point to `away` (k, walls) that satisfies the balance."""
         return self.moved(away, None, POLISH, self.unweighted)
 
+    def balancing(self, rest: Floats) -> Floats:
+        """The change of slacks (walls,) by the forces of least weight that remove an unbalance.
+
+        rest: of the rows of the network, then of the global ones.
+        """
+        at = make_scratch(self, 1)
+        at.x[:, 0], at.y[:, 0] = np.split(rest, [len(at.x)])
+        _balance(self, at, ONE)
+        return at.out[:, 0].copy()
+
 
 class Scratch(NamedTuple):
     """Storage for W right-hand sides."""
@@ -173,13 +183,13 @@ def log_determinant(network: Network, factors: Factors) -> float:
     return -2 * np.log(pivots).sum()
 
 
-def restored(matrix: WallMatrix) -> WallMatrix:
-    """The matrix with enough balance restorations that one more changes nothing.
+def restored(matrix: Any) -> Any:
+    """The WallMatrix, or RowMatrix, with enough balance restorations that one more changes nothing.
 
     If rows of A nearly follow from others, as those of the stress do at μ < 10⁻⁵, each restoration
     removes only part of the unbalance; otherwise one is enough.
     """
-    g = np.random.default_rng(0).standard_normal((PROBES, len(matrix.contact)))
+    g = np.random.default_rng(0).standard_normal((PROBES, matrix.count))
     before = matrix.moved(g)
     for times in range(1, _MOST_TIMES):
         after = matrix.moved(g, None, times + 1)
@@ -187,14 +197,6 @@ def restored(matrix: WallMatrix) -> WallMatrix:
             return matrix._replace(times=times)
         before = after
     return matrix._replace(times=_MOST_TIMES)
-
-
-def balancing(matrix: WallMatrix, rest: Floats, rest_border: Floats) -> Floats:
-    """The change of slacks (walls,) by the forces of least weight that remove an unbalance."""
-    at = make_scratch(matrix, 1)
-    at.x[:, 0], at.y[:, 0] = rest, rest_border
-    _balance(matrix, at, ONE)
-    return at.out[:, 0].copy()
 
 
 def make_scratch(matrix: WallMatrix, width: int) -> Scratch:

@@ -91,7 +91,7 @@ class BodyWalls:
         measured = (W @ null) @ np.linalg.inv(np.linalg.qr(slopes, mode="r"))
         self.K, self.pushed = rounded @ rounded.T, rounded @ measured.T
         self.pull = np.zeros(0) if d is None else d - W @ self.centre
-        self.root = np.ones(len(W))
+        self.pulls = sparse.identity(len(W), format="csr")
         basis = np.linalg.qr(relative)[0]
         self.hull = basis @ basis.T
 
