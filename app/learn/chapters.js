@@ -1,4 +1,4 @@
-// The seven chapters: their text, as functions of the numbers on screen, and the experiment of
+// The eight chapters: their text, as functions of the numbers on screen, and the experiment of
 // each.
 
 import { Chance } from "./experiments/chance.js"
@@ -24,30 +24,48 @@ function fixed(opened, sliding, free) {
   return forces < free ? "" : ` That fixes 2 × ${opened} + ${sliding} = ${forces} forces, enough for all ${free} free numbers: nothing is left to change.`
 }
 
-/** The count of free numbers, line by line: {rows, head}; head is null if the last row is the sum. */
-function counted({ contacts, disks, equations, free }, pressed, disksNote = "") {
-  const rows = [
+/** The count of free numbers, line by line, with the sum in the last row. */
+function counted({ contacts, disks, equations, free }, pressed) {
+  return [
     [`${contacts} contacts × 2 forces, normal and tangential`, 2 * contacts],
-    [`${disks} ${disks > 1 ? "disks" : "disk"}${disksNote} × 3 equations: no net force sideways, none up or down, no turning`, 3 * disks],
+    [`${disks} ${disks > 1 ? "disks" : "disk"} × 3 equations: no net force sideways, none up or down, no turning`, 3 * disks],
     ...(pressed ? [...PRESSED, [`equations: ${3 * disks} − 2 + 1`, equations]] : []),
     [`free numbers: ${2 * contacts} − ${equations}`, free],
   ]
-  return { head: null, rows }
 }
+
+const BOX = { x: { low: 1, high: 4, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" } }
 
 /**
  * Each chapter: name in links; title in the list; heading; text and ask, shown first; doing, the instruction
- * for dragging; see(facts): reason and surprise; count(facts): a table, or null; x, y: axes; experiment with options.
+ * for dragging; see(facts): reason and surprise; verdict(facts, prediction): in place of "It is …"; count(facts): the
+ * rows of a sum; x, y, second: axes; experiment with options.
  */
 export const CHAPTERS = [
+  {
+    name: "ladder", title: "A ladder", heading: "Which will it be?",
+    text: ({ mu }) => `A ladder of weight 1 leans against a wall. Floor and wall are rough: friction is at most μ = ${mu} times the normal force. A mechanics course cannot solve this: there are four unknown forces, a normal force and friction at each end, but only three equations of balance.`,
+    ask: "How hard does the wall push back, that is, how large is its normal force?",
+    doing: "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
+    verdict: ({ low, high }, prediction) => ({
+      answer: `Anything from ${two(low)} to ${two(high)}.`,
+      so: prediction < low || prediction > high ? ", which is not among them" : ": possible, like all the others",
+    }),
+    see: ({ low, high, smooth }) => [
+      `At ${two(low)} the wall’s friction holds the ladder up as hard as it can; at ${two(high)} it pulls it down. Textbooks make the wall smooth: without its friction only one value is left, ${two(smooth)}.`,
+      "A real ladder does take one of these values. Which one depends on how it bends and on how it was set up, and a rigid body knows neither. So we ask another question: what is possible?",
+    ],
+    x: { low: 0, high: 0.6, label: "normal force at the wall (weight of the ladder = 1)" }, y: null,
+    experiment: SceneExperiment, options: { scene: "ladder", x: 2, y: null, goal: "both" },
+  },
   {
     name: "groove", title: "One disk in a groove", heading: "How hard does the wall press?",
     text: ({ mu }) => `A disk of weight 1 lies between two walls. Each wall exerts a normal force on it and a friction force along the wall, at most ${mu} times the normal force. Four unknown forces, three equations of balance: one number stays free.`,
     ask: "How large can the left wall’s normal force become?",
-    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; an arrow turns orange where its contact is about to slip.",
+    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All forces stay in balance; a wedge turns dark where its contact is about to slip.",
     see: ({ low, high, mu }) => [
-      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up, as hard as it can.`,
-      `So each wall can press harder than the disk weighs, and a photograph would not show it. The bar is called S: each of its points is one set of forces that holds the disk.`,
+      `At ${two(high)} the disk would slip upwards if friction did not pull it down along both walls, and friction gives ${two(mu * high)} at most: ${mu} × ${two(high)}. At ${two(low)} friction holds the disk up, as hard as it can. So each wall can press harder than the disk weighs.`,
+      "The bar is called S: each of its points is one set of forces that holds the disk. Which one is real? That depends on how the disk was pressed in and how it deforms, if only by a hair. We call disks rigid to leave both open. Now change the friction: S grows, shrinks to a point, locks.",
     ],
     count: (facts) => counted(facts, false),
     x: { low: 0, high: 3, label: "normal force at the left wall (weight of the disk = 1)" }, y: null,
@@ -57,89 +75,82 @@ export const CHAPTERS = [
     name: "box", title: "Two disks in a box", heading: "How much can the floor carry?",
     text: ({ mu }) => `Two disks of weight 1 lie in a box, with friction of at most ${mu} times each normal force. Eight unknown forces, six equations: two numbers stay free, and S is an area. The axes of the plot are two of the forces, green and violet.`,
     ask: "How large can the floor’s normal force become?",
-    doing: "Drag the dot to the right as far as it goes. Its path paints S.",
+    doing: "Drag the dot along the edge of S, all the way round. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, mu }) => [
       `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: the disks are wedged between them, and friction there pulls them down. With more, the lower disk would slip on the floor, where friction is at its limit, ${mu} × ${two(high)}.`,
-      `So the floor can carry more than the disks weigh. Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip.`,
+      "Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip. Change the friction: how much do two disks need to stay?",
     ],
     count: (facts) => counted(facts, false),
-    x: { low: 0, high: 5, label: "normal force at the floor (green)" }, y: { low: 0, high: 5, label: "between the disks (violet)" },
-    experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0 },
+    ...BOX,
+    experiment: SceneExperiment, options: { scene: "box", x: 4, y: 0, goal: "round" },
   },
   {
     name: "thirteen", title: "Thirteen disks", heading: "How strong can one contact get?",
-    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions, so the plot shows its shadow on two of the forces. The green one starts at ${two(start)}; the mean of all normal forces is ${two(mean)}.`,
+    text: ({ contacts, equations, free, disks, start, mu, mean }) => `${disks === 13 ? "Thirteen" : disks} disks with friction μ = ${mu} are squeezed from all sides; beyond the dashed frame the picture repeats. ${2 * contacts} unknown forces, ${equations} equations: S has ${free} dimensions. No screen can show them, so the plot has two of the forces as axes. The green one starts at ${two(start)}; the mean is ${two(mean)}.`,
     ask: "How large can the green force become?",
-    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Orange: a contact is about to slip (wedge) or to open (ring).",
+    doing: "Drag the dot to the right as far as it goes, or drag an arrow. All disks stay in balance. Dark: a contact is about to slip (wedge) or to open (ring).",
     see: ({ low, high, free, others }) => [
       `Every contact must press, and friction is limited at each. At ${two(high)} so many contacts are about to open or to slip that none of the ${free} numbers is free any more. From ${two(low)} to ${two(high)} every value is possible, although no disk moves.`,
-      others ? "The dot stayed, but the other forces changed: many sets of forces lie behind this point of the shadow. Change them again."
-        : others === false ? "Here, at the edge of the shadow, there is only one set of forces. Move the dot inside, then change the others."
-          : "What you painted is a shadow: inside it, many sets of forces lie behind each point. Move the dot inside, then change the others.",
+      others ? "The dot stayed, but the other forces changed. So the plot is a shadow of S: as in the shadow of a body, many points lie behind each of its points."
+        : others === false ? "Here, at the very edge, there is only one set of forces. Move the dot inside, then change the others."
+          : "The dot fixes two forces. And the others? Move it away from the edge, and press “Change the other forces”. Then change the friction: how little is too little?",
     ],
     count: (facts) => counted(facts, true),
-    x: { low: 0, high: 8, label: "normal force between disks 1 and 12 (green)" }, y: { low: 0, high: 5, label: "between disks 8 and 13 (violet)" },
+    x: { low: 0, high: 7, label: "normal force between disks 1 and 12 (green)" }, y: { low: 0, high: 5, label: "between disks 8 and 13 (violet)" },
     experiment: SceneExperiment, options: { scene: "thirteen", x: 6, y: 40 },
   },
   {
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
-    text: ({ all, mu, start, free }) => `${all} disks at friction μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${free} numbers are free: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
+    text: ({ all, mu, start, contacts, equations, free }) => `${all} disks at μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${2 * contacts} forces − ${equations} equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make this force while no disk moves?",
-    doing: "Drag the dot to the right, or the marked line upwards; other lines move too. Blue: the force has changed. Orange: about to slip (wedge) or open (ring).",
+    doing: "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dark: about to slip (wedge) or open (ring).",
     see: ({ high, opened, sliding, changed, free }) => [
-      `At ${two(high)}, ${opened} contacts have lost both their forces, and friction is at its limit at ${sliding}.${fixed(opened, sliding, free)}`,
-      `On the way there, ${changed} other forces change by more than a tenth of the mean force, yet no disk moves. On a photograph of the packing you would see no difference.`,
+      `At ${two(high)}, ${opened} contacts have lost both their forces, and friction is at its limit at ${sliding}.${fixed(opened, sliding, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
+      `How is ${two(high)} found? As in the box, drawn again below: balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner. To find that corner is a linear program; a computer solves it for thousands of forces in a second.`,
     ],
-    count: (facts) => counted(facts, true, ` that carry (of ${facts.all})`),
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
-    experiment: Grab, options: {},
+    experiment: Grab, options: { axes: BOX, across: 4, up: 0 },
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the marked force goes from ${two(low)} to ${two(high)} times the mean (pale). Now a random walk takes ${states} steps through S, all sets of forces that hold the disks. At each step the marked force is noted.`,
-    ask: "What is the largest value that chance finds?",
-    doing: "Drag the dot upwards: network after network.",
-    see: ({ part, mean, free }) => [
-      `Chance covers ${percent(part)} of what is possible for this force, and ${percent(mean)} on average over all. To reach either end, most of the ${free} free numbers must work together, which chance hardly ever arranges.`,
-      `And that is one force alone. A part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S: a value that chance never finds may still be possible.`,
+    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: the shadow of S on this force and a violet one. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
+    ask: "What is the largest green force that chance finds?",
+    doing: "Press “Walk”, or drag the slider. Each dot is a network, one after every twentieth step; network 0 is the one in which the packing came to rest.",
+    see: ({ part, share, free }) => [
+      `The walk covers ${percent(part)} of what is possible for the green force, only ${percent(share)} of the pale area, and none of its corners. At a corner all ${free} free numbers have to work together, which chance hardly ever arranges.`,
+      `And this is a shadow on two forces. A part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S. A value that chance never finds may still be possible.`,
     ],
-    count: null,
-    x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: { low: 0, high: 1000, label: "random networks", dragged: true },
+    x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
     experiment: Chance, options: {},
   },
   {
     name: "friction", title: "Friction", heading: "Where are forces least determined?",
     text: ({ all, mu }) => `The forces of ${all} disks at μ = ${mu} walk at random through S, all sets of forces that hold the disks; watch the marked line. More friction lets each force lean further. But disks packed with more friction also come to rest with fewer contacts.`,
     ask: "At which friction μ do the forces vary most?",
-    doing: "Drag the dot along the whole axis, to both ends. At each stop it shows the mean over several packings made with that friction.",
+    doing: "Drag the dot along the whole axis, to both ends. Blue: how much the forces vary. Grey: how many numbers are free. Both are means over packings made with that friction.",
     see: ({ rows }) => {
       const most = rows.reduce((one, other) => (other.spread > one.spread ? other : one)), first = rows[0], last = rows.at(-1)
       return [
-        `At small μ many numbers are free, but friction leaves each little room: at μ = ${first.mu}, ${whole(first.free)} are free and forces vary by ${percent(first.spread)}. Disks packed with more friction touch fewer others, and fewer numbers are free: ${whole(most.free)} at μ = ${most.mu}, ${whole(last.free)} at μ = ${last.mu}.`,
-        `So more friction does not mean more freedom: S first grows wider and then loses its dimensions.`,
+        `At small μ many numbers are free, but friction leaves each little room: at μ = ${first.mu}, ${whole(first.free)} are free and forces vary by ${percent(first.spread)}. With more friction each has more room, and forces vary by ${percent(most.spread)} at μ = ${most.mu}.`,
+        `But disks packed with more friction touch fewer others, ${two(last.touching)} instead of ${two(first.touching)}, so numbers are lost: ${whole(most.free)} are free at μ = ${most.mu}, ${whole(last.free)} at μ = ${last.mu}. S first grows wider and then loses its dimensions.`,
       ]
     },
-    count: ({ rows }) => ({
-      head: ["friction μ (means over packings)", "contacts of a disk", "free numbers", "forces vary by"],
-      rows: rows.map(({ mu, touching, free, spread }) => [mu, two(touching), whole(free), percent(spread)]),
-    }),
-    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.25, label: "forces vary by (mean force = 1)" },
+    x: { low: 0.001, high: 10, log: true, label: "friction μ" }, y: { low: 0, high: 0.2, label: "forces vary by (mean force = 1)" }, second: { low: 0, high: 400, label: "free numbers" },
     experiment: Friction, options: {},
   },
   {
     name: "push", title: "Why it matters", heading: "When does something move?",
-    text: ({ mu }) => `The same packing at μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change as little as they can to carry the push.`,
+    text: ({ mu }) => `The same packing at μ = ${mu}. The two disks of the marked line press on each other. Now they are pushed apart. The other forces change as little as they can, as they would if all contacts were very stiff springs, all alike.`,
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right, or an arrow away from the marked line.",
     see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed }) => [
-      moving ? `Now ${opened} contacts open (rings), ${slid} slip (wedges), and disks start to move. Orange arrows and the motion are drawn enlarged.`
+      moving ? `Now ${opened} contacts open (rings), ${slid} slip (wedges), and disks start to move. Arrows and motion are drawn enlarged.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
-      `Up to a push of ${two(limit)}, S, all sets of forces that hold the disks, is not empty (line). But the packing gives way earlier, as it starts from the forces it has. ${limits.length > 1
+      `Up to ${two(limit)}, the limit load, S is not empty: some set of forces carries the push. The packing gives way earlier, as it starts from the forces it has, and its history chose those. ${limits.length > 1
         ? `The same disks gave way at ${listed(limits.map(two))}: no picture of them shows which. That is why it matters how undetermined forces are.`
         : "Would the same disks give way at the same push with other forces?"}`,
     ],
-    count: null,
     x: { low: 0, high: 2, label: "push (mean force = 1)" }, y: null,
     experiment: Push, options: {},
   },

@@ -1,4 +1,4 @@
-// Learn: seven chapters, one on screen; the chapter and the reader's progress are in the address
+// Learn: eight chapters, one on screen; the chapter and the reader's progress are in the address
 // and in the browser.
 
 import { button, createElement } from "../browser/dom.js"
@@ -11,7 +11,7 @@ import { Source } from "./source.js"
 
 // The data of later chapters, requested one after the other while the first is read, as some take
 // time.
-const AHEAD = [["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["push", "0"], ["curve"], ["push", "1"]]
+const AHEAD = [["scene", "groove"], ["scene", "box"], ["scene", "thirteen"], ["ends", "thirteen"], ["packing", "0.1"], ["rail"], ["shadow"], ["push", "0"], ["curve"], ["push", "1"]]
 
 class Lesson {
   constructor(model, view) {
@@ -39,7 +39,6 @@ class Lesson {
 
   close() {
     this.experiment?.stop()
-    this.mechanism?.stop()
     this.sized.disconnect()
     this.experiment = this.mechanism = null
   }
@@ -82,7 +81,7 @@ class Lesson {
       return
     }
     if (turn !== this.openings) return experiment.stop()
-    parts.pictures.classList.remove("waiting")
+    this.main.className = ""
     const { stops } = experiment, x = stops ? { ...chapter.x, stops, ticks: stops.filter(isDecade) } : chapter.x
     parts.text.textContent = chapter.text(experiment.facts)
     parts.text.append(" ", createElement("strong", { textContent: chapter.ask }))
@@ -101,10 +100,10 @@ class Lesson {
   lay(chapter) {
     const { number } = this, last = number === CHAPTERS.length - 1
     const heading = createElement("h1", { textContent: chapter.heading, tabIndex: -1 }), text = createElement("p", { className: "text" })
-    const pictures = createElement("div", { className: "pictures waiting" }), voice = createElement("div", { className: "voice", ariaLive: "polite" })
+    const voice = createElement("div", { className: "voice", ariaLive: "polite" })
     voice.textContent = "Loading … The first time on a server, this can take a minute."
-    const [picture, plot] = ["picture", "plot"].map((className) => pictures.appendChild(createElement("figure", { className })))
-    const row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
+    const [picture, plot] = ["picture", "plot"].map((className) => createElement("figure", { className }))
+    const knob = createElement("label", { className: "knob", hidden: true }), row = createElement("div", { className: "row" }), turn = createElement("span", { className: "turn" })
     const move = (words, step) => button(words, () => this.go(number + step), { disabled: !CHAPTERS[number + step] })
     turn.append(move("◂ Back", -1), last ? "" : move("Next ▸", 1))
     row.append(turn)
@@ -113,8 +112,9 @@ class Lesson {
     const after = createElement("p", { className: "after", innerHTML: onwards })
     const foot = createElement("div", { className: "foot" }) // always in view, as it says what to do next
     foot.append(voice, row)
-    this.main.replaceChildren(heading, text, pictures, foot, after)
-    return { text, pictures, picture, plot, voice, row, foot, after }
+    this.main.className = "waiting"
+    this.main.replaceChildren(heading, text, picture, plot, knob, foot, after)
+    return { text, picture, plot, knob, voice, row, foot, after }
   }
 
   /** The list of chapters, with finished ones marked. */

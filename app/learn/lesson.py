@@ -1,4 +1,4 @@
-"""The seven chapters of Learn: predict, do, see; drawn and played in the browser by lesson.js."""
+"""The eight chapters of Learn: predict, do, see; drawn and played in the browser by lesson.js."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,7 +6,7 @@ from typing import Any
 
 import param
 
-from granforce.packing.scenes import SCENES
+from granforce.packing.scenes import EVERY
 
 from ..background.jobs import Task, Visitor, computing, reading
 from ..browser.bundle import Scripted
@@ -16,7 +16,7 @@ from .model import lesson_data
 from .model.lesson_data import Packings
 
 # The forces used as axes of S in each small scene, across and up, as in chapters.js.
-PLANES = {"groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
+PLANES = {"ladder": (2, 0), "groove": (0, 2), "box": (4, 0), "thirteen": (6, 40)}
 
 # The networks from which a contact is pushed, by name.
 STARTS = {str(start): start for start in range(lesson_data.STARTS)}
@@ -65,13 +65,15 @@ class Lesson(Scripted):
         by_friction = {f"{mu:g}": mu for mu in packings.frictions}
         match want:
             case "scene" if name in PLANES:
-                pool = computing if SCENES[name].packed else reading
+                pool = computing if EVERY[name].packed else reading
                 self._send("scene", name, lambda: lesson_data.scene(name), pool)
             case "ends" if name in PLANES:
                 self._send("ends", name, lambda: lesson_data.ends(name, PLANES[name]), computing)
             case "packing":
                 mu = by_friction.get(name, float("nan"))
                 self._send("packing", name, lambda: packings.packing(mu))
+            case "shadow":
+                self._send("shadow", "", packings.shadow, computing)
             case "rail" if network is not None:
                 self._send("rail", name, lambda: packings.rail_from(name, network), computing)
             case "rail":

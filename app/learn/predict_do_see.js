@@ -9,20 +9,20 @@ const STAGES = ["Predict", "Do", "See"]
 
 export class PredictDoSee {
   /**
-   * chapter: of chapters.js; experiment: loaded; parts: {plot, voice, row, foot, after}: their elements; progress: {prediction,
+   * chapter: of chapters.js; experiment: loaded; parts: {plot, knob, voice, row, foot, after}: their elements; progress: {prediction,
    * done} of an earlier visit; save({prediction, done}): called to store progress; drawn(): called to repaint;
    * again(): called to start the chapter anew.
    */
-  constructor(chapter, experiment, { plot, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
-    Object.assign(this, { chapter, experiment, host: plot, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
+  constructor(chapter, experiment, { plot, knob, voice, row, foot, after }, { prediction, done }, { save, drawn, again }) {
+    Object.assign(this, { chapter, experiment, host: plot, knob, voice, row, foot, after, save, drawn, prediction, predicted: false, ready: true, announced: done })
+    plot.classList.toggle("plane", Boolean(chapter.y))
     this.plot = new QuantityPlot(plot, chapter, { marker: (value) => this.mark(value), dot: (x, y) => experiment.drag(x, y) })
     this.button = button("That is my prediction", () => this.begin(), { className: "primary" })
     this.stages = createElement("span", { className: "stages" })
-    this.again = button("Predict again", again)
+    this.again = button("Again", again, { className: "again" })
     this.offer = button("", () => experiment.offer.run(), { className: "primary" })
     row.prepend(this.button, this.stages, this.offer, this.again)
-    this.sized = new ResizeObserver(() => this.plot.fit())
-    this.sized.observe(plot)
+    if (experiment.knob) this.turnable()
     if (done) this.finish()
     else this.show()
   }
@@ -30,7 +30,13 @@ export class PredictDoSee {
   /** A value of the quantity in question, in words. */
   named(value) { return this.chapter.x.log ? `μ = ${Number(value.toPrecision(2))}` : value.toFixed(2) }
 
-  stop() { this.sized.disconnect() }
+  /** The slider of the experiment, with its name and a sentence about its value. */
+  turnable() {
+    const { knob, experiment } = this, { label, max, step } = experiment.knob
+    this.slider = createElement("input", { type: "range", min: 0, max, step, ariaLabel: label, oninput: () => experiment.turn(Number(this.slider.value)) })
+    this.said = createElement("output", {})
+    knob.append(createElement("span", { textContent: label }), this.slider, this.said)
+  }
 
   get stage() { return !this.predicted ? 0 : this.experiment.answered ? 2 : 1 }
 
@@ -50,7 +56,7 @@ export class PredictDoSee {
   async begin() {
     this.save({ prediction: this.prediction, done: false })
     const unlocked = this.unlock()
-    this.plot.dot.focus({ preventScroll: true })
+    ;(this.experiment.steered ? this.plot.dot : this.slider).focus({ preventScroll: true })
     await unlocked
     this.host.style.scrollMarginBottom = `${this.foot.offsetHeight}px` // which covers what lies below
     this.host.scrollIntoView({ block: "nearest" })
@@ -73,12 +79,10 @@ export class PredictDoSee {
     this.show()
   }
 
-  /** Show a finished chapter again with its answer: the dot is dragged to both ends, and to the answer. */
+  /** Show a finished chapter again with its answer. */
   async finish() {
-    const { chapter: { x, y }, experiment } = this
     await this.unlock()
-    if (!this.ready || !this.row.isConnected) return
-    for (const to of [x.low, x.high, experiment.answer]) experiment.drag(to, y?.high ?? 0)
+    if (this.ready && this.row.isConnected) this.experiment.finish(this.chapter)
   }
 
   /** Update everything from the experiment. */
@@ -88,14 +92,16 @@ export class PredictDoSee {
     if (news) this.save({ prediction, done: (this.announced = true) })
     const words = picture.words ?? `now ${this.named(experiment.value)}`
     const guess = { value: prediction ?? this.waiting, words: prediction === null ? "your prediction: ?" : `your prediction: ${this.named(prediction)}` }
-    const answer = stage === 2 ? { value: experiment.answer, words: this.named(experiment.answer) } : null
+    const answer = stage === 2 && !picture.unanswered ? { value: experiment.answer, words: this.named(experiment.answer) } : null
     this.plot.draw({ ...picture, words, marker: guess, answer })
-    this.plot.allow(stage ? (this.ready ? "dot" : null) : "marker")
+    this.plot.allow(!stage ? "marker" : this.ready && experiment.steered ? "dot" : null)
     this.button.hidden = stage > 0
     this.button.disabled = prediction === null
     this.again.hidden = this.after.hidden = stage < 2
-    const offer = stage === 2 ? experiment.offer : null
+    const offer = stage && this.ready ? experiment.offer : null
     Object.assign(this.offer, { hidden: !offer, textContent: offer?.words ?? "" })
+    this.knob.hidden = stage < (experiment.knob?.stage ?? 3) || !this.ready
+    if (this.slider) Object.assign(this.slider, { value: experiment.turned.value, ariaValueText: (this.said.textContent = experiment.turned.words) })
     this.stages.replaceChildren(...STAGES.map((name, k) => createElement("span", { textContent: `${k + 1} ${name}${stage > k || stage === 2 ? " ✓" : ""}`, className: k === stage ? "on" : "" })))
     this.speak(stage)
     this.drawn()
@@ -131,27 +137,32 @@ export class PredictDoSee {
     voice.replaceChildren(...parts())
   }
 
-  /** The answer next to the prediction, with its reason, the surprise, and the count. */
-  answer([reason, surprise], count) {
-    const { experiment: { answer }, prediction } = this
+  /** The answer next to the prediction, with its reason, the surprise, and the count or a picture. */
+  answer([reason, surprise], rows) {
+    const { chapter, experiment, prediction } = this
     const verdict = createElement("p", { className: "verdict" })
-    verdict.append(createElement("b", { textContent: `It is ${this.named(answer)}.` }), ` You predicted ${this.named(prediction)}.`)
-    const words = createElement("div", { className: "words" })
-    words.append(verdict, createElement("p", { textContent: reason }), createElement("p", { textContent: surprise }))
-    if (!count) return [words]
-    return [words, tableOf(count)]
+    const is = chapter.verdict?.(experiment.facts, prediction) ?? { answer: `It is ${this.named(experiment.answer)}.`, so: "" }
+    verdict.append(createElement("b", { textContent: is.answer }), ` You predicted ${this.named(prediction)}${is.so}.`)
+    const parts = [verdict, createElement("p", { textContent: reason }), createElement("p", { textContent: surprise })]
+    if (rows) parts.push(sumOf(rows))
+    if (experiment.aside) parts.push(this.aside ??= looked(experiment.aside))
+    return parts
   }
 }
 
-/** A table, {head, rows}; without a head its last row is a sum. */
-function tableOf({ head, rows }) {
-  const table = createElement("table", { className: head ? "" : "sum" })
-  const add = (section, cells, tag) => {
-    const row = section.insertRow()
-    row.append(...cells.map((textContent) => createElement(tag, { textContent })))
+/** A plot that is only looked at. */
+function looked({ axes, ...state }) {
+  const figure = createElement("figure", { className: "aside" })
+  new QuantityPlot(figure, axes, {}).draw(state)
+  return figure
+}
+
+/** A table of a sum, which is its last row. */
+function sumOf(rows) {
+  const table = createElement("table", {})
+  for (const cells of rows) {
+    const row = table.insertRow()
+    for (const text of cells) row.insertCell().textContent = text
   }
-  if (head) add(table.createTHead(), head, "th")
-  const body = table.createTBody()
-  for (const cells of rows) add(body, cells, "td")
   return table
 }

@@ -36,6 +36,7 @@ export function drawNames(arrows, F) {
   const { context: g, body, look } = arrows, { scene } = body
   g.font = "13px sans-serif"
   g.textBaseline = "middle"
+  const [cx, cy] = arrows.px(scene.x[0], scene.x[1])
   const write = (x, y, lines, align) => {
     g.textAlign = align
     lines.forEach((line, k) => {
@@ -52,11 +53,12 @@ export function drawNames(arrows, F) {
     const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
     const pressed = ["normal force", "normal"].map((word) => `${word} ${number(n)}`).find(fits) ?? number(n)
     const lines = [name, pressed, ...both]
-    const side = Math.abs(ux) < 0.3 ? name.match(/(left|right) end/)?.[1] : ux > 0 ? "right" : "left" // away from the other end
+    const foot = arrows.outline(0) && px < cx - NAMED ? "left" : undefined // away from the weight
+    const side = Math.abs(ux) < 0.3 ? name.match(/(left|right) end/)?.[1] ?? foot : ux > 0 ? "right" : "left" // away from the other end
     write(x, py + 34 * uy, lines, { left: "right", right: "left" }[side] ?? "center")
   }
-  const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])
-  if (load > 1e-9) write(cx, cy - 0.55 * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
+  const load = Math.hypot(body.load[0], body.load[1]), thin = arrows.outline(0)
+  if (load > 1e-9) write(cx + (thin ? 6 : 0), cy + (thin ? 0.6 : -0.55) * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], thin ? "left" : "center")
   if (scene.r[0] * arrows.unit > ROOMY) drawParts(arrows, arrows.ends()[0], F)
 }
 

@@ -1,12 +1,12 @@
-// A packing of 400 disks in a chapter: line widths show forces, blue shows their change, and one
-// contact is marked.
+// A packing of 400 disks in a chapter: line widths show forces, blue and orange their change, as in Explore, and
+// one contact is marked.
 
 import { Scene } from "../../packing/drawing/scene.js"
 import { markSelected } from "../../packing/drawing/marks.js"
 import { arrow, circle } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
-const FULL = 0.5 // change in mean forces at full blue; orange is for contacts about to slip, as in the small scenes
+const FULL = 0.5 // change in mean forces at full colour
 const WEDGE = { least: 0.3, long: 0.62 } // of a contact about to slip: angle, large enough to be seen, and length in radii
 const ARROW = { rest: 0.8, grown: 3, moved: 3 } // lengths in largest radii: of the push, and of the motion of the fastest disk
 const MOVES = 0.3 // of the largest displacement: disks that move less have no arrow
@@ -43,17 +43,22 @@ export class PackingPicture {
     this.scene.changed()
   }
 
-  /** The network: normal forces, from grey to blue by their change from `before`, or all grey without it. */
+  /** Show only a part of the packing, this fraction of its width, around a contact. */
+  zoom(chosen, part) {
+    const { scene } = this, [{ middle: [x, y] }] = scene.segments((contact) => contact === chosen)
+    scene.view = { x, y, half: part * scene.whole.half }
+  }
+
+  /** The network: normal forces, blue if smaller than `before`, orange if larger, or all grey without it. */
   draw(normal, before, palettes) {
     const { scene, style } = this, colours = palettes.change, middle = colours.length >> 1
     for (let c = 0; c < normal.length; c++) {
       style.width[c] = normal[c] > 1e-6 ? WIDTH * normal[c] : 0
-      const part = before ? Math.min(1, Math.abs(normal[c] - before[c]) / FULL) : 0
-      style.bin[c] = Math.round(middle * (1 - part))
+      const part = before ? Math.max(-1, Math.min(1, (normal[c] - before[c]) / FULL)) : 0
+      style.bin[c] = Math.round(middle * (1 + part))
     }
     style.colours = colours
     scene.palette = palettes.scene
-    this.warm = colours.at(-1)
     scene.drawChains(style)
   }
 
@@ -73,7 +78,7 @@ export class PackingPicture {
   /** As in the small scenes: a ring where a contact is open, a wedge on both disks where it is about to slip. */
   drawLimited(marks, scene) {
     const { opened, slid } = this.limited, { scale, geometry: { radius, i, j } } = scene
-    marks.strokeStyle = marks.fillStyle = this.warm
+    marks.strokeStyle = marks.fillStyle = scene.palette.strong
     marks.lineWidth = 1.5 / scale
     const wide = Math.max(WEDGE.least, this.packing.mu) / 2
     for (const { k, contact, a, b } of scene.segments((one) => opened[one] || slid[one])) {
@@ -109,7 +114,7 @@ export class PackingPicture {
   drawMotion(marks, scene) {
     const { motion } = this, { x, y, grain, unit } = scene.geometry
     const size = (g) => Math.hypot(motion[2 * g], motion[2 * g + 1]), most = Math.max(...Array.from(grain, size))
-    marks.strokeStyle = this.warm
+    marks.strokeStyle = scene.palette.strong
     marks.lineWidth = 2.5 / scene.scale
     marks.beginPath()
     for (const [k, g] of grain.entries()) {

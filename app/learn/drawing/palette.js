@@ -1,5 +1,5 @@
 // Colours of the small scenes: blue for forces, green and violet for the two that are axes of S,
-// magenta for dragging, orange for limits.
+// magenta for dragging, dark for limits, orange for motion.
 
 /** Colours by their role, on dark or on white background. */
 export function palette(dark) {
@@ -10,6 +10,6 @@ export function palette(dark) {
     guess: dark ? "#b4bec9" : "#5f6b7a",
     across: dark ? "#4ecb8d" : "#12793f", up: dark ? "#c39bff" : "#7a3fc4",
     cone: dark ? "rgba(95,162,232,0.16)" : "rgba(20,100,200,0.12)", coneLit: dark ? "rgba(255,92,168,0.3)" : "rgba(181,35,107,0.22)",
-    coneFull: "rgba(232,113,10,0.28)", shade: dark ? "rgba(95,162,232,0.2)" : "rgba(20,100,200,0.14)", state: dark ? "#8fbfee" : "#3d8bd4",
+    coneFull: dark ? "rgba(230,233,238,0.55)" : "rgba(34,39,46,0.5)", shade: dark ? "rgba(95,162,232,0.2)" : "rgba(20,100,200,0.14)", state: dark ? "#8fbfee" : "#3d8bd4",
   }
 }

@@ -48,24 +48,24 @@ class Scale {
 
 export class QuantityPlot {
   /** axes: {x, y}, y null for a single quantity. hears: {marker(value), dot(x, y)}: called when dragged. */
-  constructor(host, { x, y = null }, hears) {
-    Object.assign(this, { host, axes: { x, y }, hears, allowed: null, state: {} })
+  constructor(host, { x, y = null, second = null }, hears) {
+    Object.assign(this, { host, axes: { x, y, second }, hears, allowed: null, state: {} })
     const svg = this.svg = element(host, "svg", { role: "group", "aria-label": x.label })
-    this.inside = element(element(svg, "clipPath", { id: "inside" }), "path")
     this.frame = element(svg, "g")
     this.exact = element(svg, "path", { class: "exact" })
+    this.second = element(svg, "path", { class: "second" })
     this.seen = element(svg, "path", { class: "visited" })
-    this.seen.style.strokeLinecap = y ? "round" : "butt"
     this.dots = element(svg, "path", { class: "dots" })
+    this.lines = element(svg, "g", { class: "lines" })
     this.answer = this.flag("answer")
     this.marker = this.flag("marker")
-    this.lines = element(svg, "g", { class: "lines" })
-    const slider = { role: "slider", tabindex: -1, "aria-orientation": y?.dragged ? "vertical" : "horizontal" }
+    const slider = { role: "slider", tabindex: -1, "aria-orientation": "horizontal" }
     for (const [name, value] of Object.entries({ ...slider, "aria-label": `your prediction: ${x.label}` })) this.marker.group.setAttribute(name, value)
-    this.dot = element(svg, "g", { class: "now", ...slider, "aria-label": y?.dragged ? y.label : `now: ${x.label}` })
+    this.dot = element(svg, "g", { class: "now", ...slider, "aria-label": `now: ${x.label}` })
     element(this.dot, "circle", { r: 9 })
     this.reading = element(this.dot, "text", { y: -18, "text-anchor": "middle" })
     this.listen()
+    new ResizeObserver(() => this.fit()).observe(host)
   }
 
   flag(name) {
@@ -78,10 +78,11 @@ export class QuantityPlot {
     const { clientWidth: wide, clientHeight: high } = this.host
     if (!wide || !high) return
     this.svg.setAttribute("viewBox", `0 0 ${wide} ${high}`)
-    const left = this.axes.y ? 66 : 26, bottom = high - 54
-    Object.assign(this, { wide, high, left, bottom, top: 52 })
-    this.x = new Scale(this.axes.x, left, wide - 26)
-    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 18, this.top + 16) : null // leaves room for the prediction below
+    const left = this.axes.y ? 66 : 26, bottom = high - 54, end = wide - (this.axes.second ? 62 : 26)
+    Object.assign(this, { wide, high, left, bottom, end, top: 44 })
+    this.x = new Scale(this.axes.x, left, end)
+    this.y = this.axes.y ? new Scale(this.axes.y, bottom - PILL.high - 16, this.top) : null // leaves room for the prediction below
+    this.right = this.axes.second ? new Scale(this.axes.second, this.y.from, this.y.to) : null
     this.drawAxes()
     this.draw(this.state)
   }
@@ -92,45 +93,50 @@ export class QuantityPlot {
   place([x, y]) { return [this.x.px(x), this.y ? this.y.px(y) : this.level] }
 
   drawAxes() {
-    const { frame, left, wide, bottom, top, x, y } = this
+    const { frame, left, wide, bottom, end, top, x } = this
     frame.replaceChildren()
-    element(frame, "path", { class: "axis", d: `M${left} ${bottom}H${wide - 26}${y ? `M${left} ${y.from}V${top}` : ""}` })
+    element(frame, "path", { class: "axis", d: `M${left} ${bottom}H${end}` })
     for (const tick of x.ticks) {
       const at = x.px(tick)
       element(frame, "path", { class: "axis", d: `M${at} ${bottom}v5` })
       element(frame, "text", { x: at, y: bottom + 19, "text-anchor": "middle" }).textContent = name(tick)
     }
-    element(frame, "text", { x: (left + wide - 26) / 2, y: bottom + 42, "text-anchor": "middle", class: "label" }).textContent = x.axis.label
-    for (const tick of y?.ticks ?? []) {
-      const at = y.px(tick)
-      element(frame, "path", { class: "axis", d: `M${left} ${at}h-5` })
-      element(frame, "text", { x: left - 9, y: at + 4, "text-anchor": "end" }).textContent = name(tick)
+    element(frame, "text", { x: (left + end) / 2, y: bottom + 42, "text-anchor": "middle", class: "label" }).textContent = x.axis.label
+    for (const [scale, at, way] of [[this.y, left, -1], [this.right, end, 1]]) {
+      if (!scale) continue
+      const paint = way > 0 ? "second" : ""
+      element(frame, "path", { class: "axis", d: `M${at} ${scale.from}V${top}` })
+      for (const tick of scale.ticks) {
+        const y = scale.px(tick)
+        element(frame, "path", { class: "axis", d: `M${at} ${y}h${5 * way}` })
+        element(frame, "text", { x: at + 9 * way, y: y + 4, "text-anchor": way > 0 ? "start" : "end", class: paint }).textContent = name(tick)
+      }
+      element(frame, "text", { transform: `translate(${way > 0 ? wide - 8 : 16} ${(top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle", class: "label" }).textContent = scale.axis.label
     }
-    if (y) element(frame, "text", { transform: `translate(16 ${(top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle", class: "label" }).textContent = y.axis.label
   }
 
   /**
-   * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots, brush}: areas and
-   * lines of seen and exact are lists of lists of points, dots a list of points; null hides a part. filled: exact
-   * is an area; thin: it is a curve. clip: corners of the area in which seen is drawn. lines: [{value, words}], named
-   * values, the first one a bound on the others.
+   * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots}: seen and exact are
+   * lists of points, dots a list of points; null hides a part. filled: they are areas; thin: they are curves; walk: seen is one. second:
+   * points of a second quantity, in its units. lines: [{value, words}], named values, the first one a bound on the
+   * others.
    */
   draw(state) {
     this.state = state
     if (!this.x) return
-    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], filled = false, thin = false, brush = 10, clip = null, lines = [] } = state
-    const path = (lines, end = "") => lines.map((points) => `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}`).join("")
-    this.exact.setAttribute("d", path(exact, exact[0]?.length > 2 && filled ? "Z" : ""))
-    this.exact.classList.toggle("filled", filled)
-    this.exact.classList.toggle("thin", thin)
-    this.seen.setAttribute("d", path(seen))
-    this.seen.style.strokeWidth = brush
-    this.inside.setAttribute("d", clip ? path([clip], "Z") : "")
-    this.seen.style.clipPath = clip ? "url(#inside)" : ""
+    const { now = null, words = "", marker = null, answer = null, seen = [], exact = [], dots = [], second = [], filled = false, thin = false, walk = false, lines = [] } = state
+    const path = (points, end = "") => (points.length ? `M${points.map((point) => this.place(point).map((v) => v.toFixed(1)).join()).join("L")}${end}` : "")
+    for (const [part, points] of [[this.exact, exact], [this.seen, seen]]) {
+      const area = filled && !(walk && points === seen)
+      part.setAttribute("d", path(points, area && points.length > 2 ? "Z" : ""))
+      part.classList.toggle("filled", area)
+      part.classList.toggle("thin", thin || area !== filled)
+    }
+    this.second.setAttribute("d", second.map(([x, y]) => `M${this.x.px(x)} ${this.right.px(y)}h0`).join(""))
     this.drawLines(lines)
     this.dots.setAttribute("d", dots.map((point) => `M${this.place(point).map((v) => v.toFixed(1)).join()}h0`).join(""))
     this.show(this.marker, marker, this.bottom - PILL.high - 8)
-    this.show(this.answer, answer, this.top - 40)
+    this.show(this.answer, answer, this.top - 38)
     this.dot.style.display = now ? "" : "none"
     if (now) {
       const [px, py] = this.place(now)
@@ -138,7 +144,7 @@ export class QuantityPlot {
       this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer, ...lines]))
       this.reading.textContent = answer && this.x.px(answer.value) === px ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
-      this.dot.setAttribute("aria-valuenow", now[this.axes.y?.dragged ? 1 : 0])
+      this.dot.setAttribute("aria-valuenow", now[0])
     }
     if (marker) {
       this.marker.group.setAttribute("aria-valuenow", marker.value)
@@ -148,7 +154,7 @@ export class QuantityPlot {
 
   /** Where to write words of this half width above px, relative to it: on the plot, next to the vertical lines. */
   beside(px, half, flags) {
-    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), [low, high] = [half + GAP, this.wide - half - GAP]
+    const lines = flags.filter(Boolean).map(({ value }) => this.x.px(value)), [low, high] = [(this.y ? this.left : 0) + half + GAP, this.end - half - GAP]
     const free = (x) => x >= low && x <= high && lines.every((line) => Math.abs(line - x) > half + GAP)
     const above = Math.min(high, Math.max(low, px)), far = (x) => Math.abs(x - px)
     const places = [above, ...lines.flatMap((line) => [line - half - 2 * GAP, line + half + 2 * GAP])].sort((a, b) => far(a) - far(b))

@@ -258,7 +258,7 @@ export class Arrows {
     }
     if (normal < 1e-9) {
       circle(g, [px, py], 4)
-      g.strokeStyle = look.warm
+      g.strokeStyle = look.ink
       g.lineWidth = 1.5
       g.stroke()
       return
@@ -272,7 +272,7 @@ export class Arrows {
       g.globalAlpha = 1
       this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
-    const colour = lit ? look.hand : slides ? look.warm : (!apart && axisColour) || look.cold, thick = lit || (axisColour && !apart) ? 3.5 : 2.5
+    const colour = lit ? look.hand : (!apart && axisColour) || look.cold, thick = lit || (axisColour && !apart) ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
     if (apart) this.arrow(px, py, inward.map((v) => v * normal), axisColour, 3.5)
     g.globalAlpha *= 0.35
@@ -356,7 +356,9 @@ export class Arrows {
     for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
     const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.easel.wide)
     const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
-    const unit = (side - 34) / span, left = this.easel.wide - side - 8, top = 8
+    const highest = this.ends().reduce((one, other) => (other.at[1] > one.at[1] ? other : one)) // its label is to be read
+    const right = this.px(...highest.at)[0] < this.easel.wide / 2
+    const unit = (side - 34) / span, left = right ? this.easel.wide - side - 8 : 8, top = 8
     g.fillStyle = look.paper
     g.strokeStyle = look.edge
     g.lineWidth = 1

@@ -1,52 +1,74 @@
-// The part of the possible range that 1000 random networks reach.
+// The random walk, in the plane of two forces, and the part of S there that it reaches.
 
+import { unflat } from "../../browser/canvas_paths.js"
 import { PackingExperiment } from "./packing_experiment.js"
+
+const SECONDS = 8 // for the whole walk
 
 export class Chance extends PackingExperiment {
   async load(source) {
-    const packing = this.packing = await source.get("packing", "0.1")
-    this.contact = packing.grabbed
-    this.count = 0 // random networks so far
+    const [packing, { other, outline, share }] = await Promise.all([source.get("packing", "0.1"), source.get("shadow")])
+    const contact = packing.grabbed, force = (row, c) => packing.normal[row * packing.contacts + c]
+    Object.assign(this, { packing, contact, share, steered: false, outline: unflat([...outline]), row: 0 })
     this.network = this.before = this.asPacked(packing)
-    this.canvas.show(packing, this.contact)
-    this.drawn = [...packing.number].map((number, row) => ({ number, value: packing.normal[row * packing.contacts + this.contact], row }))
-    this.now = this.drawn[0]
+    this.canvas.show(packing, null)
+    this.canvas.scene.pair = [contact, other]
+    this.drawn = [...packing.number].map((number, row) => Object.assign([force(row, contact), force(row, other)], { number }))
+    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
   }
 
   /** Predictions cannot be outside the range that the text gives. */
   get possible() { return [this.packing.least[this.contact], this.packing.largest[this.contact]] }
 
-  get value() { return Math.max(...this.drawn.filter(({ number }) => number && number <= this.count).map(({ value }) => value)) }
   get answer() { return this.packing.high[this.contact] }
 
   get facts() {
-    const { packing, contact } = this, { least, largest, low, high } = packing, part = (c) => (high[c] - low[c]) / Math.max(largest[c] - least[c], 1e-9)
-    const widths = (a, b) => a.reduce((sum, v, c) => sum + v - b[c], 0)
+    const { packing, contact, share } = this, { least, largest, low, high } = packing
     return {
-      ...this.counted(packing), low: least[contact], high: largest[contact], part: part(contact),
-      all: packing.all_disks, mean: widths(high, low) / widths(largest, least), states: packing.states,
+      ...this.counted(packing), low: least[contact], high: largest[contact], share, states: packing.states,
+      part: (high[contact] - low[contact]) / (largest[contact] - least[contact]),
     }
   }
 
-  drag(x, y) {
-    this.count = Math.round(Math.min(y, this.packing.states))
-    this.now = this.drawn.filter(({ number }) => number <= this.count).at(-1)
-    const { row } = this.now, { normal, contacts, states } = this.packing
+  get knob() { return { label: "walk", max: this.drawn.length - 1, step: 1, stage: 1 } }
+
+  get turned() { return { value: this.row, words: `network ${this.drawn[this.row].number}` } }
+
+  turn(row) {
+    cancelAnimationFrame(this.frame)
+    this.walking = false
+    this.stepTo(row)
+  }
+
+  stepTo(row) {
+    const { normal, contacts } = this.packing
+    this.row = row
     this.network = normal.subarray(row * contacts, (row + 1) * contacts)
-    if (this.count > 0.99 * states) this.answered = true
+    this.answered ||= row === this.drawn.length - 1
     this.changed()
   }
 
+  get offer() {
+    return this.walking ? null : { words: this.answered ? "Walk again" : "Walk", run: () => this.walk(performance.now()) }
+  }
+
+  /** Play the walk, which began at this time. */
+  walk(began) {
+    const last = this.drawn.length - 1, part = this.still ? 1 : Math.max(0, (performance.now() - began) / 1000 / SECONDS)
+    this.walking = part < 1
+    this.stepTo(Math.min(last, Math.floor(part * last)))
+    if (this.walking) this.frame = requestAnimationFrame(() => this.walk(began))
+  }
+
+  finish() { this.stepTo(this.drawn.length - 1) }
+
   get picture() {
-    const { packing: { least, largest, low, high, states }, contact, answered, count } = this
-    const rows = this.drawn.filter(({ number }) => number <= count)
-    return {
-      now: [this.now.value, count], words: `network ${count}`,
-      exact: [rectangle(least[contact], largest[contact], states)], filled: true,
-      seen: answered ? [[[low[contact], states], [high[contact], states]]] : [], brush: 8,
-      dots: rows.map(({ value, number }) => [value, number]),
-    }
+    const path = this.drawn.slice(0, this.row + 1)
+    return { now: path.at(-1), words: "", exact: this.outline, seen: path, dots: path, filled: true, walk: true }
+  }
+
+  stop() {
+    cancelAnimationFrame(this.frame)
+    super.stop()
   }
 }
-
-const rectangle = (low, high, top) => [[low, 0], [high, 0], [high, top], [low, top]]

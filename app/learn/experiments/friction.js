@@ -52,9 +52,8 @@ export class Friction extends PackingExperiment {
   get answer() { return this.stops[this.spreads.indexOf(Math.max(...this.spreads))] }
 
   get facts() {
-    const { packing, packed, stops, spreads, touching, free } = this
-    const rows = stops.map((mu, k) => ({ mu, touching: touching[k], free: free[k], spread: spreads[k] })).filter(({ mu }, k) => mu === packed[k])
-    return { ...this.counted(packing), rows }
+    const { packing, stops, spreads, touching, free } = this
+    return { ...this.counted(packing), rows: stops.map((mu, k) => ({ mu, touching: touching[k], free: free[k], spread: spreads[k] })) }
   }
 
   /** Move to the nearest stop, past all stops on the way. */
@@ -65,11 +64,15 @@ export class Friction extends PackingExperiment {
     this.go()
   }
 
+  /** To the ends, and to the answer. */
+  finish({ x }) { for (const to of [x.low, x.high, this.answer]) this.drag(to) }
+
   get picture() {
-    const { stops, spreads, value, visited, answered } = this, curve = stops.map((mu, k) => [mu, spreads[k]])
+    const { stops, spreads, free, value, visited, answered } = this, now = stops.indexOf(value), curve = stops.map((mu, k) => [mu, spreads[k]])
+    const been = ([mu]) => mu === value || visited.has(mu)
     return {
-      now: curve[stops.indexOf(value)], words: `μ = ${value}`, seen: [], brush: 2,
-      dots: curve.filter(([mu]) => visited.has(mu)), thin: true, exact: answered ? [curve] : [],
+      now: curve[now], words: `μ = ${value}: ${free[now].toFixed(0)} free`, dots: curve.filter(been),
+      second: stops.map((mu, k) => [mu, free[k]]).filter(been), thin: true, exact: answered ? curve : [],
     }
   }
 

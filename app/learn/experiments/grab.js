@@ -2,6 +2,8 @@
 // marked one is asked for, but any other can be dragged too, from the network on screen.
 
 import { networkAt } from "../../packing/replay/replay.js"
+import { hull } from "../model/polytope.js"
+import { SceneInHand } from "../model/scene_in_hand.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const FOUND = 0.01 // of the distance between both ends
@@ -16,6 +18,7 @@ export class Grab extends PackingExperiment {
     this.tangential = packing.tangential.subarray(0, packing.contacts)
     this.start = this.value
     this.canvas.show(packing, contact)
+    this.box = new SceneInHand(await source.get("scene", "box"), () => {}).body
     this.fetched = source.get("rail").then((rail) => { this.rail = this.first = { ...rail, contact } })
   }
 
@@ -93,10 +96,14 @@ export class Grab extends PackingExperiment {
   }
 
   get picture() {
-    const { packing, contact, seen, answered } = this
-    return {
-      now: [this.value, 0], seen: seen ? [seen.map((x) => [x, 0])] : [],
-      exact: answered ? [[[packing.least[contact], 0], [packing.largest[contact], 0]]] : [],
-    }
+    const { packing, contact, seen, answered } = this, level = (x) => [x, 0]
+    return { now: [this.value, 0], seen: seen?.map(level), exact: answered ? [packing.least[contact], packing.largest[contact]].map(level) : [] }
+  }
+
+  /** S of two disks in a box: its largest force is at a corner. */
+  get aside() {
+    const { axes, across, up } = this.options, outline = hull(this.box.corners.map(({ u }) => { const F = this.box.forces(u); return [F[across], F[up]] }))
+    const most = Math.max(...outline.map(([x]) => x))
+    return { axes, exact: outline, filled: true, dots: outline.filter(([x]) => x === most), answer: { value: most, words: most.toFixed(2) } }
   }
 }

@@ -7,7 +7,7 @@ const AT_LIMIT = 1e-4 // mean forces: distance from the limit of friction, or fr
 
 export class PackingExperiment {
   constructor(host, options, changed, palettes) {
-    Object.assign(this, { host, options, changed, locked: true, answered: false, seen: null, palettes })
+    Object.assign(this, { host, options, changed, steered: true, locked: true, answered: false, seen: null, palettes })
     this.canvas = new PackingPicture(host, palettes, this)
     this.label = host.appendChild(createElement("div", { className: "label", hidden: true }))
   }
@@ -52,6 +52,9 @@ export class PackingExperiment {
     this.canvas.limited = this.limited
     this.canvas.draw(this.network, this.before ?? null, palettes)
   }
+
+  /** From the least to the largest value. */
+  finish({ x }) { for (const to of [x.low, x.high]) this.drag(to) }
 
   stop() { this.canvas.stop() }
 }

@@ -5,6 +5,8 @@ import { networkAt } from "../../packing/replay/replay.js"
 import { Sway } from "../../packing/drawing/displacement.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
+const SHOWN = 0.45 // of the width of the packing
+
 export class Push extends PackingExperiment {
   async load(source) {
     this.packing = await source.get("packing", "0.1")
@@ -20,6 +22,7 @@ export class Push extends PackingExperiment {
   begin(start, path) {
     Object.assign(this, { start, path, before: networkAt(path, 0).normal })
     this.canvas.show(this.packing, path.contact)
+    this.canvas.zoom(path.contact, SHOWN)
     this.drag(0)
   }
 
@@ -78,8 +81,8 @@ export class Push extends PackingExperiment {
 
   get picture() {
     const { value, answered, limits, path } = this
-    const bound = { value: path.limit, words: `S allows ${path.limit.toFixed(2)}` }
-    return { now: [value, 0], seen: [[[0, 0], [value, 0]]], lines: answered ? [bound, ...limits.slice(1)] : [] }
+    const bound = { value: path.limit, words: `limit load ${path.limit.toFixed(2)}` }
+    return { now: [value, 0], seen: [[0, 0], [value, 0]], lines: answered ? [bound, ...limits.slice(1)] : [] }
   }
 
   stop() {

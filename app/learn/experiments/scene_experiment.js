@@ -1,59 +1,87 @@
-// Chapters of small scenes: the disks with their forces, and the explored part of S over one or two
+// Chapters of small scenes: the bodies with their forces, and the explored part of S over one or two
 // forces.
 
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
-import { Body } from "../model/polytope.js"
-import { fixed, middleOf } from "../model/middle.js"
+import { fixed } from "../model/middle.js"
+import { area, hull } from "../model/polytope.js"
 import { palette } from "../drawing/palette.js"
+import { SceneInHand } from "../model/scene_in_hand.js"
 
-const FOUND = 0.01 // relative distance from the end at which it counts as found
-const WAY = 1500 // stored positions of the drag
+const FOUND = 0.01 // relative distance from an end at which it counts as found
+const ROUND = 0.9 // part of S that a path round it has to enclose
 const STEPS = 20, SECONDS = 0.4 // to other forces behind the same dot
+const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 
 export class SceneExperiment {
-  /** options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. */
+  /**
+   * options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. goal: where the dot
+   * has to go: to the "high" end, to "both", or "round" S.
+   */
   constructor(host, options, changed) {
-    Object.assign(this, { host, options, changed, way: [], locked: true, answered: false, lit: new Set() })
+    Object.assign(this, { host, options, changed, steered: true, locked: true, answered: false, lit: new Set(), way: [] })
     this.canvas = host.appendChild(document.createElement("canvas"))
-    Object.assign(this.canvas, { role: "img", ariaLabel: "Disks, and the force on them at every contact" })
+    Object.assign(this.canvas, { role: "img", ariaLabel: "What is in balance, and the force on it at every contact" })
     this.arrows = new Arrows(this.canvas, (what, given) => this.respond(what, given))
   }
 
   async load(source) {
-    const scene = await source.get("scene", this.options.scene)
-    this.scene = scene
-    this.body = new Body(scene).cut(scene.mu)
-    if (this.body.whole) this.body.u = [...this.body.middle]
-    else {
-      this.body.goInside()
-      this.body.u = middleOf(this.body)
-    }
+    const scene = this.scene = await source.get("scene", this.options.scene)
+    this.hand = new SceneInHand(scene, () => {})
     this.start = this.at
     this.mean = this.body.sumAt(this.body.u) / this.body.count
-    if (this.body.whole) this.end(this.body.interval(this.options.x), this.corners)
-    else this.ends = source.get("ends", this.options.scene).then(({ bounds, outline }) => this.end(bounds[this.options.x / 2], unflat([...outline])))
+    this.ends = this.body.whole ? this.end() : source.get("ends", this.options.scene).then(({ mu, bounds, outlines }) => {
+      this.known = mu.map((one, k) => ({ mu: one, bounds: bounds[k], outline: unflat([...outlines[k]]) ?? [] }))
+      this.end()
+    })
   }
+
+  get body() { return this.hand.body }
 
   /** Whether the answer can be found: if S is not drawn whole, only the server knows it. */
   ready() { return this.ends }
 
-  /** The least and the largest value of the quantity, and the corners of S on its axes, in order. */
-  end([low, high], outline) { Object.assign(this, { low, high, outline }) }
-
-  /** Corners of a polygon S on its axes, in order. */
-  get corners() {
-    const { body, options: { x, y } } = this
-    const flat = body.corners.map(({ u }) => { const F = body.forces(u); return [F[x], y === null ? 0 : F[y]] })
-    const [a, b] = [0, 1].map((d) => flat.reduce((sum, point) => sum + point[d], 0) / flat.length)
-    return flat.sort((one, other) => Math.atan2(one[1] - b, one[0] - a) - Math.atan2(other[1] - b, other[0] - a))
+  /** S at the present friction: [least, largest] value of the quantity, and the corners on its axes. */
+  measured() {
+    const { body, options: { x }, known } = this
+    if (!known) return { bounds: body.empty ? [] : body.interval(x), outline: hull(body.corners.map(({ u }) => this.flat(u))) }
+    return body.empty ? { bounds: [], outline: [] } : known.find(({ mu }) => Math.abs(mu - body.mu) < 1e-9)
   }
 
-  get at() {
-    const F = this.body.forces(), { x, y } = this.options
+  end() {
+    this.S = this.measured()
+    if (!this.first) [this.low, this.high] = (this.first = this.S).bounds
+  }
+
+  // Friction
+
+  get knob() { return FRICTION }
+
+  /** Another friction: S is cut again, and explored anew. */
+  turn(mu) {
+    cancelAnimationFrame(this.frame)
+    this.hand.cut(mu)
+    Object.assign(this, { way: [], others: null, varied: mu !== this.scene.mu })
+    this.end()
+    this.changed()
+  }
+
+  get turned() {
+    const { body, scene: { one }, S: { bounds: [low, high] = [] } = {} } = this, value = body.mu, mu = `μ = ${Number(value.toFixed(2))}`
+    if (low === undefined) return { value, words: `${mu}: S is empty. No forces hold the ${one}${body.scene.r.length > 1 ? "s" : ""}: motion begins.` }
+    if (high === Infinity) return { value, words: `${mu}: S has no end. Forces lock between the walls, as large as you like.` }
+    return { value, words: high - low < 1e-6 ? `${mu}: S is one point, ${low.toFixed(2)}. Nothing is left open.` : `${mu}: from ${low.toFixed(2)} to ${high.toFixed(2)}` }
+  }
+
+  // Forces
+
+  /** Forces on the axes, at a point of S. */
+  flat(u) {
+    const F = this.body.forces(u), { x, y } = this.options
     return [F[x], y === null ? 0 : F[y]]
   }
 
+  get at() { return this.flat(this.body.u) }
   get value() { return this.at[0] }
   get answer() { return this.high }
 
@@ -63,20 +91,35 @@ export class SceneExperiment {
     const weight = [...scene.load].reduce((sum, v, k) => sum + (k % 3 === 1 ? -v : 0), 0)
     return {
       contacts: body.count, disks: scene.r.length, equations: scene.equations, free: body.h, mu: scene.mu,
-      low: this.low, high: this.high, weight, start: this.start[0], mean: this.mean, others: this.others,
+      low: this.low, high: this.high, smooth: this.smooth, weight, start: this.start[0], mean: this.mean, others: this.others,
     }
+  }
+
+  /** On a line S, the quantity where the friction of its contact is zero. */
+  get smooth() {
+    const { body, options: { x } } = this, [a, b] = body.corners?.map(({ u }) => body.forces(u)) ?? []
+    return a && b ? a[x] - (a[x + 1] * (b[x] - a[x])) / (b[x + 1] - a[x + 1]) : NaN
   }
 
   /** Move the dot to these values, as far as S extends. */
   drag(x, y) {
     const { body, options } = this
+    if (body.empty) return
     if (options.y !== null) body.steer([options.x, options.y], [x, y])
     body.steer([options.x], [x]) // at the edge of S the other force yields
     this.moved()
   }
 
+  /** To both ends, or round S, and to the answer. */
+  finish({ x }) {
+    const { outline } = this.S
+    for (const [px, py] of [...outline, [x.low, 0], [this.answer, this.at[1]]]) this.drag(px, py)
+  }
+
   /** Where S is drawn as a shadow, other forces behind the same dot. */
-  get offer() { return this.body.whole ? null : { words: "Change the other forces", run: () => this.change() } }
+  get offer() {
+    return this.body.whole || !this.answered || this.body.empty ? null : { words: "Change the other forces", run: () => this.change() }
+  }
 
   /** Walk to another point of S with the same forces on the axes; there is none behind the edge of the shadow. */
   change() {
@@ -100,13 +143,22 @@ export class SceneExperiment {
   moved() {
     cancelAnimationFrame(this.frame)
     this.others = null
-    const { at, way } = this, before = way.at(-1) ?? this.start
-    if (!way.length) way.push(this.start)
-    if (Math.hypot(at[0] - before[0], at[1] - before[1]) > 1e-3) way.push(at)
-    if (way.length > WAY) way.splice(1, 1)
-    if (this.high - at[0] < FOUND * (this.high - this.low)) this.answered = true
+    this.way = hull([...(this.way.length ? this.way : [this.varied ? this.at : this.start]), this.at])
+    this.answered ||= this.reached
     this.changed()
   }
+
+  /** Whether the dot has been where it has to go. */
+  get reached() {
+    const { way, options: { goal }, first } = this
+    if (!first) return false
+    const [low, high] = first.bounds, near = FOUND * (high - low), xs = way.map(([x]) => x)
+    if (goal === "round") return this.enclosed > ROUND
+    return high - Math.max(...xs) < near && (goal !== "both" || Math.min(...xs) - low < near)
+  }
+
+  /** Part of the area of S that the path encloses. */
+  get enclosed() { return area(this.way) / area(this.first.outline) }
 
   respond(what, given) {
     if (what === "hover" && !this.arrows.held) {
@@ -123,23 +175,19 @@ export class SceneExperiment {
 
   /** The contents of the plot. */
   get picture() {
-    const { way, answered, options: { y }, low, high, outline } = this, xs = way.map(([x]) => x)
-    const line = way.length ? [[[Math.min(...xs), 0], [Math.max(...xs), 0]]] : []
+    const { way, answered, varied, options: { goal, y }, S, body } = this
+    const round = goal === "round" && !this.locked && !answered ? `, ${Math.round(100 * this.enclosed)} % of S` : ""
     return {
-      now: this.at,
-      seen: y === null ? line : way.length ? [way] : [],
-      exact: !answered ? [] : y === null ? [[[low, 0], [high, 0]]] : [outline],
-      filled: y !== null,
-      brush: y === null ? 10 : 14,
-      clip: y === null ? null : outline,
+      now: body.empty ? null : this.at, words: `now ${this.value.toFixed(2)}${round}`,
+      seen: way, exact: answered ? S.outline : [], filled: y !== null, unanswered: varied || goal === "both",
     }
   }
 
   draw(dark) {
-    const { arrows, body, canvas, options: { x, y } } = this
-    if (!body || !canvas.clientWidth) return
-    if (arrows.body !== body || arrows.wide !== canvas.clientWidth) {
-      arrows.fit(body)
+    const { arrows, hand, canvas, options: { x, y } } = this
+    if (!hand || !canvas.clientWidth) return
+    if (arrows.body !== hand.body || arrows.wide !== canvas.clientWidth) {
+      arrows.fit(hand.body)
       arrows.wide = canvas.clientWidth
     }
     const colours = palette(dark), axes = new Map(y === null ? [] : [[x, colours.across], [y, colours.up]])

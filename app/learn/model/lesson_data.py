@@ -7,14 +7,15 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from granforce.live import hulls
 from granforce.live.pulls import Puller
-from granforce.records import InputError, float_array
+from granforce.records import InputError, NotJammedError, float_array
 from granforce.study import kinds
 from granforce.study.cells import entries
 
 from ...packing.legend import exact_intervals
 from ...packing.player import frames
-from ...results import study_data
+from ...results import planes, study_data
 from ...results.library import Cell, Library, Shown, best_cell
 from ...state.perturbations import path
 from ...state.pulls import rail_of
@@ -25,6 +26,8 @@ NEAR = 0.5  # largest distance of a marked contact from the centre, in half view
 STRONG = 1.5  # least force of the contact that is pulled, ⟨f_n⟩
 FIRM = 0.5  # least critical force of the contact that is pushed, ⟨f_n⟩
 STARTS = 4  # networks from which it is pushed: as packed, and others of the stored walk
+
+FRICTIONS = [round(0.05 * k, 2) for k in range(25)]  # of a small scene, as its slider has them
 
 # Curves against friction, by the measures of which they are means.
 CURVES = {"spread": "eta1", "touching": "coordination", "free": "dimension"}
@@ -38,8 +41,20 @@ def scene(name: str) -> dict[str, Any]:
 
 @lru_cache
 def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
-    """Exact interval of every normal force in a small scene, and the outline of S on two forces."""
-    return small_scenes.measured(small_scenes.packing_of(name), plane=plane)
+    """S of a small scene on two forces at every μ of FRICTIONS; empty lists where S is empty.
+
+    mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat.
+    """
+    packing = small_scenes.packing_of(name)
+    found: dict[str, Any] = {"mu": FRICTIONS, "bounds": [], "outlines": []}
+    for mu in FRICTIONS:
+        try:
+            S = small_scenes.measured(packing._replace(mu=mu), plane=plane)
+        except NotJammedError:
+            S = {"bounds": {plane[0] // 2: []}, "outline": []}
+        found["bounds"].append(S["bounds"][plane[0] // 2])
+        found["outlines"].append(S["outline"])
+    return found
 
 
 class Packings:
@@ -56,6 +71,7 @@ class Packings:
                 self.cells[cell.mu] = cell
         self.rail = lru_cache(1)(self._rail)
         self.push = lru_cache(STARTS)(self._push)
+        self.shadow = lru_cache(1)(self._shadow)
 
     @property
     def frictions(self) -> list[float]:
@@ -90,6 +106,24 @@ class Packings:
         bounds = exact_intervals(self.shown(mu).exact, replay)
         fits = (_away(replay) < NEAR) & (replay.normal[0] > STRONG)
         return int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
+
+    def _shadow(self) -> dict[str, Any]:
+        """S on the forces of the marked contact and of another one, and the share that walks fill.
+
+        other: the least determined contact near the centre that shares no disk with the marked one.
+        """
+        replay, exact = self.shown(MU).replay, self.shown(MU).exact
+        bounds, links, marked = exact_intervals(exact, replay), replay.links, self._grabbed(MU)
+        disks = np.zeros((len(replay.backbone), 2), dtype=int)
+        disks[links.contact] = np.column_stack([links.i, links.j])
+        fits = (_away(replay) < NEAR) & ~np.isin(disks, disks[marked]).any(axis=1)
+        other = int(np.argmax(np.where(fits, bounds["high"] - bounds["low"], -1.0)))
+        packing = self.library.packing(self.cells[MU].params["packing"])
+        forces = [2 * int(replay.backbone[contact]) for contact in (marked, other)]
+        outline = hulls.outline(packing, forces) / replay.force_scale
+        walked = replay.normal[1:, [marked, other]]
+        share = planes.area(walked) / planes.area(outline)
+        return {"other": other, "outline": outline.ravel(), "share": share}
 
     def _puller(self) -> Puller:
         cell = self.cells[MU]

@@ -13,6 +13,22 @@ export function distance([ax, ay], [bx, by], px, py) {
   return Math.hypot(px - ax - s * dx, py - ay - s * dy)
 }
 
+/** Corners of the convex hull of points in a plane, in order. */
+export function hull(points) {
+  const sorted = points.toSorted(([a, b], [c, d]) => a - c || b - d)
+  const half = (ordered) => ordered.reduce((kept, [x, y]) => {
+    const left = () => { const [[a, b], [c, d]] = kept.slice(-2); return (c - a) * (y - b) > (d - b) * (x - a) }
+    while (kept.length > 1 && !left()) kept.pop()
+    return [...kept, [x, y]]
+  }, [])
+  return [...half(sorted).slice(0, -1), ...half(sorted.toReversed()).slice(0, -1)]
+}
+
+/** The area of a polygon. */
+export function area(corners) {
+  return Math.abs(corners.reduce((sum, [x, y], k) => { const [a, b] = corners.at(k - 1); return sum + a * y - b * x }, 0)) / 2
+}
+
 export function dot(a, b) {
   let sum = 0
   for (let k = 0; k < a.length; k++) sum += a[k] * b[k]

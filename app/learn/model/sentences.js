@@ -54,7 +54,7 @@ export function legend(body) {
   const parts = scene.r.length < 4 ? "normal parts, " : ""
   const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
   const heads = scene.r.length > 2 ? " (in opposite pairs)" : ""
-  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
+  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; dark wedge: friction at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at any contact. */

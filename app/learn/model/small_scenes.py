@@ -16,7 +16,8 @@ from granforce.types import Floats, Integers
 from ...state.scene_links import OWN
 
 MOST_BODIES, MOST_WALLS = 30, 12
-BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # the initial scene of the builder
+# The initial scene of the builder: two disks wedged in a box, with room for more.
+BEGIN = "1,1,1;2,2.732050807569,1|0,5,0,0;0,0,3,0;3,0,3,5"
 PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: the pressing walls
 DRAWN = 6.0  # fraction of all loads: largest f_n drawn for an unbounded S
 ONE = {"ladder": "ladder", "stones": "stone"}  # a body of these scenes

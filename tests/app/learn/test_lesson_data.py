@@ -45,3 +45,12 @@ def test_without_a_study_friction_stops_at_the_packings(packings, monkeypatch):
     curve = packings.curve()
     assert curve["mu"] == curve["packed"] == packings.frictions
     assert curve["spread"] == [packings.packing(mu)["spread"] for mu in packings.frictions]
+
+
+def test_the_walk_fills_a_small_part_of_the_shadow_of_s(packings):
+    shadow, packing = packings.shadow(), packings.packing(0.1)
+    outline = shadow["outline"].reshape(-1, 2)
+    for k, contact in enumerate((packing["grabbed"], shadow["other"])):
+        ends = packing["least"][contact], packing["largest"][contact]
+        np.testing.assert_allclose((outline[:, k].min(), outline[:, k].max()), ends, atol=0.01)
+    assert 0.05 < shadow["share"] < 0.2
