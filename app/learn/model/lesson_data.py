@@ -46,15 +46,15 @@ def ends(name: str, plane: tuple[int, int]) -> dict[str, Any]:
     mu (k,); bounds: k times [least, largest] value of the first force; outlines: corners, flat.
     """
     packing = small_scenes.packing_of(name)
-    found: dict[str, Any] = {"mu": FRICTIONS, "bounds": [], "outlines": []}
+    bounds, outlines = [], []
     for mu in FRICTIONS:
         try:
             S = small_scenes.measured(packing._replace(mu=mu), plane=plane)
         except NotJammedError:
-            S = {"bounds": {plane[0] // 2: []}, "outline": []}
-        found["bounds"].append(S["bounds"][plane[0] // 2])
-        found["outlines"].append(S["outline"])
-    return found
+            S = {"bounds": [[]] * len(packing.contacts.i), "outline": []}
+        bounds.append(S["bounds"][plane[0] // 2])
+        outlines.append(S["outline"])
+    return {"mu": FRICTIONS, "bounds": bounds, "outlines": outlines}
 
 
 class Packings:
