@@ -187,8 +187,6 @@ def infer(
         For inconsistent shapes, σ ≤ 0, or without any measurement.
     NotJammedError
         If S is empty.
-    Cancelled
-        If cancelled.
     """
     begin = time.perf_counter()
     numbers, seed = (states, chains, workers), random_seed(seed)

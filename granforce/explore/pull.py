@@ -122,8 +122,6 @@ def pull(
         message gives.
     NotJammedError
         If S is empty.
-    Cancelled
-        If cancelled.
     """
     position = ensemble.position(contact)
     values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
@@ -246,8 +244,6 @@ def reach(
         If the interval could not be certified.
     NotJammedError
         If S is empty.
-    Cancelled
-        If cancelled.
     """
     position = ensemble.position(contact)
     keys = [(position, 0, side) for side in (0, 1)]

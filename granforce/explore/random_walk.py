@@ -187,8 +187,6 @@ def walk(
         arguments.
     NotJammedError
         If max_attempts yield too few states of a whole walk.
-    Cancelled
-        If cancelled.
     """
     states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
     workers, seed = worker_count(workers), random_seed(seed)

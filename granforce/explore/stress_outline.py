@@ -160,8 +160,6 @@ def admissible_stress(
     ------
     InputError
         As `stress_outline`.
-    Cancelled
-        If cancelled.
     """
     axes = stress_axes(ensemble)
     polygons = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)

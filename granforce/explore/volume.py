@@ -150,8 +150,6 @@ def volume(
         For an accuracy below 0.01 and unbounded forces.
     NotJammedError
         If S is empty.
-    Cancelled
-        If cancelled.
     """
     begin = time.perf_counter()
     accuracy, seed = positive(accuracy, "accuracy", least=LEAST_ACCURACY), random_seed(seed)

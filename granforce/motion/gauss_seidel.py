@@ -69,8 +69,6 @@ def gauss_seidel(
     ------
     InputError
         If the whole stress is prescribed or forces are known.
-    Cancelled
-        If cancelled.
     """
     refuse_options(gauss_seidel, options, [*inspect.signature(SideBySide).parameters][2:])
     order = choice(order, ("sequential", "random"), "order")

@@ -99,8 +99,6 @@ def rest(
         If S is empty.
     InputError
         If the packing has no forces, and for conditions with an Ensemble.
-    Cancelled
-        If cancelled.
     """
     S = ensemble_at(packing, **conditions)
     draws = whole(draws, "draws", least=1)

@@ -180,8 +180,6 @@ def pack(
         again and again.
     InputError
         For bad input.
-    Cancelled
-        If cancelled.
     """
     mu = friction(mu)
     pressure = moderate(pressure, "pressure")

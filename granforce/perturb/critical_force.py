@@ -190,8 +190,6 @@ def critical_force(
     InputError
         For a contact without force in any state of S, for mu with an Ensemble, and if the search
         ends at a given limit load that is below the exact one.
-    Cancelled
-        If cancelled.
     """
     refuse_options(critical_force, protocol, Protocol._fields)
     S = ensemble_at(packing, mu=mu)
@@ -242,8 +240,6 @@ def critical_forces(
         If a limit load cannot be certified, or is given as NaN.
     InputError
         As for `critical_force`.
-    Cancelled
-        If cancelled.
     """
     refuse_options(critical_forces, protocol, Protocol._fields)
     S, protocol = ensemble, checked(Protocol(**protocol))
@@ -435,8 +431,6 @@ def response(
     ------
     InputError
         If the grains come to rest under this load, and for an unused precision.
-    Cancelled
-        If cancelled.
     """
     S = ensemble_at(packing, mu=mu)
     used = critical is None or (force is None and critical.moving is None)

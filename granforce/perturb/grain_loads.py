@@ -121,8 +121,6 @@ def load_factor(
         If a pressure is prescribed, and if the load acts on no grain.
     UndecidedError
         If the limit could not be certified.
-    Cancelled
-        If cancelled.
     """
     return _limit(with_idle(ensemble), load)
 

@@ -75,8 +75,6 @@ def loaded_networks(
     InputError
         For a contact that carries no force, and for a load without a network (there is none above
         the limit load).
-    Cancelled
-        If cancelled.
     """
     position = ensemble.position(contact)
     loads = float_array(np.atleast_1d(real_array(loads, "loads")), (-1,), "loads")

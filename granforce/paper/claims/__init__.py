@@ -6,7 +6,7 @@ walk are close enough to S. How a verdict follows from numbers and a range is in
 
 Samplers: "gauss_seidel", the paper's relaxation, whose sweeps end at 10⁻³ of ⟨f_n⟩ here, which they
 reach at every μ; "nearest" networks; "uniform" states; "exact" bounds; and "" for packings alone.
-A name that ends in LATE is of packings in which drag sets in later.
+A name that ends in "late drag" is of packings in which drag sets in later.
 
 Verdicts are not corrected for the number of claims: each is an answer of its own.
 """
@@ -28,7 +28,6 @@ from granforce.types import Rows
 # From this μ on, results depend on how packings come to rest, and claims need both preparations.
 PREPARED_FROM = 1.0
 LATE_DRAG = "prepared_late_drag"
-LATE = ", late drag"
 # Both preparations have these parts.
 _PREPARED = {"walk": LATE_DRAG, "exact": f"{LATE_DRAG}_exact"}
 
@@ -56,8 +55,10 @@ def _judge(claim: Claim, table: StudyTable, usual: StudyTable, late: StudyTable)
     other = list(claim.measure(late, both)) if needed else []
     late_verdict = compared = ""
     if _large(other):
-        by[both + LATE] = verdict_of(other, claim.ranges)
-        late_verdict = by[both + LATE]["verdict"]
+        by[f"{both}, late drag" if both else "late drag"] = of_late = verdict_of(
+            other, claim.ranges
+        )
+        late_verdict = of_late["verdict"]
         compared = verdict_of(list(claim.measure(usual, both)), claim.ranges)["verdict"]
         if {late_verdict, compared} == {REPRODUCED, CONTRADICTED}:
             verdict = DEPENDS
