@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from granforce.cli.parser import Parser, make_parser, refused
+from granforce.cli.parser import Parser, make_parser, refuse
 from granforce.cli.path_roles import Input, Output, StorePath, Workplace
 from granforce.system import interrupts, streams
 
@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     0; 1 if some cells failed, or a result could not be printed or stored; 2 for invalid input; 130
     after Ctrl-C.
     """
-    with streams.guarded():
+    with streams.guard_output():
         try:
             try:
                 return _main(argv)
@@ -40,7 +40,7 @@ def _main(argv: Sequence[str] | None) -> int:
     parser = make_parser()
     arguments = parser.parse_args(argv)
     usual = warnings.formatwarning
-    with interrupts.noted():
+    with interrupts.record_interrupts():
         try:
             return _run(arguments, parser)
         except KeyboardInterrupt as error:
@@ -70,11 +70,11 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
     for _, path in command.paths(arguments):
         # Before the imports, which take seconds.
         if isinstance(path, Input) and not os.path.lexists(os.path.expanduser(path)):
-            return refused(f"{path}: cannot be read (No such file or directory); check the path")
+            return refuse(f"{path}: cannot be read (No such file or directory); check the path")
     threads = os.environ.get("NUMBA_NUM_THREADS", "").strip()
     if threads.lstrip("-").isdecimal() and threads.lstrip("0")[:1] in ("", "-"):
         # numba's import would fail.
-        return refused(
+        return refuse(
             f"NUMBA_NUM_THREADS must be at least 1, got {threads[:20]}; change or unset it"
         )
     if arguments.run == "app":
@@ -97,13 +97,13 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         return max(code, 1) if store is not None and store.incomplete else code
     except InputError as error:
         option = command.option_of(error.argument, error.value, arguments)
-        return refused(option + str(error).removeprefix(error.argument) if option else str(error))
+        return refuse(option + str(error).removeprefix(error.argument) if option else str(error))
     except OSError as error:
         if error.errno not in (errno.EMFILE, errno.ENFILE):
             raise
-        return refused("too many open files; use fewer --workers, or raise the limit (ulimit -n)")
+        return refuse("too many open files; use fewer --workers, or raise the limit (ulimit -n)")
     except MemoryError as error:
-        return refused(f"not enough memory: {str(error) or 'ask for less'}")
+        return refuse(f"not enough memory: {str(error) or 'ask for less'}")
     except Cancelled:
         return _report_interrupt()
 

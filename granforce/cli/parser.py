@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from granforce import __version__
 from granforce.cli.command_table import COMMANDS, Command, Group, Options, Rule
 from granforce.cli.path_roles import ROLES, Output, TableOrStore
-from granforce.cli.report_lines import FEW, explained
+from granforce.cli.report_lines import FEW, explanation
 from granforce.system.wording import integer, number
 
 LONGEST = 600  # characters of a message
@@ -34,7 +34,7 @@ def _no_file(path: str) -> bool:
     return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
 
 
-def refused(reason: str) -> int:
+def refuse(reason: str) -> int:
     """Print why a command is rejected, as one line on stderr; returns the exit code 2."""
     line = " ".join(str(reason).split())
     if len(line) > LONGEST:  # for example a name of thousands of characters
@@ -122,7 +122,7 @@ class Parser(argparse.ArgumentParser):
             self.register("type", kind, read)
 
     def error(self, message: str) -> NoReturn:
-        self.exit(refused(f"{message}; see {self.prog} --help"))
+        self.exit(refuse(f"{message}; see {self.prog} --help"))
 
     @property
     def options(self) -> dict[str, str]:
@@ -281,9 +281,9 @@ def _add_command(
     commands: argparse._SubParsersAction[Parser], command: Command, example: str, function: str
 ) -> Parser:
     """Add a command, which runs this function of `granforce.cli.commands`."""
-    report = f"Lines of the report:\n{explained(command.lines)}\n\n" if command.lines else ""
+    report = f"Lines of the report:\n{explanation(command.lines)}\n\n" if command.lines else ""
     if command.columns:
-        columns = explained(command.columns)
+        columns = explanation(command.columns)
         report += f"At most {FEW} contacts are listed, with columns\n{columns}\n\n"
     parser = commands.add_parser(
         command.name,

@@ -296,7 +296,7 @@ def line(name: str) -> Line:
     return declared if isinstance(declared, Line) else Line(declared)
 
 
-def explained(names: tuple[str, ...]) -> str:
+def explanation(names: tuple[str, ...]) -> str:
     """The meaning of these lines, two spaces in, as the options above them."""
     width = 24
     lines = []

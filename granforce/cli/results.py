@@ -109,7 +109,7 @@ def store_of(arguments: argparse.Namespace) -> Store:
     return arguments.store
 
 
-def prepared(
+def open_with_packing(
     arguments: argparse.Namespace,
     kind: Kind,
     name: Callable[[Parameters], Parameters],
@@ -211,7 +211,7 @@ def stored_result(
     named: its parameters in addition to the packing and the friction of the cones. watching(bar): a
     callback for the kind's compute that shows progress on the bar; options: its other arguments.
     """
-    store, parameters = prepared(
+    store, parameters = open_with_packing(
         arguments,
         kind,
         lambda packing: kind.parameters(packing, mu=arguments.ensemble_mu, **named),

@@ -257,7 +257,7 @@ def _beyond(deviation: Floats) -> Integers:
     return beyond[np.argsort(-far[beyond], kind="stable")]
 
 
-def judged(
+def draws_of(
     ensemble: Ensemble,
     forces: Floats,
     worth: Mixing,
@@ -296,7 +296,7 @@ def _draws(
     counts = uniform.add_counts({"turns": 0, "refused": 0}, dropped + done)
     counts |= {"dropped": _DROPPED * chains, "held": len(polytope.centre) - len(polytope.moving)}
     mixed = not polytope.dimension or worth.worst_r_hat <= uniform.MIXED
-    return judged(ensemble, samples, worth, mixed, counts, ready - begin, drawn - ready)
+    return draws_of(ensemble, samples, worth, mixed, counts, ready - begin, drawn - ready)
 
 
 def step(

@@ -41,7 +41,7 @@ from granforce.experiment.walls import (
 from granforce.fields import record
 from granforce.forces.likeliest import Likeliest
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
-from granforce.packing.importers.network import WORTH_REVERSING, judged, worth_reversing
+from granforce.packing.importers.network import WORTH_REVERSING, accuracy_of, worth_reversing
 from granforce.packing.importers.notes import noted
 from granforce.packing.importers.text import Source, check_grains
 from granforce.records import InputError, Packing, friction, positive
@@ -396,7 +396,7 @@ def _packing(balance: _Balance, fit: _Fit, frame: float, walls: int) -> Packing:
         "walls": walls,
         "largest_gap": float(np.abs(c.gap / shorter).max()),
     }
-    return packing._replace(info=info | judged(packing))
+    return packing._replace(info=info | accuracy_of(packing))
 
 
 def _ids(grains: _Grains, sides: _Sides) -> Floats:

@@ -23,8 +23,8 @@ import numpy.typing as npt
 from granforce.experiment.infer import (
     Inference,
     checked_numbers,
+    draws_of,
     inference_of,
-    judged,
     measured_rows,
 )
 from granforce.explore.mixing import Mixing
@@ -124,7 +124,7 @@ def remeasured(
     # The draws are independent, so mixing is not diagnosed.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
-    draws = judged(ensemble, repeated, worth, True, counts, 0.0, time.perf_counter() - ready)
+    draws = draws_of(ensemble, repeated, worth, True, counts, 0.0, time.perf_counter() - ready)
     return inference_of(Remeasured, ensemble, best, rows, draws, begin)
 
 

@@ -310,7 +310,7 @@ def _intervals(
         value[:, 1], gap[:, 1] = 0.0, 0.0
     value[~(gap <= accuracy)] = np.nan
     value *= ensemble.force_scale
-    max_gap, converged = _judged(gap, accuracy)
+    max_gap, converged = _largest_gap(gap, accuracy)
     backbone = value[:, 0, 1] > CARRYING * ensemble.force_scale
     low, high = ordered(value[..., 0], value[..., 1], FLAT)
     return Intervals(
@@ -398,7 +398,7 @@ def limit_load_bounds(
     bounds |= solver.solve(keys, [Program([], [], key) for key in keys])
     attained, gap = values_and_gaps(bounds, places)
     load = np.where(gap <= system.accuracy, -attained * ensemble.force_scale, np.nan)
-    judged = _judged(gap, system.accuracy)
+    judged = _largest_gap(gap, system.accuracy)
     return LimitLoads(ensemble.index[places], load, gap, *judged, solver.counts)
 
 
@@ -413,7 +413,7 @@ def values_and_gaps(
     return both[:, 0], np.where(both[:, 0] == both[:, 1], 0.0, apart)
 
 
-def _judged(gap: Floats, accuracy: float) -> tuple[float, bool]:
+def _largest_gap(gap: Floats, accuracy: float) -> tuple[float, bool]:
     """Largest gap of the certified bounds, and whether all are certified."""
     certified = gap <= accuracy
     return float(gap[certified].max(initial=0.0)), bool(certified.all())

@@ -66,7 +66,7 @@ def mixing(draws: Floats, varies: Mask) -> Mixing:
         for first in range(0, values.shape[2], _AT_ONCE):
             cancelling.check("diagnosis")
             some = slice(first, first + _AT_ONCE)
-            answers[:, some] = _judged(values[:, :, some])
+            answers[:, some] = _diagnostics(values[:, :, some])
         stuck = np.all(values == values[:, :1], axis=(0, 1))
         answers[:, stuck] = [[np.inf], [0.0], [0.0]]
     full = np.full((3, *varies.shape), np.nan)
@@ -74,7 +74,7 @@ def mixing(draws: Floats, varies: Mask) -> Mixing:
     return Mixing(*full)
 
 
-def _judged(x: Floats) -> Floats:
+def _diagnostics(x: Floats) -> Floats:
     """R̂, bulk and tail effective sample size (3, k) of draws x (chains, draws, k)."""
     halves = _halves(x)
     folded = np.abs(halves - np.median(halves, axis=(1, 2), keepdims=True))

@@ -172,7 +172,7 @@ def volume(
     stores = uniform.stores_for(polytope, workers, workers)
     allowed = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
     work = _Work(progress, _foreseen(polytope.dimension, allowed))
-    pilots = _climbed(polytope, stores[0], top, seed, work)
+    pilots = _climb(polytope, stores[0], top, seed, work)
     cost = _costs(pilots)
     aim = _needed(pilots, _summed(pilots)[1], cost, allowed)
     work.expect(2 * float((np.maximum(aim, _FIRST) * cost).sum()))
@@ -280,14 +280,14 @@ class _Rung(NamedTuple):
     refused: int
 
 
-def _climbed(
+def _climb(
     polytope: Walls, rows: billiard.RowStore, top: float, seed: int, work: _Work
 ) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
     down: list[_Rung] = []
     beta, slacks, reach = top, np.ones(polytope.count), float(np.sqrt(polytope.dimension / top))
     while not down or down[-1].beta > 0:
-        down.append(_settled(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
+        down.append(_settle(polytope, rows, beta, reach, slacks, [seed, 1, len(down)]))
         work.add_pilots(down[-1])
         q = down[-1].q
         slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
@@ -297,13 +297,13 @@ def _climbed(
     up = []
     for number in range(len(down) - 1, -1, -1):
         beta, reach = down[number].beta, down[number].reach
-        up.append(_settled(polytope, rows, beta, reach, slacks, [seed, 2, number]))
+        up.append(_settle(polytope, rows, beta, reach, slacks, [seed, 2, number]))
         work.add_pilots(up[-1])
         slacks = up[-1].end.slacks
     return [down, up[::-1]]
 
 
-def _settled(
+def _settle(
     polytope: Walls,
     rows: billiard.RowStore,
     beta: float,

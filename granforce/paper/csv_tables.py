@@ -14,7 +14,7 @@ from scipy import stats
 
 from granforce.measures import statistics
 from granforce.paper import plan as plans
-from granforce.paper.claims.groups import SAMPLERS, drawn, positive, skipped
+from granforce.paper.claims.groups import SAMPLERS, positive, rows_of, skipped
 from granforce.paper.formatting import NOTHING
 from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder, written
@@ -105,7 +105,7 @@ def _quantities(table: StudyTable) -> Iterator[tuple[str, pd.DataFrame, str]]:
     yield "dimension h", exact, "dimension"
     yield "exact η3", exact, "eta3"
     for sampler, word in WALKS.items():
-        rows = drawn(table, sampler)
+        rows = rows_of(table, sampler)
         rows = rows[~skipped(rows)]
         for name, symbol in (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3")):
             yield f"{symbol}, {word}", rows, name

@@ -58,11 +58,11 @@ _MEASURES = {
 def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows) -> None:
     """Write the study's tables, judged claims and findings into files with marks.
 
-    claims: as `claims.judged` returns them; findings: dicts of `findings.Finding`.
+    claims: as `claims.judge` returns them; findings: dicts of `findings.Finding`.
     """
     known: dict[str, Callable[[], str]] = {
         "headlines": lambda: headlines(table, claims, findings),
-        "highlights": lambda: highlighted(table, claims, findings),
+        "highlights": lambda: highlight_text(table, claims, findings),
         "claims": lambda: claim_table(claims),
         "figures": paper_figures,
         "friction": lambda: at_friction(table, _MEASURES, _FRICTIONS),
@@ -109,10 +109,10 @@ def sweeps(table: StudyTable) -> str:
         head: name + " over nearest-network walk" * name.startswith("η2")
         for head, name in columns.items()
     }
-    return f"{_swept(table)}\n{at_friction(table, columns, _SWEPT_FRICTIONS)}" if ends else ""
+    return f"{_sweep_notes(table)}\n{at_friction(table, columns, _SWEPT_FRICTIONS)}" if ends else ""
 
 
-def _swept(table: StudyTable) -> str:
+def _sweep_notes(table: StudyTable) -> str:
     """At how many packings each residual was measured, and which walks are incomplete."""
     swept = {part: table.part(part) for part in plans.SWEEPS if len(table.part(part))}
     most = [
@@ -173,21 +173,21 @@ def _difference(row: Any, level: float) -> str:
 def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """The first highlights as a list."""
     chosen = highlights(table, claims, findings)[:HEADLINES]
-    return "".join(f"- {_led(one.sentence)}\n" for one in chosen)
+    return "".join(f"- {_with_bold_message(one.sentence)}\n" for one in chosen)
 
 
-def _led(sentence: str) -> str:
+def _with_bold_message(sentence: str) -> str:
     """A highlight with its message, the words before the first colon, in bold."""
     message, colon, numbers = sentence.partition(": ")
     return f"**{message}**{colon}{numbers}" if colon else sentence
 
 
-def highlighted(table: StudyTable, claims: Rows, findings: Rows) -> str:
+def highlight_text(table: StudyTable, claims: Rows, findings: Rows) -> str:
     """All highlights, numbered, with caveats, links to methods, and figures."""
     text, shown = "", set()
     for k, one in enumerate(highlights(table, claims, findings), 1):
         words = f"{one.sentence} {one.caveat}".strip()
-        text += f"**{k}.** {_led(words)} [Method](method.md#{one.method})\n\n"
+        text += f"**{k}.** {_with_bold_message(words)} [Method](method.md#{one.method})\n\n"
         if one.figure and one.figure not in shown:
             text += _figure(one.figure) + "\n"
             shown.add(one.figure)
@@ -239,7 +239,7 @@ def claim_table(claims: Rows) -> str:
     lines = []
     for claim in claims:
         networks = ", exact intervals" * (claim["sampler"] == "exact")
-        notes = prepared(claim)
+        notes = preparation_note(claim)
         words = (
             f"`{claim['id']}`<br>{claim['place']}",
             f"{claim['text']}<br><small>{claim['number']}{networks}</small>",
@@ -280,7 +280,7 @@ def _runs(labels: Sequence[str], chosen: Sequence[int]) -> str:
     return ", ".join(words)
 
 
-def prepared(claim: dict[str, Any]) -> str:
+def preparation_note(claim: dict[str, Any]) -> str:
     """In which preparations a claim about large friction was judged, as HTML."""
     if claim["one_preparation"]:
         return "<small>default preparation only</small>"

@@ -9,7 +9,7 @@ import pandas as pd
 
 from granforce import figures
 from granforce.measures import statistics
-from granforce.paper.claims.groups import SAMPLERS, drawn, outside, positive
+from granforce.paper.claims.groups import SAMPLERS, outside, positive, rows_of
 from granforce.paper.resting import resting_rows
 from granforce.paper.tables import StudyTable
 from granforce.system.files import make_folder
@@ -130,7 +130,7 @@ def _of_the_paper(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures 1 to 6, by one sampler."""
     sampler, drawings = paper_sampler(table), {}
     part = SAMPLERS[sampler]
-    walk = drawn(table, sampler)
+    walk = rows_of(table, sampler)
     if len(walk):
         drawings["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
         words = _WALKS[sampler]
@@ -169,7 +169,7 @@ def _beyond(table: StudyTable) -> dict[str, Callable[..., Any]]:
     """Figures that the paper does not have."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     drawings = {}
-    sources = {_DRAWN.get(name, name): drawn(table, name) for name in SAMPLERS}
+    sources = {_DRAWN.get(name, name): rows_of(table, name) for name in SAMPLERS}
     packings = {name: rows["seed"].nunique() for name, rows in sources.items()}
     enough = max(1, ENOUGH * max(packings.values()))
     sources = {name: rows for name, rows in sources.items() if packings[name] >= enough}

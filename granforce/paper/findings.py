@@ -16,9 +16,9 @@ from granforce.measures import statistics
 from granforce.paper.claims.contacts import relative_extents
 from granforce.paper.claims.groups import (
     RANGES,
-    drawn,
     items,
     positive,
+    rows_of,
 )
 from granforce.paper.claims.verdicts import peak, slope
 from granforce.paper.tables import StudyTable
@@ -47,7 +47,7 @@ class Finding(NamedTuple):
     topic: str = ""
 
 
-def measured(table: StudyTable) -> list[Finding]:
+def all_findings(table: StudyTable) -> list[Finding]:
     """All findings about a `tables.StudyTable`, without those that lack data."""
     return [
         finding._replace(topic=topic)
@@ -60,10 +60,10 @@ def measured(table: StudyTable) -> list[Finding]:
 def sampled_part(table: StudyTable) -> Iterator[Finding]:
     """The fraction of the exact extent that sampled states see."""
     for sampler in (*WALKS, "uniform"):
-        ratios = _ratios(drawn(table, sampler), table.part("exact"), "eta3")
+        ratios = _ratios(rows_of(table, sampler), table.part("exact"), "eta3")
         yield from _by_range(f"coverage-{sampler}", ratios, f"η3 of {WORDS[sampler]} over exact η3")
     for sampler, part in LONGER.items():
-        ratios = _ratios(table.part(part), drawn(table, sampler), "eta3")
+        ratios = _ratios(table.part(part), rows_of(table, sampler), "eta3")
         if ratios:
             statement = f"η3 of {WORDS[sampler]} if four times as long, over that of the usual one"
             frictions = ", ".join(f"{mu:g}" for mu in ratios)
@@ -75,7 +75,7 @@ def measure(table: StudyTable) -> Iterator[Finding]:
     """The difference between the walks' measures and the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         for sampler in WALKS:
-            ratios = _ratios(drawn(table, sampler), table.part("uniform"), name)
+            ratios = _ratios(rows_of(table, sampler), table.part("uniform"), name)
             statement = f"{label} of {WORDS[sampler]} over {label} of {WORDS['uniform']}"
             yield from _by_range(f"{name}-{sampler}", ratios, statement)
     rows = table.part("uniform").dropna(subset=["walk_ratio"])
@@ -89,7 +89,7 @@ def measure(table: StudyTable) -> Iterator[Finding]:
 
 def correlations(table: StudyTable) -> Iterator[Finding]:
     """Whether strong contacts have long intervals: in absolute terms, and relative to f_n."""
-    lengths = items(drawn(table, "exact"), "correlation")
+    lengths = items(rows_of(table, "exact"), "correlation")
     ranks = relative_extents(table, "exact", statistics.rank_correlation)
     for id, groups, statement in (
         ("extent-correlation", lengths, "correlation of f_n with the exact ΔF_n"),

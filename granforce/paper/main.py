@@ -43,7 +43,7 @@ def main(arguments: argparse.Namespace) -> int:
     worker_count(arguments.workers, "--workers")
     if arguments.minutes is not None:
         positive(arguments.minutes, "--minutes")
-    renewed = markdown.named(arguments.documents, documents.KIND)
+    renewed = markdown.marked_files(arguments.documents, documents.KIND)
     if arguments.status:
         return status(arguments)
     _check_apart(arguments)
@@ -68,8 +68,8 @@ def main(arguments: argparse.Namespace) -> int:
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
     results: dict[str, Any] = {
-        "claims": claims.judged(reduced),
-        "findings": [finding._asdict() for finding in findings.measured(reduced)],
+        "claims": claims.judge(reduced),
+        "findings": [finding._asdict() for finding in findings.all_findings(reduced)],
         "skipped": reduced.skipped,
     }
     with written(folder / "claims.json") as file:

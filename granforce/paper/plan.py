@@ -483,7 +483,7 @@ def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
     return rows
 
 
-def finished(path: str | Path, plan: Plan) -> Iterator[tuple[Task, xr.Dataset]]:
+def finished_tasks(path: str | Path, plan: Plan) -> Iterator[tuple[Task, xr.Dataset]]:
     """Yield (task, dataset) for the tasks of a plan that are in the store at path."""
     store = open_store(path)
     for task in tasks(plan):

@@ -101,7 +101,7 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     exact: dict[tuple[float, int], xr.Dataset] = {}
     decays: dict[int, Floats] = {}
     every = plans.tasks(plan)
-    for task, dataset in plans.finished(path, plan):
+    for task, dataset in plans.finished_tasks(path, plan):
         k = len(rows)
         rows.append(row_of(task, dataset))
         if task.part == "exact":

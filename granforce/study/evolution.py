@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from granforce.forces.balance import left_open_in
-from granforce.packing.importers.network import judged
+from granforce.packing.importers.network import accuracy_of
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.records import InputError, Packing, takes
 from granforce.study import kinds
@@ -161,5 +161,5 @@ def _scalars(
         **{name: bounds[name].item() for name in ("coordination", "dimension", "eta3")},
         **{name: np.nan if walk is None else walk[name].item() for name in ("eta1", "eta2")},
         "rattlers": int(rattlers.sum()),
-        "residual": judged(packing)["residual"],
+        "residual": accuracy_of(packing)["residual"],
     }

@@ -18,7 +18,7 @@ def walk_dataset(
     S: Ensemble, done: Walk, *, keep: int | None = None, seconds: float = 0.0
 ) -> xr.Dataset:
     """A Walk with its measures as a dataset; stores `keep` evenly spaced states, or all."""
-    pick = _picked(len(done.states), keep)
+    pick = _evenly_spaced(len(done.states), keep)
     return labelled(
         {
             **stored(done),
@@ -45,11 +45,11 @@ def uniform_dataset(
     S: Ensemble, drawn: UniformSample, *, keep: int | None = None, seconds: float = 0.0
 ) -> xr.Dataset:
     """A UniformSample with its measures as a dataset; states stored as in `walk_dataset`."""
-    pick = _picked(len(drawn.flat), keep)
+    pick = _evenly_spaced(len(drawn.flat), keep)
     return labelled(
         {
             **_measured(S, drawn.flat, pick),
-            **_drawn(drawn, pick),
+            **_diagnostics(drawn, pick),
             **stored(drawn.mixing),
             **S.skipped,
             "seconds": seconds,
@@ -90,12 +90,12 @@ def inference_dataset(
         arrays["least_normal"] = np.full(len(S.index), np.nan)
         arrays["least_normal"][S.positions(certain.contacts)] = certain.least
     if inference.draws is not None:
-        pick = _picked(len(inference.draws.flat), keep)
-        arrays |= {"states": inference.draws.flat[pick], **_drawn(inference.draws, pick)}
+        pick = _evenly_spaced(len(inference.draws.flat), keep)
+        arrays |= {"states": inference.draws.flat[pick], **_diagnostics(inference.draws, pick)}
     return labelled(arrays)
 
 
-def _drawn(drawn: UniformSample | Draws, pick: slice | Integers) -> dict[str, Any]:
+def _diagnostics(drawn: UniformSample | Draws, pick: slice | Integers) -> dict[str, Any]:
     """Chains and mixing diagnostics of drawn states, and the picked states."""
     return {
         "residual": drawn.residual.ravel()[pick],
@@ -111,7 +111,7 @@ def _drawn(drawn: UniformSample | Draws, pick: slice | Integers) -> dict[str, An
     }
 
 
-def _picked(count: int, keep: int | None) -> slice | Integers:
+def _evenly_spaced(count: int, keep: int | None) -> slice | Integers:
     if keep is None or keep >= count:
         return slice(None)
     return np.linspace(0, count - 1, keep).astype(int)

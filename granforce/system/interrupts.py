@@ -23,7 +23,7 @@ def interrupted() -> bool:
 
 
 @contextmanager
-def noted() -> Iterator[None]:
+def record_interrupts() -> Iterator[None]:
     """Within, record Ctrl-C before its KeyboardInterrupt is raised; only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -15,7 +15,7 @@ def mark(kind: str) -> re.Pattern[str]:
     return re.compile(rf"(<!-- {kind}: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
 
-def named(files: str | None, kind: str) -> list[Path]:
+def marked_files(files: str | None, kind: str) -> list[Path]:
     """The paths of files separated by commas, or none; InputError for files without a part."""
     paths = [Path(name) for name in (files or "").split(",") if name]
     for path in paths:

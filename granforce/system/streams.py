@@ -73,7 +73,7 @@ class _Progress(_Stream):
 
 
 @contextmanager
-def guarded() -> Iterator[None]:
+def guard_output() -> Iterator[None]:
     """Within, stdout raises OutputError if it cannot be written, and stderr never raises."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = _OutputStream(sys.stdout, 1), _Progress(sys.stderr, 2)

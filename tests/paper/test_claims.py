@@ -97,7 +97,7 @@ def verdict(table, id, sampler="gauss_seidel"):
 
 
 def test_what_the_paper_says_is_reproduced_by_what_it_describes():
-    found = {one["id"]: one["verdict"] for one in claims.judged(synthetic(rise_and_fall))}
+    found = {one["id"]: one["verdict"] for one in claims.judge(synthetic(rise_and_fall))}
     # Its packings all come from contact dynamics, and there are no exact bounds and no repetitions.
     without = {"linear", "reproducible", "size", "coordination", "fewer-contacts", "power-law"}
     without |= {"everywhere", "frozen"}
@@ -235,14 +235,14 @@ def late(table, sampler="nearest", **columns):
 def test_a_claim_about_large_friction_is_judged_in_two_preparations(monkeypatch):
     ids = ("turns", "vanishing", "pair-distances", "significant", "response")
     monkeypatch.setattr(claims, "CLAIMS", [BY_ID[id] for id in ids])
-    same = {one["id"]: one for one in claims.judged(late(synthetic(rise_and_fall)))}
+    same = {one["id"]: one for one in claims.judge(late(synthetic(rise_and_fall)))}
     for id in ids[:3]:
         assert (same[id]["verdict"], same[id]["late"]) == ("reproduced", "reproduced")
         assert not same[id]["one_preparation"]
     assert same["significant"]["late"] == "" and not same["significant"]["one_preparation"]
     assert same["response"]["one_preparation"]  # nobody pushed packings with late drag
     table = late(synthetic(rise_and_fall), correlation=lambda rows: 0.5)
-    other = {one["id"]: one for one in claims.judged(table)}
+    other = {one["id"]: one for one in claims.judge(table)}
     assert other["vanishing"]["verdict"] == verdicts.DEPENDS
     assert other["vanishing"]["late"] == verdicts.CONTRADICTED
     assert other["vanishing"]["by"]["gauss_seidel"]["verdict"] == verdicts.REPRODUCED
@@ -262,7 +262,7 @@ def test_findings_compare_the_same_packings():
             for part, eta3, eta2 in (("walk", 1, 1), ("exact", 2, np.nan), ("uniform", 1, 0.5))
         ),
     )
-    ours = {(finding.id, finding.span): finding for finding in findings.measured(table)}
+    ours = {(finding.id, finding.span): finding for finding in findings.all_findings(table)}
     for word in ("small", "intermediate", "large"):
         ratio = ours["coverage-nearest", word]
         assert (ratio.value, ratio.low, ratio.high) == pytest.approx((0.5, 0.5, 0.5))
@@ -275,7 +275,7 @@ def test_findings_compare_the_same_packings():
     # The pair's share of the pressure: one contact of 600.
     assert 1 < ours["excluded-pair", "large"].value < 1.01
     table = table._replace(rows=table.part(SWEEPS), samples=tables.no_samples())
-    assert not findings.measured(table)
+    assert not findings.all_findings(table)
 
 
 def test_a_trend_with_friction_is_no_part_of_the_error_of_a_mean():
@@ -285,7 +285,7 @@ def test_a_trend_with_friction_is_no_part_of_the_error_of_a_mean():
         for seed in range(5)
         for part, eta in (("walk", mu * (10 + 0.01 * seed)), ("exact", 1.0))
     ]
-    ours = {(f.id, f.span): f for f in findings.measured(study(rows))}
+    ours = {(f.id, f.span): f for f in findings.all_findings(study(rows))}
     (mean, low, high) = ours["coverage-nearest", "intermediate"][2:5]
     assert mean == pytest.approx(1.5, abs=0.01) and high - low < 0.01
 
@@ -424,7 +424,7 @@ def test_few_disks_decide_nothing():
 
 def test_a_walk_that_reached_few_states_is_not_judged():
     table = changed(synthetic(rise_and_fall), SWEEPS, 10, reached_part=0.1)
-    assert 10 not in groups.items(groups.drawn(table, "gauss_seidel"), "eta2")
+    assert 10 not in groups.items(groups.rows_of(table, "gauss_seidel"), "eta2")
     assert 10 not in groups.sampled(table, "gauss_seidel")
 
 
@@ -437,7 +437,7 @@ def test_every_claim_has_a_reason_and_known_samplers():
 
 
 def test_without_data_there_is_no_verdict():
-    assert {one["verdict"] for one in claims.judged(study())} == {verdicts.MISSING}
+    assert {one["verdict"] for one in claims.judge(study())} == {verdicts.MISSING}
 
 
 def test_volumes_tell_where_they_are_largest_and_what_they_follow():

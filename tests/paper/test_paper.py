@@ -387,14 +387,14 @@ def test_a_study_tells_what_is_left_and_ends_in_time(commanded, tmp_path, capsys
 
 
 def test_tables_in_documents_are_renewed(table, tmp_path):
-    told = claims.judged(table)
-    found = [finding._asdict() for finding in findings.measured(table)]
+    told = claims.judge(table)
+    found = [finding._asdict() for finding in findings.all_findings(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
     names = ("friction", "sweeps", "preparation", "resting", "claims", "figures")
     names += ("headlines", "highlights", "certificates")
     page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
-    (path,) = markdown.named(str(page), documents.KIND)
+    (path,) = markdown.marked_files(str(page), documents.KIND)
     documents.renew([path], table, told, found)
     text = page.read_text()
     assert text.startswith("before\n<!-- study: friction -->\n| μ | z | h |")
@@ -431,7 +431,7 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     rows = csv_tables.by_friction(table).set_index(["quantity", "mu"])
     assert ("η2, paper's walk", 0) not in rows.index
     assert rows.loc["excess over the exact intervals, paper's walk to 0.001, ⟨f_n⟩", 0]["mean"] > 0
-    assert set(groups.drawn(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
+    assert set(groups.rows_of(table, "gauss_seidel")["mu"]) <= {0.1, 0.3}
 
 
 def test_sweeps_are_compared_by_the_residual_at_which_they_end(table):

@@ -138,7 +138,7 @@ def bench(arguments: argparse.Namespace) -> None:
     from granforce.bench import documents, draw, main
     from granforce.system import markdown
 
-    renewed = markdown.named(arguments.documents, documents.KIND)
+    renewed = markdown.marked_files(arguments.documents, documents.KIND)
     if arguments.table is None:
         results = main(arguments.out, arguments.quick, arguments.json)
     else:

@@ -55,7 +55,7 @@ def with_given_forces(packing: Packing, *, reverse: bool = False, **info: Any) -
         packing = packing._replace(pressure=virial / (2 * packing.volume))
     elif not packing.load.any():
         packing = packing._replace(load=_left_over(packing))
-    verdict = judged(packing)
+    verdict = accuracy_of(packing)
     if gain <= WORTH_REVERSING and verdict["residual"] > NO_EQUILIBRIUM:
         notes.append(
             f"the forces do not balance the grains, by up to {verdict['residual']:.2g} ⟨f_n⟩: "
@@ -145,7 +145,7 @@ def with_nearest_network(packing: Packing, **info: Any) -> Packing:
         try:
             S = ensemble(packing)
         except NotJammedError as error:
-            raise NotJammedError(f"{error}{_missed(packing)}") from None
+            raise NotJammedError(f"{error}{_missed_pairs(packing)}") from None
     start = np.zeros_like(S.original)
     start[:, 0] = S.force_scale
     relaxed = nearest(S, start)
@@ -155,7 +155,7 @@ def with_nearest_network(packing: Packing, **info: Any) -> Packing:
             f"{relaxed.iterations} iterations; check that the packing is at rest"
         )
     packing = packing._replace(forces=S.expand(relaxed.forces))
-    return packing._replace(info={**packing.info, **info, **judged(packing)})
+    return packing._replace(info={**packing.info, **info, **accuracy_of(packing)})
 
 
 @takes(Packing)
@@ -185,7 +185,7 @@ def report(packing: Packing) -> dict[str, Any]:
     """
     ens = ensemble(packing)
     loaded = bool(packing.forces.any())
-    verdict = judged(packing) if loaded else {"residual": None, "violation": None}
+    verdict = accuracy_of(packing) if loaded else {"residual": None, "violation": None}
     closed = np.isfinite(packing.volume)
     left_open = int(left_open_in(packing).sum())
     return {
@@ -208,7 +208,7 @@ def report(packing: Packing) -> dict[str, Any]:
     }
 
 
-def judged(packing: Packing) -> dict[str, Any]:
+def accuracy_of(packing: Packing) -> dict[str, Any]:
     """Residual and violation of the packing's own forces.
 
     Without pruning, so that they exist for any network, even if S is empty.
@@ -220,7 +220,7 @@ def judged(packing: Packing) -> dict[str, Any]:
     }
 
 
-def _held(whole: Ensemble) -> Integers:
+def _pressed_grains(whole: Ensemble) -> Integers:
     """Grains on which the packing's own network presses by more than its noise."""
     pressing = whole.original[:, 0] > CARRYING * whole.force_scale
     return np.union1d(whole.contacts.i[pressing], whole.contacts.j[pressing])
@@ -255,7 +255,7 @@ def _left_over(packing: Packing) -> Floats:
     load = np.zeros((len(packing.r), 3))
     load[whole.grains, : rest.shape[1]] = -rest
     load[:, 2] *= packing.r
-    load[np.setdiff1d(whole.grains, _held(whole))] = 0.0
+    load[np.setdiff1d(whole.grains, _pressed_grains(whole))] = 0.0
     return load
 
 
@@ -280,14 +280,14 @@ def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     forces = np.zeros_like(packing.forces)
     forces[:, 0] = mean_load(packing)  # the scale of tolerances
     packing = packing._replace(contacts=contacts, forces=forces)
-    settled = _settled(packing)  # first, as it refuses loads that no forces balance
+    settled = _with_balanced_loads(packing)  # first, as it refuses loads that no forces balance
     try:
         return packing, ensemble(packing)
     except (NotJammedError, UndecidedError):
         return settled, ensemble(settled)
 
 
-def _missed(packing: Packing) -> str:
+def _missed_pairs(packing: Packing) -> str:
     """Words on pairs that may be contacts: their number and smallest gap."""
     gap = apart(packing, MISSED)[2] / packing.r.max()
     if not len(gap):
@@ -308,7 +308,7 @@ def _few_touch(packing: Packing) -> str:
     return f"; only {touching} of {n} grains touch another: do x, y and r have the same unit?"
 
 
-def _settled(packing: Packing) -> Packing:
+def _with_balanced_loads(packing: Packing) -> Packing:
     """The packing with the loads nearest to its own that contact forces can balance.
 
     info["load_change"] is the largest change, in ⟨f_n⟩.
@@ -330,7 +330,7 @@ def _settled(packing: Packing) -> Packing:
         raise NotJammedError(
             f"no forces balance the loads, whose sum is ({total}); correct loads, contacts or "
             f"friction; the largest unbalance is at grains {named} (counted from 0){walls}"
-            f"{_few_touch(packing)}{_missed(packing)}"
+            f"{_few_touch(packing)}{_missed_pairs(packing)}"
         )
     load = packing.load.copy()
     unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])

@@ -32,7 +32,7 @@ LATE_DRAG = "prepared_late_drag"
 _PREPARED = {"walk": LATE_DRAG, "exact": f"{LATE_DRAG}_exact"}
 
 
-def judged(table: StudyTable) -> Rows:
+def judge(table: StudyTable) -> Rows:
     """All claims about a `tables.StudyTable` as dicts, even without data.
 
     "by" has, for each sampler, its verdict and cases; "late" is the verdict in packings with late

@@ -30,7 +30,7 @@ WHOLE_WALK = 0.3
 DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
-def drawn(table: StudyTable, sampler: str) -> pd.DataFrame:
+def rows_of(table: StudyTable, sampler: str) -> pd.DataFrame:
     """Rows of a sampler that may be judged: those with enough states, in S or close to it."""
     rows = table.part(SAMPLERS[sampler])
     return rows[enough(rows) & ~rows["mu"].isin(outside(table, SAMPLERS[sampler]))]
@@ -98,7 +98,7 @@ def over_contacts(
     contacts: a table with the f_n, least f_n and ΔF_n (normal, least, extent) of each, in ⟨f_n⟩.
     """
     groups: Groups = {}
-    rows = drawn(table, sampler)
+    rows = rows_of(table, sampler)
     judged = set(rows.index[rows["mu"].between(*span)])
     for row, contacts in table.contacts(SAMPLERS[sampler]):
         if row.Index in judged and len(contacts):

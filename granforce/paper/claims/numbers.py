@@ -18,12 +18,12 @@ from granforce.paper.claims.groups import (
     SAMPLERS,
     SMALL,
     Groups,
-    drawn,
     dynamic,
     enough,
     items,
     positive,
     positive_friction,
+    rows_of,
     within,
 )
 from granforce.paper.claims.verdicts import FRACTION, Case, at_each, over_all, peak, slope, turning
@@ -44,7 +44,7 @@ _AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
 
 def ratios(table: StudyTable, sampler: str) -> Iterator[tuple[str, Groups]]:
     """The logarithms of the ratios of η1, η2 and η3, by μ ≥ LEAST_DYNAMIC."""
-    rows = dynamic(drawn(table, sampler))
+    rows = dynamic(rows_of(table, sampler))
     for above, below, word in RATIOS:
         known = positive(rows, above, below)
         yield word, items(known.assign(log=np.log(known[above] / known[below])), "log")
@@ -64,7 +64,7 @@ def factors(table: StudyTable, sampler: str) -> Iterator[Case]:
 
 
 def _etas(table: StudyTable, sampler: str) -> Iterator[tuple[str, Groups]]:
-    rows = drawn(table, sampler)
+    rows = rows_of(table, sampler)
     for name, label in MEASURES[2:] if sampler == "exact" else MEASURES:
         yield label, positive_friction(items(positive(rows, name), name))
 
@@ -89,13 +89,13 @@ def measure_of(sampler: str) -> str:
 def smallest(table: StudyTable, sampler: str) -> Iterator[Case]:
     """The slope of log η against log μ below LEAST_DYNAMIC."""
     name = measure_of(sampler)
-    groups = positive_friction(items(positive(drawn(table, sampler), name), name))
+    groups = positive_friction(items(positive(rows_of(table, sampler), name), name))
     yield from over_all("", slope, within(groups, (0, LEAST_DYNAMIC / 10)))
 
 
 def repeated(table: StudyTable, sampler: str) -> Iterator[Case]:
     """The scatter of η2 over walks in the same packing, relative to its mean."""
-    part, first = _AGAIN[sampler], drawn(table, sampler)
+    part, first = _AGAIN[sampler], rows_of(table, sampler)
     names = table.rows["part"]
     again = table.rows[names.str.startswith(f"{part}_") & (names != f"{part}_long")]
     again = statistics.paired(again[enough(again)], first)[first.columns]
@@ -110,7 +110,7 @@ def sizes(table: StudyTable, sampler: str) -> Iterator[Case]:
     name = measure_of(sampler)
     part = {"exact": "size_exact", "nearest": "size", "gauss_seidel": "size_sweeps"}[sampler]
     sized = table.part(part)
-    rows = positive(pd.concat([sized, drawn(table, sampler)]), name)
+    rows = positive(pd.concat([sized, rows_of(table, sampler)]), name)
     for mu in sorted(sized["mu"].unique()):
         groups = items(rows[rows["mu"] == mu], name, by="n")
         for case in over_all(f"μ = {mu:g}", slope, groups):
@@ -201,12 +201,12 @@ def misfit_ratio(decays: Sequence[Floats]) -> float:
 
 def pair_distances(table: StudyTable, sampler: str) -> Iterator[Case]:
     """Relative scatter of the distances between networks."""
-    yield from at_each(items(dynamic(drawn(table, sampler)), "pair_spread"))
+    yield from at_each(items(dynamic(rows_of(table, sampler)), "pair_spread"))
 
 
 def centre(table: StudyTable, sampler: str) -> Iterator[Case]:
     """Distance of the original network from the centre over that of the others."""
-    rows = positive(dynamic(drawn(table, sampler)), "dimension", "mean_distance")
+    rows = positive(dynamic(rows_of(table, sampler)), "dimension", "mean_distance")
     if sampler == "uniform":  # whose cells do not have the original network
         ratio = rows["original_ratio"]
     else:
@@ -232,7 +232,7 @@ def frozen(table: StudyTable, sampler: str) -> Iterator[Case]:
 
 
 def _correlations(table: StudyTable, sampler: str) -> Groups:
-    return items(positive(drawn(table, sampler), "mu"), "correlation")
+    return items(positive(rows_of(table, sampler), "mu"), "correlation")
 
 
 def significant(table: StudyTable, sampler: str) -> Iterator[Case]:

@@ -6,7 +6,7 @@ number of cases, as all of them must hold. It is "contradicted" if the interval 
 wider for their number (Bonferroni), is entirely outside its range; otherwise it is "undecided". The
 interval that is shown is the one that counts: 95 % if it is in the range, else the wider one.
 Nothing else changes a verdict, except that a claim about μ ≥ 1 must not be reproduced in one
-preparation and contradicted in another (`judged` in this folder).
+preparation and contradicted in another (`judge` in this folder).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -52,13 +52,13 @@ class Case(NamedTuple):
 def verdict_of(cases: Sequence[Case], ranges: Mapping[str, Ends]) -> dict[str, Any]:
     """{"verdict", "cases"} of a claim; a case has its label, interval and verdict."""
     level = 1 - (1 - statistics.LEVEL) / max(1, len(cases))
-    told = [_told(case, ranges[case.span], level) for case in cases]
+    told = [_judge_case(case, ranges[case.span], level) for case in cases]
     kinds = {one["verdict"] for one in told}
     order = (CONTRADICTED, FEW, UNDECIDED, REPRODUCED)
     return {"verdict": next((kind for kind in order if kind in kinds), MISSING), "cases": told}
 
 
-def _told(case: Case, good: Ends, level: float) -> dict[str, Any]:
+def _judge_case(case: Case, good: Ends, level: float) -> dict[str, Any]:
     """A case with its verdict; level: of an interval that is outside the range."""
     value, low, high = case.interval(statistics.LEVEL)
     if not (case.enough and np.isfinite([value, low, high]).all()):

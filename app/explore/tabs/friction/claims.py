@@ -5,7 +5,7 @@ import re
 
 from granforce.paper.claims.table import TOPICS
 from granforce.paper.claims.verdicts import SYMBOLS
-from granforce.paper.documents import UNBROKEN, case_texts, prepared
+from granforce.paper.documents import UNBROKEN, case_texts, preparation_note
 
 from ....results import study_data
 
@@ -49,7 +49,7 @@ def summary() -> str:
 def _row(claim: study_data.Claim) -> str:
     by = claim["by"]
     place = f"{claim['number']}; {SAMPLERS[claim['sampler']]}; ✓ if {claim['range']}"
-    verdict = f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{prepared(claim)}"
+    verdict = f"{SYMBOLS[claim['verdict']]} {claim['verdict']}{preparation_note(claim)}"
     others = (
         f"{SYMBOLS[one['verdict']]} {SAMPLERS[name]}"
         for name, one in by.items()
