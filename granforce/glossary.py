@@ -104,20 +104,23 @@ TERMS = {
     ),
     "eta1": Term(
         "indeterminacy by spread",
-        "How much a contact's force scatters over the networks, relative to the mean force: 0 if "
-        "determined, 0.1 for a scatter of a tenth.",
+        "How much a contact's force F scatters over the networks, relative to the mean force: "
+        "η1 = ⟨δF⟩ / ⟨|G|⟩ over contacts, with its mean G and its scatter δF = √⟨|F − G|²⟩ over "
+        "networks. 0 if determined, 0.1 for a scatter of a tenth.",
         "η1",
     ),
     "eta2": Term(
         "indeterminacy by distance",
         "The typical distance between two networks in force space, relative to the size of the "
-        "mean network.",
+        "mean network: η2 = √(⟨Σ|F − F′|²⟩ / Σ|G|²), with sums over contacts, a mean over pairs of "
+        "networks F and F′, and the mean network G.",
         "η2",
     ),
     "eta3": Term(
         "indeterminacy by intervals",
         "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints,"
-        " which are signed for fₜ. Times 0.15, it is comparable to η1 and η2. The value seen "
+        " which are signed for fₜ: η3 = ⟨max − min⟩ / ⟨(max + min)/2⟩. The paper multiplies it by "
+        "0.15, so that its curve lies beside those of η1 and η2. The value seen "
         "grows with the number of networks. It can exceed the exact one: midpoints differ, and "
         "networks of the paper's walk are slightly outside S.",
         "η3",

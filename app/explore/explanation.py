@@ -4,12 +4,16 @@ from typing import Any
 
 import numpy as np
 
+import granforce
+from granforce.glossary import TERMS
+
 from ..results import study_data
 from ..results.replays import Replay, worded
 from ..state.app_state import AppState
 from ..widgets.header import Header
 from ..widgets.hints import term
 
+DOI = "https://doi.org/10.1103/PhysRevE.79.052302"
 QUESTION = "What am I seeing? Why more than one force network?"
 FRICTION = (
     "<p><b>How friction matters.</b> Each μ has its own packing. More friction "
@@ -17,6 +21,11 @@ FRICTION = (
     "comes to rest with fewer contacts, so fewer forces are free. With little friction many "
     "directions are open, but narrow; with a lot of it few, but wide: the indeterminacy "
     "rises and then falls{}.</p>"
+)
+
+ABOUT = (
+    f"<p><b>To cite:</b> granforce {granforce.__version__} (CITATION.cff), and "
+    f'{TERMS["paper"].sentence} <a href="{DOI}" target="_blank" rel="noopener">{DOI}</a></p>'
 )
 
 
@@ -112,7 +121,7 @@ def follow(state: AppState, header: Header) -> None:
 
     def tell(*events: Any) -> None:
         if state.replay is not None:
-            header.help = summary_html(state.replay) + rest(state.replay)
+            header.help = summary_html(state.replay) + rest(state.replay) + ABOUT
 
     state.param.watch(tell, "replay")
     tell()

@@ -385,10 +385,7 @@ def test_walls_of_disks_are_lines_and_chains_end_at_them():
 @pytest.mark.parametrize(
     "name, content",
     [
-        (
-            "a.csv",
-            b"body,x,y,fixed\n1,0,0,0\n1,1,0,0\n1,0,1,0\n2,-1,-1,1\n2,2,-1,1\n2,2,0,1\n2,-1,0,1\n",
-        ),
+        ("a.csv", upload_view.SAMPLES["bodies.csv"].encode()),
         (
             "a.json",
             b'{"bodies": [{"disk": [0, 1, 1]}, {"corners": [[-1, -1], [2, 0], [-1, 0]], '
@@ -400,6 +397,12 @@ def test_a_file_of_bodies_is_read(name, content):
     files = uploads.added({}, [(name, content)])
     assert not uploads.missing(files) and not uploads.loose(files)
     assert len(uploads.read(files, mu=0.5).shapes.sides) == 2
+
+
+def test_the_sample_of_disks_is_held_by_walls():
+    files = uploads.added({}, [("disks.csv", upload_view.SAMPLES["disks.csv"].encode())])
+    packing = uploads.read(files, mu=0.3, box=None, tilt=0.0, walls="box", gravity=1.0)
+    assert gf.ensemble(packing).dimension == 10
 
 
 def test_a_scene_of_bodies_has_a_link_and_is_made_where_it_is_opened(tmp_path):

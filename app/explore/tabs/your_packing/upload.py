@@ -3,6 +3,7 @@
 import html
 import re
 from typing import Any
+from urllib.parse import quote
 
 import panel as pn
 import panel_material_ui as pmui
@@ -20,14 +21,28 @@ from ....widgets.select import Select
 from . import photoelastic as measured
 from .my_computations import Mine
 
+# Examples to look at, and to try: a heap between walls under gravity, and a block on another.
+SAMPLES = {
+    "disks.csv": "x,y,r\n1,1,1\n3,1,1\n5,1,1\n2,2.7320508,1\n4,2.7320508,1\n3,4.4641016,1\n",
+    "bodies.csv": "body,x,y,fixed\n1,0,0,0\n1,1,0,0\n1,0,1,0\n2,-1,-1,1\n2,2,-1,1\n2,2,0,1\n"
+    "2,-1,0,1\n",
+}
 STATES = 200  # of the first walk
-HELP = """
+
+
+def _sample(name: str) -> str:
+    """A link that saves an example, as HTML."""
+    return f'<a download="{name}" href="data:text/csv,{quote(SAMPLES[name])}">sample</a>'
+
+
+HELP = f"""
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, contacts with columns i,
-j and f_n, f_t; <b>bodies</b> (CSV or JSON): convex polygons and disks, with columns body, x, y, as
-for <code>granforce import blocks</code>; <b>photoelastic frames</b>, as PeGS writes them: positions
-(frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
+j and f_n, f_t ({_sample("disks.csv")}; walls: a floor and two sides, gravity: 1); <b>bodies</b>
+(CSV or JSON): convex polygons and disks, with columns body, x, y, as for
+<code>granforce import blocks</code> ({_sample("bodies.csv")});
+<b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
 <code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Something
 must hold the disks of a table: enter a periodic box, or walls and gravity, or give columns fx, fy,
 torque with the load on each disk. Files are read into memory. A packing is saved in the cache; a
