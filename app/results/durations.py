@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from granforce.study.keys import Parameters
 
@@ -19,7 +18,7 @@ _seconds = {
 
 def seconds(kind: str, params: Parameters) -> float:
     """The expected duration of a computation, s."""
-    return _seconds[kind] * _work(params)
+    return _seconds[kind] * _work(kind, params)
 
 
 @contextmanager
@@ -28,16 +27,16 @@ def expected(job: Job, stage: str, kind: str, params: Parameters) -> Iterator[No
     begun = time.perf_counter()
     job.begin(stage, seconds(kind, params))
     yield
-    _seconds[kind] = (time.perf_counter() - begun) / _work(params)
+    _seconds[kind] = (time.perf_counter() - begun) / _work(kind, params)
 
 
-def _work(params: dict[str, Any]) -> float:
+def _work(kind: str, params: Parameters) -> float:
     """The work of a computation, relative to that with USUAL_DISKS and USUAL_STATES.
 
     It grows like the square of the number of disks for programs over all contacts, and in
     proportion to it for a state.
     """
     disks = params["packing"].get("n", USUAL_DISKS) / USUAL_DISKS
-    if "states" not in params or "check" in params:
+    if kind not in ("walk", "uniform"):
         return float(disks**2)
     return float(disks * (disks + params["states"] / USUAL_STATES) / 2)

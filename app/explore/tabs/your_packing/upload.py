@@ -42,7 +42,8 @@ contacts; <b>tables</b> (CSV): disks with columns x, y, r and, optionally, conta
 j and f_n, f_t ({_sample("disks.csv")}; walls: a floor and two sides, gravity: 1); <b>bodies</b>
 (CSV or JSON): convex polygons and disks, with columns body, x, y, as for
 <code>granforce import blocks</code> ({_sample("bodies.csv")});
-<b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x, y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a
+<b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x, y, r, flag at a wall) and
+an adjacency list (frame, id, id, fₜ, fₙ), or a
 <code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Something
 must hold the disks of a table: enter a periodic box, or walls and gravity, or give columns fx, fy,
 torque with the load on each disk. Files are read into memory. A packing is saved in the cache; a
