@@ -10,6 +10,7 @@ import tempfile
 import threading
 import time
 import urllib.request
+import warnings
 import webbrowser
 from html import escape
 from pathlib import Path
@@ -20,7 +21,7 @@ import numpy as np
 
 from granforce.forces.knowledge import Known
 from granforce.packing.importers import load_packing
-from granforce.records import InputError, Packing
+from granforce.records import InputError, InputWarning, Packing
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
@@ -29,6 +30,7 @@ from granforce.study.store import open_store
 HELD_VARIABLE = "GRANFORCE_HELD"
 PATIENCE = 60.0  # s until the server must respond
 PAUSE = 0.1  # s between attempts
+ENDED = "the server of this page has ended: gf.show opens a new page"
 
 
 class View:
@@ -40,12 +42,17 @@ class View:
         Address of the page.
     """
 
-    def __init__(self, address: str, held: Path) -> None:
-        self.address, self._held = address, held
+    def __init__(self, address: str, held: Path, server: subprocess.Popen[bytes]) -> None:
+        self.address, self._held, self._server = address, held, server
 
     @property
     def known(self) -> Known | None:
-        """The forces that are held on the page now, for `gf.ensemble`; None if there are none."""
+        """The forces that are held on the page now, for `gf.ensemble`; None if there are none.
+
+        With a warning if the page's server has ended: they are then the last ones.
+        """
+        if self._server.poll() is not None:
+            warnings.warn(f"{ENDED}; these are the last held forces", InputWarning, stacklevel=2)
         try:
             rows = json.loads(self._held.read_text())
         except FileNotFoundError:
@@ -59,7 +66,8 @@ class View:
         return f"View({self.address!r})"
 
     def _repr_html_(self) -> str:
-        wait_for_server(self.address)
+        if not wait_for_server(self.address, self._server):
+            return f"<p>{ENDED}</p>"
         return f'<iframe src="{escape(self.address)}" width="100%" height="900"></iframe>'
 
 
@@ -88,11 +96,11 @@ def show(packing: Packing, *, browser: bool | None = None) -> View:
     if not isinstance(packing, Packing):
         raise InputError(f"show takes a Packing, not {type(packing).__name__}")
     parameters = _stored(packing)
-    root, folder = _server()
+    root, folder, server = _server()
     address = f"{root}?{_query(parameters)}"
     if browser or (browser is None and "ipykernel" not in sys.modules):
         open_when_ready(address)
-    return View(address, folder / f"{parameters['imported']}.json")
+    return View(address, folder / f"{parameters['imported']}.json", server)
 
 
 def query_of_file(path: str | None) -> str:
@@ -145,11 +153,11 @@ def open_when_ready(address: str) -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def wait_for_server(address: str) -> bool:
-    """Whether the server of an address responds within PATIENCE."""
+def wait_for_server(address: str, server: subprocess.Popen[bytes] | None = None) -> bool:
+    """Whether the server of an address responds within PATIENCE, and its process has not ended."""
     health = urljoin(address, "/health")
     until = time.monotonic() + PATIENCE
-    while time.monotonic() < until:
+    while time.monotonic() < until and (server is None or server.poll() is None):
         try:
             with urllib.request.urlopen(health, timeout=PATIENCE):
                 return True
@@ -162,8 +170,8 @@ def wait_for_server(address: str) -> bool:
 _started: list[tuple[subprocess.Popen[bytes], str, tempfile.TemporaryDirectory[str]]] = []
 
 
-def _server() -> tuple[str, Path]:
-    """The page of this process's server, and the folder of held forces; starts it if needed."""
+def _server() -> tuple[str, Path, subprocess.Popen[bytes]]:
+    """The page of this process's server, the folder of held forces and the server; starts it."""
     if not _started or _started[-1][0].poll() is not None:
         port = checked_port("localhost", 0)
         folder = tempfile.TemporaryDirectory(prefix="granforce-held-")
@@ -176,5 +184,5 @@ def _server() -> tuple[str, Path]:
         )
         atexit.register(process.terminate)
         _started[:] = [(process, page_at("localhost", port), folder)]
-    _, page, folder = _started[-1]
-    return page, Path(folder.name)
+    process, page, folder = _started[-1]
+    return page, Path(folder.name), process

@@ -31,3 +31,10 @@ def test_a_packing_is_shown_and_its_held_forces_come_back(opening, tmp_path, mon
     assert view.known.contacts.tolist() == [contact]
     exact = gf.intervals(gf.ensemble(packing, known=view.known))
     assert np.ptp([exact.low[0, 0], exact.high[0, 0]]) < 1e-6 * packing.forces[:, 0].mean()
+    page.close()
+    server = viewer._started[-1][0]
+    server.terminate()
+    server.wait(60)
+    with pytest.warns(gf.InputWarning, match="server of this page has ended"):
+        assert view.known.contacts.tolist() == [contact]
+    assert "has ended" in view._repr_html_()
