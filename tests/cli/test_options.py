@@ -169,8 +169,8 @@ def here(place, monkeypatch):
         "tables.save": None,
         "drawings.draw": None,
         "csv_tables.save": None,
-        "claims.judged": [],
-        "findings.measured": [],
+        "claims.judge": [],
+        "findings.all_findings": [],
     }.items():
         monkeypatch.setattr(f"granforce.paper.main.{name}", lambda *a, value=value, **k: value)
     for name in commands.packings.READERS:
