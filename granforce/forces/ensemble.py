@@ -399,7 +399,23 @@ class Ensemble:
         return self.with_bounds(bounds, network)
 
     def positions(self, contacts: npt.ArrayLike) -> Integers:
-        """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
+        """Positions of contacts in the ensemble.
+
+        Parameters
+        ----------
+        contacts : (k,) array of int
+            Numbers in the packing.
+
+        Returns
+        -------
+        (k,) array of int
+            Such that ``index[positions]`` are the contacts.
+
+        Raises
+        ------
+        InputError
+            For contacts that carry no force in the packing.
+        """
         contacts = np.asarray(refuse_hidden(contacts, "contacts"))
         if contacts.ndim != 1 or not (contacts.dtype.kind in "iuf" or not contacts.size):
             raise InputError("contacts must be a list of contact numbers of the packing")
@@ -464,9 +480,17 @@ class Ensemble:
         return forces
 
     def expand(self, forces: Floats) -> Floats:
-        """Forces (…, N_c, 2) of S on all contacts of the packing: zero off the backbone.
+        """Forces of S on all contacts of the packing: zero off the backbone.
 
-        Frozen contacts get their original forces.
+        Parameters
+        ----------
+        forces : (…, N_c, 2) array
+            Networks.
+
+        Returns
+        -------
+        (…, contacts of the packing, 2) array
+            Frozen contacts have their original forces.
         """
         forces = self.networks(forces)
         count = len(self.packing.contacts.i)
@@ -483,10 +507,18 @@ class Ensemble:
         return forces
 
     def residual(self, forces: Floats) -> Any:
-        """Largest unbalance |A x − b| over rows, in ⟨f_n⟩: scalar, or (…,) for (…, N_c, 2).
+        """Largest unbalance |A x − b| over rows, in ⟨f_n⟩.
 
-        Rows are force components and torque/r of every backbone grain, and the pressure as mean
-        normal force (with it the stress, where that is prescribed). NaN forces give NaN.
+        Parameters
+        ----------
+        forces : (…, N_c, 2) array
+            Networks; NaN gives NaN.
+
+        Returns
+        -------
+        float or (…,) array
+            Rows are force components and torque/r of every backbone grain, and the pressure as mean
+            normal force (with it the stress, where that is prescribed).
         """
         x = self.to_vector(forces)
         columns = x.reshape(int(np.prod(x.shape[:-1])), x.shape[-1]).T
@@ -495,7 +527,18 @@ class Ensemble:
         return _plain(worst.reshape(x.shape[:-1]))
 
     def violation(self, forces: Floats) -> Any:
-        """Largest violation of f_n ≥ 0, |f_t| ≤ μ f_n and what is known, in ⟨f_n⟩, (…,)."""
+        """Largest violation of f_n ≥ 0, |f_t| ≤ μ f_n and what is known, in ⟨f_n⟩.
+
+        Parameters
+        ----------
+        forces : (…, N_c, 2) array
+            Networks.
+
+        Returns
+        -------
+        float or (…,) array
+            0 inside the cones.
+        """
         forces = self.networks(forces)
         normal, tangential = forces[..., 0], forces[..., 1]
         excess = np.maximum(-normal, np.abs(tangential) - self.friction * np.maximum(normal, 0.0))
@@ -509,9 +552,19 @@ class Ensemble:
     def admits(
         self, forces: Floats, residual: float = BALANCED, violation: float = ADMISSIBLE
     ) -> Any:
-        """Whether forces are an equilibrium inside the cones, to the given tolerances.
+        """Whether forces are an equilibrium inside the cones.
 
-        A bool for forces (N_c, 2), a mask (…,) for (…, N_c, 2).
+        Parameters
+        ----------
+        forces : (…, N_c, 2) array
+            Networks.
+        residual, violation : float
+            Tolerances, in ⟨f_n⟩.
+
+        Returns
+        -------
+        bool or (…,) array of bool
+            For each network.
         """
         return (self.residual(forces) <= residual) & (self.violation(forces) <= violation)
 

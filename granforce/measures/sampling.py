@@ -40,7 +40,18 @@ class Sampling(NamedTuple):
 
 
 def sampling(states: Floats) -> Sampling:
-    """Sampling of consecutive states (S, N_c, 2) of one chain."""
+    """Sampling of consecutive states of one chain.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    Sampling
+        NaN if there are too few states.
+    """
     states = networks(states)
     count = len(states)
     if count < FEWEST:

@@ -44,12 +44,34 @@ def _some(states: Any) -> Floats:
 
 
 def mean_network(states: Floats) -> Floats:
-    """G_c = ⟨F_c⟩, the mean force of each contact over states, shape (N_c, 2)."""
+    """G_c = ⟨F_c⟩, the mean force of each contact over states.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    (N_c, 2) array
+        Force.
+    """
     return _some(states).mean(axis=0)
 
 
 def eta1(states: Floats) -> float:
-    """η1 = ⟨δF_c⟩_c / ⟨|G_c|⟩_c with δF_c = sqrt⟨|F_c − G_c|²⟩ over states."""
+    """η1 = ⟨δF_c⟩_c / ⟨|G_c|⟩_c with δF_c = sqrt⟨|F_c − G_c|²⟩ over states.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    float
+        0 if all states are the same.
+    """
     mean = mean_network(states)
     spread = np.sqrt(((states - mean) ** 2).sum(axis=2).mean(axis=0))
     return float(spread.mean() / np.linalg.norm(mean, axis=1).mean())
@@ -58,7 +80,17 @@ def eta1(states: Floats) -> float:
 def eta2(states: Floats) -> float:
     """η2 = sqrt(⟨Σ_c |F_c − F'_c|²⟩ / Σ_c |G_c|²) over all pairs of different states.
 
-    The mean over pairs is 2 S/(S − 1) times the variance, so pairs are never formed; 0 for S = 1.
+    The mean over pairs is 2 S/(S − 1) times the variance, so pairs are never formed.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    float
+        0 for one state.
     """
     count = len(_some(states))
     if count < 2:
@@ -99,9 +131,20 @@ def _bounds(low: Any, high: Any) -> tuple[Floats, Floats]:
 def eta3(low: Floats, high: Floats | None = None) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩, both means over all 2N_c components.
 
-    The mean length of the intervals of f_n and f_t, divided by the mean of their midpoints.
-    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact, both required.
-    Raises InputError if their shapes differ, and where low exceeds high.
+    Parameters
+    ----------
+    low, high : (N_c, 2) array
+        Smallest and largest f_n, f_t of each contact, over states or exact.
+
+    Returns
+    -------
+    float
+        Mean length of the intervals over the mean of their midpoints.
+
+    Raises
+    ------
+    InputError
+        If shapes differ, and where low exceeds high.
     """
     if high is None:
         raise InputError(
@@ -113,24 +156,61 @@ def eta3(low: Floats, high: Floats | None = None) -> float:
 
 
 def sampled_intervals(states: Floats) -> tuple[Floats, Floats]:
-    """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
+    """Smallest and largest value of each component over states.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    low, high : (N_c, 2) array
+        Force.
+    """
     states = _some(states)
     return states.min(axis=0), states.max(axis=0)
 
 
 def normal_extent(low: Floats, high: Floats) -> Floats:
-    """ΔF_n (N_c,), the length of the interval of f_n of each contact, from low, high (N_c, 2).
+    """ΔF_n, the length of the interval of f_n of each contact.
 
-    Raises InputError as `eta3` does.
+    Parameters
+    ----------
+    low, high : (N_c, 2) array
+        Smallest and largest f_n, f_t of each contact, over states or exact.
+
+    Returns
+    -------
+    (N_c,) array
+        Force.
+
+    Raises
+    ------
+    InputError
+        As `eta3`.
     """
     low, high = _bounds(low, high)
     return high[:, 0] - low[:, 0]
 
 
 def correlation(normal_forces: Floats, extent: Floats) -> float:
-    """corr(f_n, ΔF_n) over contacts (Pearson); nan if one of them does not vary.
+    """corr(f_n, ΔF_n) over contacts (Pearson).
 
-    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n. Raises InputError if their shapes differ.
+    Parameters
+    ----------
+    normal_forces, extent : (N_c,) array
+        f_n, and ΔF_n.
+
+    Returns
+    -------
+    float
+        NaN if one of them does not vary.
+
+    Raises
+    ------
+    InputError
+        If shapes differ.
     """
     _alike(normal_forces, extent)
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
@@ -139,18 +219,43 @@ def correlation(normal_forces: Floats, extent: Floats) -> float:
 
 
 def correlation_range(states: Floats, extent: Floats) -> tuple[float, float]:
-    """Smallest and largest corr(f_n, ΔF_n) with any state in place of the original network.
+    """Range of corr(f_n, ΔF_n) with any state in place of the original network.
 
-    states (S, N_c, 2), extent (N_c,): ΔF_n. It is the paper's error bar of the correlation.
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+    extent : (N_c,) array
+        ΔF_n.
+
+    Returns
+    -------
+    least, largest : float
+        The paper's error bar of the correlation.
     """
     values = [correlation(state[:, 0], extent) for state in _some(states)]
     return float(np.min(values)), float(np.max(values))
 
 
 def distances(states: Floats, centre: Floats) -> Floats:
-    """Distance |F − centre| of each of the states (S, N_c, 2) in force space, (S,).
+    """Distance |F − centre| of states in force space.
 
-    centre (N_c, 2). Raises InputError for states and a centre of different numbers of contacts.
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+    centre : (N_c, 2) array
+        Network.
+
+    Returns
+    -------
+    (S,) array
+        Force.
+
+    Raises
+    ------
+    InputError
+        For different numbers of contacts.
     """
     states = _some(states)
     centre = float_array(centre, states.shape[1:], "centre")
@@ -158,10 +263,26 @@ def distances(states: Floats, centre: Floats) -> Floats:
 
 
 def principal_axes(states: Floats, count: int = 2) -> tuple[Floats, Floats]:
-    """Directions along which states vary most: axes (count, N_c, 2), and their share of variance.
+    """Directions along which states vary most.
 
-    Axes have length 1 and a positive largest component; axes without variation are zero. Raises
-    InputError for a count below 1 or above the number of components 2 N_c.
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+    count : int, default 2
+        Number of axes.
+
+    Returns
+    -------
+    axes : (count, N_c, 2) array
+        Of length 1, with a positive largest component; zero without variation.
+    share : (count,) array
+        Of the variance.
+
+    Raises
+    ------
+    InputError
+        For a count below 1 or above the number of components 2 N_c.
     """
     states = _some(states)
     count = whole(count, "the number of axes", 1, states[0].size)
@@ -207,7 +328,18 @@ class Growth:
 
 
 def growing(states: Floats) -> dict[str, Floats]:
-    """η1, η2 and η3 of the first 1, 2, … S states: {"eta1": (S,), "eta2": (S,), "eta3": (S,)}."""
+    """η1, η2 and η3 of the first 1, 2, … S states.
+
+    Parameters
+    ----------
+    states : (S, N_c, 2) array
+        Force networks (f_n, f_t).
+
+    Returns
+    -------
+    dict
+        {"eta1": (S,), "eta2": (S,), "eta3": (S,)}.
+    """
     growth = Growth()
     values = np.array([growth.add(state) for state in _some(states)])
     return dict(zip(("eta1", "eta2", "eta3"), values.T, strict=True))
@@ -216,9 +348,22 @@ def growing(states: Floats) -> dict[str, Floats]:
 def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
     """Position of each f_n in its interval, from 0 (least) to 1 (largest).
 
-    NaN where the force is determined: ΔF_n is at most 10⁻⁶ of the largest force.
-    normal_forces (N_c,); low, high (N_c, 2). Raises InputError as `eta3` does, and for another
-    number of forces.
+    Parameters
+    ----------
+    normal_forces : (N_c,) array
+        f_n.
+    low, high : (N_c, 2) array
+        Smallest and largest f_n, f_t of each contact, over states or exact.
+
+    Returns
+    -------
+    (N_c,) array
+        NaN where the force is determined: ΔF_n is at most 10⁻⁶ of the largest force.
+
+    Raises
+    ------
+    InputError
+        As `eta3`, and for another number of forces.
     """
     low, high = _bounds(low, high)
     normal_forces = float_array(normal_forces, (len(low),), "normal forces")
@@ -232,10 +377,26 @@ def undetermined_clusters(
 ) -> tuple[Integers, Integers]:
     """Clusters of contacts with undetermined forces, connected through shared grains.
 
-    i, j (N_c,) grains; extent (N_c, 2) lengths of the intervals of f_n and f_t; a contact is
-    undetermined if one of them exceeds the tolerance. Returns the cluster of each contact (N_c,),
-    −1 for determined ones, and the number of contacts of each cluster, largest first. Raises
-    InputError for arrays of different numbers of contacts.
+    Parameters
+    ----------
+    i, j : (N_c,) array of int
+        Grains.
+    extent : (N_c, 2) array
+        Lengths of the intervals of f_n and f_t.
+    tolerance : float
+        A contact is undetermined if one of its lengths exceeds this.
+
+    Returns
+    -------
+    cluster : (N_c,) array of int
+        Cluster of each contact, −1 for determined ones.
+    count : array of int
+        Number of contacts of each cluster, largest first.
+
+    Raises
+    ------
+    InputError
+        For arrays of different numbers of contacts.
     """
     extent = real_array(extent, "lengths of intervals")
     if extent.shape != (len(i), 2) or len(i) != len(j):

@@ -225,13 +225,23 @@ class Store(Mapping[str, xr.Dataset]):
     def load(
         self, kind: str, params: Mapping[str, Any], *, version: int | str
     ) -> xr.Dataset | None:
-        """The entry's dataset, read and verified in full, or None if there is none.
+        """The entry's dataset, read and verified in full.
 
-        A damaged entry causes a warning and counts as missing; saving replaces it. Arrays have the
-        dtype with which they were stored.
+        Parameters
+        ----------
+        kind, params, version
+            As for `save`.
 
-        Raises InputError if a file is in the place of the entry, so that nothing could be saved
-        there.
+        Returns
+        -------
+        xr.Dataset or None
+            Arrays have the dtype with which they were stored. None without an entry, or if it is
+            damaged, with a warning; saving replaces it.
+
+        Raises
+        ------
+        InputError
+            If a file is in the place of the entry.
         """
         name = self.name(kind, params, version=version)
         self.refuse_file(name)
@@ -249,13 +259,34 @@ class Store(Mapping[str, xr.Dataset]):
         version: int | str,
         dtypes: Mapping[str, str] | None = None,
     ) -> str:
-        """Store a dataset under its parameters and return the entry's name.
+        """Store a dataset under its parameters; an intact entry of that name is not changed.
 
-        An intact entry of that name is not changed. dtypes: {variable: dtype} to store floats with
-        fewer bits, for small stores.
+        Parameters
+        ----------
+        kind : str
+            Of result, such as "packing" or "walk".
+        params : mapping
+            Plain values that identify it.
+        dataset : xr.Dataset
+            With variables of the schema.
+        version : int or str
+            Of the algorithm.
+        dtypes : mapping, optional
+            {variable: dtype} to store floats with fewer bits.
 
-        Raises ValueError if the dataset violates VARIABLES, TypeError for parameters or attributes
-        that are not plain values, InputError if the store cannot be written.
+        Returns
+        -------
+        str
+            Name of the entry.
+
+        Raises
+        ------
+        ValueError
+            If the dataset violates the schema.
+        TypeError
+            For parameters or attributes that are not plain values.
+        InputError
+            If the store cannot be written.
         """
         name = self.name(kind, params, version=version)
         variables = entries.conforming(dataset, dtypes or {})
@@ -352,7 +383,20 @@ class Store(Mapping[str, xr.Dataset]):
         return entries_read
 
     def find(self, kind: str | None = None, **params: Any) -> list[Entry]:
-        """The entries of a kind whose parameters include the given ones (compared as in keys)."""
+        """Entries whose parameters include the given ones.
+
+        Parameters
+        ----------
+        kind : str, optional
+            By default all kinds.
+        **params
+            Compared as in keys.
+
+        Returns
+        -------
+        list of Entry
+            Arrays are not read.
+        """
         parameters = {key: keys.canonical(value) for key, value in params.items()}
 
         def fits(name: str) -> bool:
