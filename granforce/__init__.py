@@ -78,9 +78,7 @@ _BY_QUESTION = {
         "scan": "study.scan",
         "evolution": "study.evolution",
     },
-    "Measures of states": {
-        "measures": "",
-    },
+    "Measures of states": {"measures": ""},
     "What is known and measured": {
         "Known": "forces.knowledge",
         "read_known": "packing.importers",
@@ -139,9 +137,7 @@ _BY_QUESTION = {
         "Entry": "study.store",
         "Verdict": "study.store",
     },
-    "Figures": {
-        "figures": "",
-    },
+    "Figures": {"figures": ""},
     "Records and errors": {
         "Packing": "records",
         "Contacts": "records",

@@ -144,8 +144,7 @@ TERMS = {
         "fₜ/(μ fₙ)",
     ),
     "residual": Term(
-        "residual",
-        "The largest unbalanced force on any body, in ⟨fₙ⟩: 0 is perfect balance.",
+        "residual", "The largest unbalanced force on any body, in ⟨fₙ⟩: 0 is perfect balance."
     ),
     "distance": Term(
         "distance from the centre",
@@ -256,8 +255,7 @@ TERMS = {
         "The first networks of a sample still depend on its starting point and are discarded.",
     ),
     "failed": Term(
-        "failed attempts",
-        "Kicks after which no balanced network was found. The walk tries again.",
+        "failed attempts", "Kicks after which no balanced network was found. The walk tries again."
     ),
     "segment": Term(
         "force lines",

@@ -16,11 +16,7 @@ from granforce.bench.exact import REFERENCES, interval_methods
 from granforce.bench.frames import frames
 from granforce.bench.kernel import growth, pushes, starts
 from granforce.bench.masonry import SMALL, masonry
-from granforce.bench.packings import (
-    compaction,
-    compaction_frictions,
-    compaction_growth,
-)
+from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, table
 from granforce.bench.runner import note
 from granforce.bench.solvers import contact_updates, relaxation, scaling
@@ -148,10 +144,7 @@ def draw(folder: str | Path, results: Mapping[str, Any]) -> bool:
 
 
 def main(
-    out: str | Path | None = None,
-    quick: bool = False,
-    as_json: bool = False,
-    parts: Parts = PARTS,
+    out: str | Path | None = None, quick: bool = False, as_json: bool = False, parts: Parts = PARTS
 ) -> dict[str, Any]:
     """The command `granforce bench`: tables or JSON on stdout, progress on stderr."""
     results = run(out, quick, parts=parts, show=(lambda text: None) if as_json else print)

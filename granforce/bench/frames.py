@@ -28,10 +28,7 @@ _SPOILT, _BY = 5, 3.0
 
 
 def frames(
-    n: int = 400,
-    packings: int = 6,
-    cases: Sequence[tuple[float, ...]] = CASES,
-    mu: float = MU,
+    n: int = 400, packings: int = 6, cases: Sequence[tuple[float, ...]] = CASES, mu: float = MU
 ) -> list[Row]:
     """Rows: mean error in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage of error bars.
 

@@ -22,9 +22,7 @@ WALKS: Mapping[str, dict[str, Any]] = {
 
 
 def intervals(
-    n: int = 400,
-    frictions: Sequence[float] = (0.1, 1.0),
-    states: Sequence[int] = (100, 300, 1000),
+    n: int = 400, frictions: Sequence[float] = (0.1, 1.0), states: Sequence[int] = (100, 300, 1000)
 ) -> list[Row]:
     """Rows: η3 and mean ΔF_n seen by walks of growing length, against the exact intervals.
 

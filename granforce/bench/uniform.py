@@ -12,15 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from granforce.bench.runner import (
-    Row,
-    growth_of,
-    note,
-    packings,
-    peak_megabytes,
-    tile,
-    tilings,
-)
+from granforce.bench.runner import Row, growth_of, note, packings, peak_megabytes, tile, tilings
 from granforce.explore.billiard import make_rows, room_for_rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.uniform import (

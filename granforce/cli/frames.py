@@ -106,9 +106,7 @@ def _check_out(path: str | None) -> None:
 
 
 def _chosen(
-    available: Sequence[Number],
-    text: str,
-    refusal: Callable[[float], InputError] | None = None,
+    available: Sequence[Number], text: str, refusal: Callable[[float], InputError] | None = None
 ) -> list[Number]:
     """The numbers of the requested frames; refusal(number): the error of one that is not there."""
     if text == "all":

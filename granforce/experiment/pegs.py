@@ -309,11 +309,7 @@ class _Fit(NamedTuple):
 
 
 def _grains(
-    listing: Listing,
-    mu: float,
-    repair: bool,
-    flag: str | None,
-    outline: str | WallOutline | None,
+    listing: Listing, mu: float, repair: bool, flag: str | None, outline: str | WallOutline | None
 ) -> _Grains:
     """The repaired frame."""
     listing, account, renamed = repaired(listing, mu, repair)

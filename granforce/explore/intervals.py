@@ -297,11 +297,7 @@ def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
 
 
 def _intervals(
-    ensemble: Ensemble,
-    places: Integers,
-    bounds: Bounds,
-    counts: dict[str, int],
-    accuracy: float,
+    ensemble: Ensemble, places: Integers, bounds: Bounds, counts: dict[str, int], accuracy: float
 ) -> Intervals:
     keys = itertools.product((int(c) for c in places), (0, 1), (0, 1))
     attained, gap = (one.reshape(-1, 2, 2) for one in values_and_gaps(bounds, list(keys)))

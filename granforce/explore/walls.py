@@ -273,11 +273,7 @@ def _is_thin(setup: _Setup, y: Floats) -> bool:
     return h != ensemble.hull.dimension
 
 
-def _centred(
-    setup: _Setup,
-    y: Floats,
-    matrix_at: _MatrixAt,
-) -> Floats | None:
+def _centred(setup: _Setup, y: Floats, matrix_at: _MatrixAt) -> Floats | None:
     """The y with the largest Σ log y − ½ Σ W (f − m)², from y by damped Newton steps.
 
     None if they do not converge: it may be at infinity.

@@ -8,12 +8,7 @@ their standard errors.
 from granforce.figures.bench import benchmark
 from granforce.figures.displacement import displacement
 from granforce.figures.indeterminacy import correlations, extents, indeterminacy
-from granforce.figures.networks import (
-    force_densities,
-    overlaid,
-    possible_forces,
-    ratio_counts,
-)
+from granforce.figures.networks import force_densities, overlaid, possible_forces, ratio_counts
 from granforce.figures.response import perturbation
 from granforce.figures.style import save
 from granforce.figures.variations import (

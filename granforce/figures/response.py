@@ -27,10 +27,7 @@ def perturbation(rows: Table, *, limit: bool = False, backend: str = "bokeh") ->
         title, label = "Critical force (solid), limit load (dashed)", "mean force / ⟨f_n⟩"
         forces.append(("limit_load", "limit load", "dashed"))
     exponents = [("decay_exponent", "in order of μ", "solid")]
-    panels = [
-        (forces, title, label),
-        (exponents, "Decay of displacements", "α of |u| ~ r^−α"),
-    ]
+    panels = [(forces, title, label), (exponents, "Decay of displacements", "α of |u| ~ r^−α")]
     looks = style.looks(sorted(pd.DataFrame(rows)["mu"].unique()))
     frames = []
     for names, title, label in panels:

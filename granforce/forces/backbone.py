@@ -73,8 +73,7 @@ def _raise_contradiction(full: Ensemble) -> None:
     assert full.known is not None
     A, b, T = full.scaled_balance
     message = knowledge.contradiction(
-        *(A, b, T, full.known, full.slopes, full.index, full.force_scale, full.slack),
-        full.friction,
+        *(A, b, T, full.known, full.slopes, full.index, full.force_scale, full.slack), full.friction
     )
     if message is not None:
         raise NotJammedError(message)

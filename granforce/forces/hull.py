@@ -11,11 +11,7 @@ from scipy import sparse
 from scipy.sparse.linalg import norm
 
 from granforce.forces.balance import LARGEST_RANK, left_free
-from granforce.forces.contact_problem import (
-    centre_of,
-    in_balance,
-    independent_problem_of,
-)
+from granforce.forces.contact_problem import centre_of, in_balance, independent_problem_of
 from granforce.forces.ensemble import Ensemble, Hull
 from granforce.numerics import wall_matrix
 from granforce.numerics.contact_program import PINNED

@@ -53,10 +53,7 @@ def _one(push: Push) -> Generator[Push, Outcome, Outcome]:
 
 
 def follow(
-    step: Step,
-    searches: Sequence[Search],
-    finished: Callable[[int, Any], object],
-    workers: int = 1,
+    step: Step, searches: Sequence[Search], finished: Callable[[int, Any], object], workers: int = 1
 ) -> None:
     """Run searches in lanes on threads: generators of Push that are sent the Outcome of each.
 

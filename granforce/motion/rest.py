@@ -126,13 +126,7 @@ def rest(
     why = _reason(noise, draws - stayed.sum(axis=1), draws)
     reasons = [reason for reason in (_elsewhere(S, distance), why) if reason]
     return Rest(
-        not reasons,
-        distance,
-        noise,
-        stayed,
-        _on_all(S, moving),
-        "; ".join(reasons),
-        wedged(S),
+        not reasons, distance, noise, stayed, _on_all(S, moving), "; ".join(reasons), wedged(S)
     )
 
 

@@ -24,16 +24,7 @@ from scipy import sparse
 from granforce.numerics import contact_matrix
 from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.contact_matrix import Factors, Network, push
-from granforce.numerics.lanes import (
-    larger,
-    load,
-    pick,
-    room,
-    side_by_side,
-    size,
-    store,
-    within,
-)
+from granforce.numerics.lanes import larger, load, pick, room, side_by_side, size, store, within
 from granforce.system import cancelling
 from granforce.types import Floats, Integers, Mask
 

@@ -357,12 +357,7 @@ def _no_pairs() -> tuple[Integers, Integers, Integers, Floats]:
 
 @compiled
 def _insert(
-    r: Floats,
-    order: Integers,
-    side: float,
-    rng: np.random.Generator,
-    attempts: int,
-    stop: Mask,
+    r: Floats, order: Integers, side: float, rng: np.random.Generator, attempts: int, stop: Mask
 ) -> tuple[Floats, bool]:
     """Random sequential insertion in a periodic square; False if a disk could not be placed.
 
@@ -394,10 +389,7 @@ def _insert(
 
 
 def _looking(
-    watch: Callable[[Glimpse], object],
-    unit: float,
-    pressure: float,
-    counters: Integers,
+    watch: Callable[[Glimpse], object], unit: float, pressure: float, counters: Integers
 ) -> Callable[[dynamics.Motion, float], object]:
     """look(motion, unbalance), which calls `watch` in the user's units."""
 

@@ -93,11 +93,7 @@ def _springer(inner: Floats, outer: Floats, end: int) -> Floats:
 
 
 def wall(
-    mu: float,
-    courses: int = 6,
-    blocks: int = 5,
-    width: float = 0.4,
-    height: float = 0.175,
+    mu: float, courses: int = 6, blocks: int = 5, width: float = 0.4, height: float = 0.175
 ) -> Packing:
     """A wall in running bond on fixed ground; every other course ends in half blocks."""
     courses, blocks = whole(courses, "courses", 1), whole(blocks, "blocks", 1)

@@ -46,8 +46,7 @@ def _leant_back(motion: Motion) -> Motion:
     # The image s_x a + s_y b is (s_x + times s_y) a + s_y (b − times a).
     along = motion.shift[:, 0] + int(times) * motion.shift[:, 1]
     return motion._replace(
-        tilt=motion.tilt - times * motion.box[0],
-        shift=np.column_stack([along, motion.shift[:, 1]]),
+        tilt=motion.tilt - times * motion.box[0], shift=np.column_stack([along, motion.shift[:, 1]])
     )
 
 

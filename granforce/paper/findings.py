@@ -14,12 +14,7 @@ import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper.claims.contacts import relative_extents
-from granforce.paper.claims.groups import (
-    RANGES,
-    items,
-    positive,
-    rows_of,
-)
+from granforce.paper.claims.groups import RANGES, items, positive, rows_of
 from granforce.paper.claims.verdicts import peak, slope
 from granforce.paper.tables import StudyTable
 

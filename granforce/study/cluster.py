@@ -17,10 +17,7 @@ LOOK, WORKERLESS, GIVEN_UP = 0.2, 5.0, 600.0
 
 
 def over_dask(
-    client: Any,
-    tasks: Tasks,
-    scheduler: str,
-    finished: Callable[[int, Callable[[], bool]], object],
+    client: Any, tasks: Tasks, scheduler: str, finished: Callable[[int, Callable[[], bool]], object]
 ) -> None:
     """Run tasks on the workers of a dask scheduler, which restarts those of lost workers."""
     from dask.distributed import KilledWorker, as_completed

@@ -1,13 +1,6 @@
 """The commands, by subject: each takes its arguments and may return an exit code."""
 
-from granforce.cli.commands.exact import (
-    intervals,
-    limit_loads,
-    load_factor,
-    perturb,
-    rest,
-    stress,
-)
+from granforce.cli.commands.exact import intervals, limit_loads, load_factor, perturb, rest, stress
 from granforce.cli.commands.inference import infer, informative
 from granforce.cli.commands.packings import export, import_, pack
 from granforce.cli.commands.pictures import figures, plot

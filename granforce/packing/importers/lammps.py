@@ -211,9 +211,7 @@ def open_lammps(
         pairs = _with_names(pairs, bool(set(columns or {}) & set(CONTACT_COLUMNS)))
         joined, forces, skipped = _contacts(pairs, x, r, box.cell, index)
         packing = make_packing(
-            *(x, r, box.cell.box, joined, forces, mu),
-            info={"source": "lammps"},
-            tilt=box.cell.tilt,
+            *(x, r, box.cell.box, joined, forces, mu), info={"source": "lammps"}, tilt=box.cell.tilt
         )
         info = {"timestep": step, "contacts_skipped": skipped}
         found = with_given_forces(packing, reverse=reverse, **info)

@@ -22,14 +22,7 @@ REPRODUCED, UNDECIDED, CONTRADICTED = "reproduced", "undecided", "contradicted"
 DEPENDS = "depends on the preparation"
 FEW, MISSING = "too few data", "no data"
 # Verdict → its symbol in tables.
-SYMBOLS = {
-    REPRODUCED: "✓",
-    CONTRADICTED: "✗",
-    DEPENDS: "⇄",
-    UNDECIDED: "?",
-    FEW: "…",
-    MISSING: "–",
-}
+SYMBOLS = {REPRODUCED: "✓", CONTRADICTED: "✗", DEPENDS: "⇄", UNDECIDED: "?", FEW: "…", MISSING: "–"}
 
 LEAST_DISKS = 1000  # in all packings of one μ
 NEAR_PEAK = 2.0  # in μ: means within this factor of the largest determine the maximum
@@ -83,12 +76,7 @@ def range_text(good: Ends) -> str:
 
 
 def over_all(
-    label: str,
-    statistic: Callable[..., float],
-    groups: Groups,
-    *,
-    least: int = 2,
-    span: str = "",
+    label: str, statistic: Callable[..., float], groups: Groups, *, least: int = 2, span: str = ""
 ) -> Iterator[Case]:
     """The case of one number of all groups, statistic(keys, means over packings); or none.
 

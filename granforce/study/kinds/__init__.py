@@ -13,13 +13,7 @@ from granforce.study.kinds.packings import (
     parameters_of,
 )
 from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
-from granforce.study.kinds.states import (
-    INFERENCE,
-    INFORMATIVE,
-    UNIFORM,
-    VOLUME,
-    WALK,
-)
+from granforce.study.kinds.states import INFERENCE, INFORMATIVE, UNIFORM, VOLUME, WALK
 
 __all__ = [
     "INFERENCE",
