@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 import granforce
 from granforce.glossary import TERMS
@@ -116,12 +117,20 @@ def more(replay: Replay) -> str:
     return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
 
 
+def of_all(replay: Replay, exact: xr.Dataset | None) -> Replay:
+    """A Replay with the dimension of all of S, as its networks may have held forces."""
+    if exact is None:
+        return replay
+    return replay._replace(summary=replay.summary | {"dimension": exact["dimension"].item()})
+
+
 def follow(state: AppState, header: Header) -> None:
     """Make the help of the page explain what is on screen."""
 
     def tell(*events: Any) -> None:
         if state.replay is not None:
-            header.help = summary_html(state.replay) + rest(state.replay) + ABOUT
+            replay = of_all(state.replay, state.exact)
+            header.help = summary_html(replay) + rest(replay) + ABOUT
 
     state.param.watch(tell, "replay")
     tell()

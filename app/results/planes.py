@@ -190,8 +190,8 @@ def other_states(cells: Sequence[Cell], cell: Cell) -> Cell | None:
         other
         for other in cells
         if other.kind != cell.kind
-        and other.mu == cell.mu
-        and other.selection.packing == selection.packing
+        and other.selection.shares_packing(selection)
+        and other.selection.held == selection.held
     ]
     return max(others, key=lambda other: other.selection.states, default=None)
 
@@ -246,7 +246,7 @@ def outline(
 
 def _stresses(library: Library, job: Job, cell: Cell, plane: Plane) -> Outlined:
     """The Outlined of all stresses."""
-    params = kinds.STRESS.parameters(cell.selection.packing, mu=cell.mu)
+    params = kinds.STRESS.parameters(cell.selection.packing, **cell.selection.conditions)
     dataset = load_or_compute(library, job, "outline of all stresses", kinds.STRESS, params)
     inner, outer = dataset["stress_inner"].values, dataset["stress_outer"].values
     gap = dataset["friction_bound"].item() - dataset["friction"].item()
@@ -260,7 +260,7 @@ def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
     chosen = [[int(replay.backbone[contact]), part] for contact, part in plane.components]
     return kinds.OUTLINE.parameters(
         selection.packing,
-        mu=selection.mu,
+        **selection.conditions,
         components=chosen or None,
         states=None if chosen else cell.params,
     )

@@ -368,6 +368,8 @@ class AppState(param.Parameterized):
         # A walk that was replaced may have reached numbers that the replay does not have.
         if (self.shown is replay and view is None) or self._is_grown(replay):
             fresh = {}
+        if cell.selection.held and "frame" in fresh:
+            fresh["frame"] = 1  # the network as packed has other forces
         fresh |= fitting(view or {}, replay)
         held = fresh["known"] if "known" in fresh else self.knowledge.known
         if not held:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from visitor import wait_for
 
+from app.background.jobs import Job
 from app.explore.results_line import results
 from app.explore.status_line import bounds
 from app.explore.tabs.intervals.intervals import View
@@ -13,6 +14,7 @@ from app.explore.tabs.intervals.known_forces import Known, meaning, words
 from app.packing.captions import PACKED, network
 from app.packing.legend import legend
 from app.packing.player import Player
+from app.results import planes
 from app.state import known
 from app.state.known import Statement
 from granforce.packing.importers import read_known
@@ -125,6 +127,11 @@ def test_networks_are_sampled_with_what_is_held(state, visited):
     assert "seen given the held forces (30 networks)" in results(state, None, False)
     assert state.knowledge.narrowed is narrowed  # not computed again
     assert np.all(np.isfinite(View(state).drawing.bars.data["high"]))
+    assert state.looks.frame == 1 and planes.other_states(state.catalogue, state.cell) is None
+    plane = planes.components(replay, (4, 0), (9, 0))
+    outlined = planes.outline(state.library, state.cell, replay, plane)(Job(lambda job: None))
+    assert np.ptp(outlined.outer[:, 0]) < 1e-3 < np.ptp(outlined.outer[:, 1])  # of the smaller S
+    state.looks.frame = 0
     assert network(state) == PACKED.capitalize() + ", which ignores the held forces"
     state.looks.frame = 3
     assert network(state) == "Network 3 of 30"

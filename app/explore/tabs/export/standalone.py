@@ -111,6 +111,7 @@ def html(
         "wide": True,  # force space is beside the intervals
     }
     left = len(replay.normal) - len(thinned_replay.normal)
+    whole = explanation.of_all(replay, exact)
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         # Not render(), which also names files of all of Panel's models.
@@ -118,7 +119,7 @@ def html(
             f"<script>{text}</script>"
             for text in Resources(mode="inline", components=["bokeh"]).js_raw
         ),
-        words=explanation.summary_html(replay) + explanation.more(replay),
+        words=explanation.summary_html(whole) + explanation.more(whole),
         plots="".join(plots),
         script=script,
         command=escape(command),

@@ -55,8 +55,7 @@ class Known(Scripted):
         number, knowledge = state.replay.backbone, state.knowledge
         best = knowledge.ranked
         self.param.update(
-            visible=not state.elsewhere
-            and (state.replay.summary["dimension"] > 0 or bool(knowledge.known)),
+            visible=state.shown.summary["dimension"] > 0 or bool(knowledge.known),
             chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
             words=words(knowledge, number) + sampled(state),
             ranked=[] if best is None else _ranks(best, number),
@@ -134,7 +133,7 @@ def meaning(best: Ranked, running: bool) -> str:
 def _worth(before: float, after: float, expected: float) -> str:
     """The value of knowing a contact."""
     if np.isnan(after) or np.isnan(before):
-        return f"standard deviations about {100 * expected:.1f} % smaller"
+        return f"spread about {100 * expected:.1f} % smaller"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 
 
