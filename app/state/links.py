@@ -155,10 +155,6 @@ def _place(text: str) -> tuple[float, ...]:
     return place
 
 
-def _tab(text: str) -> str:
-    return {"projection": "plane"}.get(text, text)  # former name in links
-
-
 def _flag(text: str) -> bool:
     return {"0": False, "1": True}[text]
 
@@ -181,7 +177,7 @@ class Stored(NamedTuple):
 
 # Parameters stored in a link if they differ from a new page.
 VIEW: dict[str, Stored] = {
-    "tab": Stored(_tab),
+    "tab": Stored(str),
     "contact": Stored(integer, key="select", numbered=lambda value, contact, _: contact(value)),
     "pair": Stored(_two, _joined, "span", lambda pair, contact, _: tuple(map(contact, pair))),
     "paused": Stored(_flag, int),

@@ -5,12 +5,10 @@ hopsy (pip install hopsy) is optional: it depends on GLPK, and is used only here
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from granforce.bench.runner import Row, growth_of, note, packings, peak_megabytes, tile, tilings
 from granforce.explore.billiard import make_rows, room_for_rows
@@ -37,8 +35,6 @@ MOST_ROUNDED = 60
 NAMES = dict(zip(METHODS, ("billiard", "coordinate hit-and-run"), strict=True))  # in tables
 STATES = 1000
 HOPSY_STATES = 600
-# Most walls for a dense null space: 1600 disks at μ = 0.1.
-MOST_DENSE_WALLS = 6000
 # States per chain to time a way of storing rows, after as many that fill the store.
 _TIMED = 2
 # Where rows of K are stored, as fractions of `billiard.MEMORY`.
@@ -56,9 +52,7 @@ def uniform(
     Four chains in one thread, including warm-up, without set-up (centre, factor, rows of K). ratio:
     that cost over the billiard's. z_mean and z_square: root mean square, over components, of the
     differences of means and of second moments from the billiard's in standard errors: near 1 if
-    both sample the same measure. null_space_ratio: time of a dense null space of the balance (QR
-    with pivoting), which the billiard avoids, over the whole set-up. two_cores: wall time of one
-    thread over that of two.
+    both sample the same measure.
     """
     rows = []
     for case, S in packings("uniform", n, frictions, seed):
@@ -68,8 +62,6 @@ def uniform(
         runs += _hopsy(S, polytope, stored_rows, rounded)
         case = case | {"h": polytope.dimension}
         rows += [_row(case, S, runs[0], run, setup) for run in runs]
-        rows[-len(runs)]["two_cores"] = _two_cores(polytope, stored_rows, seed)
-        rows[-len(runs)]["null_space_ratio"] = _null_space(S, polytope) / setup
     return rows
 
 
@@ -122,8 +114,7 @@ def uniform_growth(
     of processor time, including set-up, warm-up and diagnosis; peak_MB: largest memory of the
     process until then. seconds_per_state: processor time per further effective state, by where rows
     of K are stored, which does not change the states. setup_seconds: centre, factor and, if there
-    is room, rows of K; null_space_ratio: a dense null space of the balance over that.
-    seconds_of_eight: processor time of eight networks, warm-up included.
+    is room, rows of K. seconds_of_eight: processor time of eight networks, warm-up included.
     """
     base = ensemble(pack(n, mu, seed))
     sample_uniform(ensemble(tile(base, 1), prune=False), 8)  # compiles
@@ -143,8 +134,6 @@ def uniform_growth(
             "setup_seconds": setup,
             "seconds_of_eight": timed(sample_uniform, S, 8, seed=seed, clock=time.process_time)[0],
         }
-        if polytope.count <= MOST_DENSE_WALLS:
-            row["null_space_ratio"] = _null_space(S, polytope) / setup
         worth = sample.effective / len(sample.flat)
         for place, part in ROOMS.items():
             cost = case | {"rows": place, "seconds_per_state": _going_on(sample, part) / worth}
@@ -180,26 +169,6 @@ def _going_on(sample: Any, part: float) -> Any:
         ends, *_ = step(polytope, ends, count=_TIMED, reach=sample.reach, rows=rows)
         seconds = time.process_time() - begin
     return seconds / (_TIMED * len(ends))
-
-
-def _null_space(S: Ensemble, polytope: Any) -> float:
-    """Seconds of processor time for a dense null space by QR, which gives the same K."""
-    weighted = (
-        S.scaled_form[0].tocsc()[:, polytope.moving].toarray() * polytope.centre[polytope.moving]
-    )
-    return timed(linalg.qr, weighted.T, pivoting=True, clock=time.process_time)[0]
-
-
-def _two_cores(polytope: Any, rows: Any, seed: int) -> float:
-    wall = []
-    ends, reach, _ = warm_up(polytope, 2, seed, [rows])
-    for workers in (1, 2):
-        begin = time.perf_counter()
-        with ThreadPoolExecutor(workers) as pool:
-            on = partial(step, polytope, count=STATES, reach=reach, rows=rows)
-            list(pool.map(on, [[end] for end in ends]))
-        wall.append(time.perf_counter() - begin)
-    return wall[0] / wall[1]
 
 
 def _hopsy(S: Ensemble, polytope: Any, rows: Any, rounded: int) -> list[_Run]:

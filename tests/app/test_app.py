@@ -51,7 +51,7 @@ from app.state.known import Knowledge, Statement
 from app.state.links import Numbers, fitting, link, read_link, read_view, spelled
 from app.state.page_session import waker
 from app.state.pulls import Hand
-from app.state.view_settings import SORTS, TABS, Looks
+from app.state.view_settings import SORTS, Looks
 from granforce import measures
 from granforce.cli import entry_point
 from granforce.experiment.measurements import Measurement
@@ -262,11 +262,6 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
     for name, value in extra.items():
         word = "step-accuracy" if name == "accuracy" else name
         assert options[f"--{word}"] == str(value)
-
-
-def test_older_links_to_a_renamed_tab_open_it():
-    (tab,) = read_view({"tab": "projection"}, Looks.param).values()
-    assert TABS[tab] == "Force space"
 
 
 def test_a_button_names_all_that_is_to_be_computed_anew():

@@ -404,7 +404,7 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
     rows = bench.uniform(n=30, frictions=(0.3,), rounded=0)
     ours, other, *elsewhere = rows
     assert [ours["method"], other["method"]] == ["billiard", "coordinate hit-and-run"]
-    assert ours["ratio"] == 1 and ours["two_cores"] > 0 and ours["setup_seconds"] > 0
+    assert ours["ratio"] == 1 and ours["setup_seconds"] > 0
     cost = ours["seconds"] / ours["effective"]
     assert ours["seconds_per_state"] == pytest.approx(cost)
     assert other["ratio"] == pytest.approx(other["seconds_per_state"] / cost)
