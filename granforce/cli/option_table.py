@@ -186,9 +186,10 @@ OPTIONS = {
     "--best": Option("number of contacts to list", int, 10),
     "--box": Option(
         "square (default), or a cell whose sides and tilt adapt until the stress is isotropic, "
-        "so that the packing is also jammed against shear",
+        "so that the packing is also jammed against shear, or a layer that rests on a floor under "
+        "gravity, periodic in x only",
         default="square",
-        choices=("square", "isotropic"),
+        choices=("square", "isotropic", "floor"),
     ),
     "--box:import": Option(
         "sides of the periodic box (default: open)", float, metavar=("LX", "LY"), nargs=2

@@ -50,7 +50,7 @@ def _rates(motion: Motion) -> int:
 
 def prescribed_of(motion: Motion) -> dict[str, Any]:
     """What the ensemble prescribes in addition to the pressure, in units of it."""
-    if _rates(motion) == 1:
+    if _rates(motion) <= 1:
         return {}
     return {"prescribed": "stress", "stress": (1.0, 1.0, 0.0)}
 

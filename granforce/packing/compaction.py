@@ -9,6 +9,7 @@ rest; there, linear programs finish the packing (`closing`).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
@@ -22,7 +23,8 @@ from granforce.numerics.lanes import compiled
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
-from granforce.packing.settling import SEVERAL, come_to_rest, same_state
+from granforce.packing.pouring import poured
+from granforce.packing.settling import SEVERAL, come_to_rest, same_state, slump
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -63,8 +65,8 @@ BOX_AT_REST = 1e-6
 # Time steps start at SHORTEST times the longest, and grow while no carrying grain moves farther
 # than STRIDE (in largest radii).
 SHORTEST, STRIDE = 0.1, 0.02
-# Shapes of the box, with the number of strain rates.
-BOXES = {"square": 1, "isotropic": 3}
+# Shapes of the box, with the number of strain rates; a floor has no box that moves.
+BOXES = {"square": 1, "isotropic": 3, "floor": 0}
 # Counters of a compaction besides its steps and sweeps.
 WORK = (
     *("list_rebuilds", "linear_programs", "certificates_tried", "implicit_steps"),
@@ -76,6 +78,8 @@ DISK_BYTES = 2000
 COARSEST = 1.0
 # The compaction ends if the last phase fails in the same state so many times after the first.
 MOST_REPEATS = 2
+# Times that disks on a floor may come to rest.
+MOST_HEAPS = 40
 # Steps between two calls of `watch`.
 WATCH_EVERY = 5
 
@@ -121,7 +125,7 @@ def pack(
     watch: Callable[[Glimpse], object] | None = None,
     cancel: Cancel | None = None,
 ) -> Packing:
-    """A jammed packing of n disks with friction coefficient μ in a doubly periodic box.
+    """A jammed packing of n disks with friction coefficient μ in a doubly periodic box, or a heap.
 
     Parameters
     ----------
@@ -150,16 +154,19 @@ def pack(
     drag_below : float, optional
         Drag takes the place of inertia once no grain's momentum changes by more than this in a
         step, in ⟨f_n⟩; by default 0.02, less from 2000 disks on. Only for μ above 10⁻⁴.
-    box : {"square", "isotropic"}
+    box : {"square", "isotropic", "floor"}
         Sides and tilt of an isotropic box follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
-        jammed against shear too.
+        jammed against shear too. On a floor, disks of weight π r² are poured one by one in a layer
+        that is periodic in x and about as deep as wide, and slump until they rest, without inertia:
+        μ above 10⁻⁴, and neither pressure nor settings of the dynamics.
     max_steps : int, default 100,000
         Maximum number of time steps.
     progress : callable, optional
         progress(steps done, None) is called repeatedly, as the total is unknown. It does not change
         a bit of the result.
     watch : callable, optional
-        watch(Glimpse) is called at least every 5 steps. It does not change a bit of the result.
+        watch(Glimpse) is called at least every 5 steps. It does not change a bit of the result. On
+        a floor it is not called.
     cancel : callable, optional
         Polled; returning True raises Cancelled.
 
@@ -193,6 +200,18 @@ def pack(
     rng = np.random.default_rng(seed)
     r = draw_radii(radii, n, rng)
     unit = r.max()
+    if box == "floor":
+        given = {
+            "pressure": pressure != 1.0,
+            "dt, sweeps": (dt, sweeps) != default_steps(mu, None, None),
+            "box_mass": box_mass != 100.0,
+            "accuracy": accuracy != 0.01,
+            "drag_below": drag_below is not None,
+        }
+        info = {"seed": seed, "radii": radii if isinstance(radii, str) else "list", "box": box}
+        for name in (name for name, is_given in given.items() if is_given):
+            raise InputError(f'box="floor" has no use for {name}: leave it out')
+        return _heap(r / unit, unit, mu, rng, info, progress)
     motion = _dilute_gas(r / unit, rng, BOXES[box])
     motion.pace[:] = SHORTEST * dt, dynamics.MOST_RELAXATION
     settling = sweeps // SETTLING if mu >= SETTLED_FROM else 0
@@ -247,7 +266,45 @@ def pack(
         "noise_at_rest": max(certificate.noise),
         **work,
     }
-    return _in_users_units(finished, unit, pressure, info)
+    return _in_users_units(finished, unit, unit * pressure, pressure, info)
+
+
+def _heap(
+    r: Floats,
+    unit: float,
+    mu: float,
+    rng: np.random.Generator,
+    info: dict[str, Any],
+    progress: Progress | None,
+) -> Packing:
+    """Disks at rest on a floor, in the user's units."""
+    if mu <= NEARLY_FRICTIONLESS:
+        raise InputError(f'box="floor" needs a friction coefficient above {NEARLY_FRICTIONLESS:g}')
+    work, looks = dict.fromkeys(WORK, 0), itertools.count(1)
+
+    def look(motion: dynamics.Motion, unbalance: float) -> None:
+        if progress is not None:
+            progress(next(looks), None)
+
+    motion = slump(poured(r, rng), mu, work, look)
+    for _ in range(MOST_HEAPS):
+        motion, finished, certificate = come_to_rest(motion, mu, work, look)
+        if finished is not None and certificate is not None and certificate.at_rest:
+            break
+    else:
+        raise NotJammedError("the disks on the floor did not come to rest; use another seed")
+    apart = margin(finished)
+    info |= {
+        "steps": 0,
+        "sweeps_done": 0,
+        "largest_contact_gap": apart.contact,
+        "least_other_gap": apart.other,
+        "distance_to_rest": certificate.distance,
+        "noise_at_rest": max(certificate.noise),
+        **work,
+    }
+    weight = np.pi * np.sum(r**2) / finished.box[0] * unit**2
+    return _in_users_units(finished, unit, weight, np.nan, info)
 
 
 def number_of_disks(n: int) -> int:
@@ -467,8 +524,9 @@ def _finish(
 
 
 def _in_users_units(
-    packing: Packing, unit: float, pressure: float, info: dict[str, Any]
+    packing: Packing, unit: float, force: float, pressure: float, info: dict[str, Any]
 ) -> Packing:
+    walls = {"walls": (unit * packing.walls).tolist()} if len(packing.walls) else {}
     contacts = packing.contacts
     lengths = {name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")}
     return make_packing(
@@ -476,9 +534,10 @@ def _in_users_units(
         packing.r * unit,
         packing.box * unit,
         contacts._replace(**lengths),
-        packing.forces * unit * pressure,
+        packing.forces * force,
         packing.mu,
         pressure,
-        info=info,
+        load=packing.load * force,
+        info=packing.info | walls | info,
         tilt=packing.tilt * unit,
     )

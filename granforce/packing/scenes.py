@@ -22,6 +22,7 @@ from granforce.forces.build import ensemble
 from granforce.packing import masonry
 from granforce.packing.assemblies import with_network
 from granforce.packing.compaction import pack
+from granforce.packing.pouring import STUD
 from granforce.records import (
     InputError,
     NotJammedError,
@@ -39,9 +40,6 @@ from granforce.types import Floats, Integers, Mask
 
 # Default gap (in largest radii) below which a disk touches a wall or another disk.
 SNAPPED = 1e-9
-# Radius of the grain behind a touched place, relative to the disk's; of a pressing wall, relative
-# to the largest disk's.
-STUD = 0.25
 MOST_SEEDS = 100  # tried for a packing with the dimension of a scene
 
 

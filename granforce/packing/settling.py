@@ -31,6 +31,7 @@ from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained
 from granforce.packing.neighbours import separations
 from granforce.packing.pair_list import cell_of, relisted
+from granforce.packing.pouring import behind_floor, weights
 from granforce.records import NotJammedError, Packing, UndecidedError, make_contacts
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, SAME_STATE, TOUCHING
@@ -43,6 +44,8 @@ SOFTNESS = 1e-6
 # Displacement after which the geometry is updated, in largest radii: the neglected quadratic terms
 # of the gaps change forces by a hundredth.
 STRIDE = 0.1 * SOFTNESS**0.5
+# Softness of disks that slump on a floor, and how often their linear systems may be used up.
+SOFTER, SLUMPS = 1e-4, 50
 # Implicit steps between two calls of `look`; linear systems after which the dynamics takes over:
 # fewer beyond SEVERAL disks, in inverse proportion to their number, as a system then costs far more
 # than a sweep.
@@ -111,6 +114,15 @@ def come_to_rest(
     return motion, packing, certificate
 
 
+def slump(motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None) -> Motion:
+    """Overdamped motion of softer disks, in longer strides, SLUMPS times or until they balance."""
+    for _ in range(SLUMPS):
+        motion, rested = _creep(motion, mu, work, look, SOFTER)
+        if rested:
+            break
+    return motion
+
+
 def same_state(one: Packing, other: Packing) -> bool:
     """Whether two packings of the same grains have the same contacts and forces to SAME_STATE."""
     if len(one.contacts.i) != len(other.contacts.i):
@@ -124,9 +136,14 @@ def same_state(one: Packing, other: Packing) -> bool:
 
 
 def _creep(
-    motion: Motion, mu: float, work: dict[str, Any], look: Look | None
+    motion: Motion,
+    mu: float,
+    work: dict[str, Any],
+    look: Look | None,
+    softness: float = SOFTNESS,
 ) -> tuple[Motion, bool]:
     """Overdamped motion; returns whether everything came to rest."""
+    stride = STRIDE * (softness / SOFTNESS) ** 0.5
     pace = FIRST_PACE
     counts, near, ended = np.zeros(3, dtype=np.int64), None, overdamped.MOVED
     fewer = min(1.0, SEVERAL / len(motion.r))
@@ -136,19 +153,19 @@ def _creep(
         motion, near = _chosen(motion, near)
         place = _place(motion, near, mu)
         moving = overdamped.make_overdamped(
-            place.step, motion.force[near.pairs], place.gap, SOFTNESS, pace
+            place.step, motion.force[near.pairs], place.gap, softness, pace
         )
         velocity = moving.flows.velocity
         velocity.rows[place.grains, 0] = motion.velocity
         velocity.border[:, 0] = motion.dilation.ravel()
         ended = overdamped.move(
-            place.step, moving, SOFTNESS, STRIDE, steps, counts, cancelling.flag()
+            place.step, moving, softness, stride, steps, counts, cancelling.flag()
         )
         pace = float(moving.flows.pace[0, 0])
         motion.velocity[:] = velocity.rows[place.grains, 0]
         motion.dilation.ravel()[:] = velocity.border[:, 0]
         _displace(motion, moving.moved[place.grains], moving.strain / place.unit)
-        _correct(motion, near, place.step, moving)
+        _correct(motion, near, place.step, moving, softness)
         if look is not None:
             look(motion, _unbalance(place.step, velocity))
         if ended != overdamped.MOVED:
@@ -188,12 +205,14 @@ def _columns(
     first[:, :2] = -second[:, :2]
     first[:, 2, 1] = second[:, 2, 1] = -1.0  # torque/r of rigid disks
     i, j, r = motion.i[pairs], motion.j[pairs], motion.r
+    if motion.dilation.size == 0:
+        second[j >= len(r) // 2] = 0.0  # behind the floor nothing moves
     rows = stress_rows(make_contacts(i, j, normal, length, r)) / length.sum()
     if frictionless:
         first[..., 1] = second[..., 1] = rows[..., 1] = 0.0
     pressure = rows[0] + rows[1]
-    if motion.dilation.size == 1:
-        return first, second, pressure[:, None]
+    if motion.dilation.size <= 1:
+        return first, second, pressure[:, None][:, : motion.dilation.size]
     return first, second, np.stack([pressure, 0.5 * (rows[0] - rows[1]), rows[2]], axis=1)
 
 
@@ -204,17 +223,20 @@ def _place(motion: Motion, near: _Near, mu: float) -> _Place:
         near.network.layout, i, j, *_columns(motion, near.pairs, normal, length, mu == 0)
     )
     grains = 3 * network.layout.position[:, None] + np.arange(3)
-    mass, volume = np.empty(grains.size), float(np.prod(motion.box))
+    mass, load = np.empty(grains.size), np.zeros(grains.size)
     mass[grains] = motion.mass[:, None] * np.array([1.0, 1.0, 0.5])
-    box = np.full(motion.dilation.size, 2 * volume * BOX_MASS / unit**2)
-    b = np.zeros(len(box))
-    b[0] = 2 * volume / unit
+    box = b = np.zeros(0)
+    if motion.dilation.size:
+        volume = float(np.prod(motion.box))
+        box = np.full(motion.dilation.size, 2 * volume * BOX_MASS / unit**2)
+        b = np.zeros(len(box))
+        b[0] = 2 * volume / unit
+    else:
+        load[grains[:, 1]] = weights(motion)
     stiffness = effective_masses(network, mass, box)
     everywhere = np.append(grains.ravel(), grains.size + np.arange(len(box)))
     closing, friction = np.zeros(len(gap)), np.full(len(gap), mu)
-    step = Step(
-        network, np.zeros(len(mass)), b, mass, box, stiffness, closing, friction, everywhere
-    )
+    step = Step(network, load, b, mass, box, stiffness, closing, friction, everywhere)
     return _Place(step, gap, grains, unit)
 
 
@@ -223,17 +245,22 @@ def _displace(motion: Motion, moved: Floats, strain: Floats) -> None:
     if len(strain) == 3:
         mean, half, shear = strain
         strain = np.array([mean + 0.5 * half, mean - 0.5 * half, shear])
-    x, cell = strained(motion.x, cell_of(motion), strain)
-    motion.x[:], motion.box[:], motion.tilt[0] = x + moved[:, :2], cell.box, cell.tilt
+    if len(strain):
+        x, cell = strained(motion.x, cell_of(motion), strain)
+        motion.x[:], motion.box[:], motion.tilt[0] = x + moved[:, :2], cell.box, cell.tilt
+    else:
+        motion.x[:] = behind_floor(motion.x + moved[:, :2], motion.r)
     farthest = np.hypot(*moved[:, :2].T).max()
     motion.drift[0] += 2.0 * farthest + 3.0 * np.abs(strain).sum() * motion.r.max()
 
 
-def _correct(motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped) -> None:
+def _correct(
+    motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped, softness: float
+) -> None:
     """Keep the forces when the quadratic terms of displacements change the gaps."""
     gap = _geometry(motion, near.pairs)[2]
     forces = moving.flows.forces.reshape(-1, 2).copy()
-    forces[:, 0] -= step.stiffness[:, 0] * (gap - moving.gap) / SOFTNESS
+    forces[:, 0] -= step.stiffness[:, 0] * (gap - moving.gap) / softness
     forces[forces[:, 0] <= 0] = 0.0
     motion.force[:] = 0.0
     motion.force[near.pairs] = forces
@@ -297,4 +324,25 @@ def _packing(motion: Motion, mu: float, work: dict[str, Any]) -> tuple[Packing, 
     touching = pressing | (gap < TOUCHING)
     work["touching_without_force"] = int((touching & ~pressing).sum())
     packing = packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
+    if not motion.dilation.size:
+        packing = _on_floor(packing, motion)
     return packing, np.flatnonzero(touching)
+
+
+def _on_floor(packing: Packing, motion: Motion) -> Packing:
+    """The packing of disks on a floor, whose grains behind it are those that are touched."""
+    disks, c = len(packing.r) // 2, packing.contacts
+    behind = np.unique(c.j[c.j >= disks])
+    kept = np.append(np.arange(disks), behind)
+    load = np.zeros((len(kept), 3))
+    load[:, 1] = -weights(motion)[kept]
+    load[disks:] = np.nan
+    j = np.where(c.j < disks, c.j, disks + np.searchsorted(behind, c.j))
+    return packing._replace(
+        x=packing.x[kept],
+        r=packing.r[kept],
+        contacts=c._replace(j=j),
+        load=load,
+        pressure=np.nan,
+        info={"walls": [[0.0, 0.0, float(packing.box[0]), 0.0]], "disks": disks, "pressing": []},
+    )
