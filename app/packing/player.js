@@ -199,7 +199,7 @@ class Player {
       style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
       style.setProperty(`${name}-plots`, old ? (model.live ? 0 : OLD) : 1)
     }
-    const waits = { intervals: pale["--growing"], plane: pale["--growing"], statistics: model.requested, perturb: model.requested }
+    const waits = { intervals: pale["--growing"], plane: pale["--growing"], perturb: model.requested }
     style.setProperty("--waiting", model.live && waits[model.tab] ? '"Being computed …"' : "none")
   }
 

@@ -58,6 +58,7 @@ PLOTTED = ("intervals", "plane", "statistics", "perturb")  # what can be saved w
 PLANE = list(TABS).index("plane")
 # At once, however busy the server; `Tabs._place` does the same for changes from there.
 SHOW = f"space.visible = source.active === {PLANE} || matchMedia('(min-width: 1800px)').matches"
+OF_ONE_PACKING = ("intervals", "plane", "perturb")
 GROWING = ("intervals", "plane")  # views that show a walk during its computation
 
 
@@ -134,11 +135,12 @@ class Tabs:
 def pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
     """Dim parts (name, view) that belong to older states than requested; see player.js.
 
-    Plots are hidden while the requested states are being computed.
+    Plots of one packing are hidden while the requested states are being computed; figures of the
+    study are not.
     """
     for name, part in parts:
         old = "growing" if name in GROWING else "still"
         part.styles = part.styles | {
-            "opacity": f"var(--{old}{'-plots' if name in PLOTTED else ''}, 1)",
+            "opacity": f"var(--{old}{'-plots' if name in OF_ONE_PACKING else ''}, 1)",
             "filter": f"var(--{old}-colours, none)",
         }
