@@ -20,6 +20,7 @@ from . import result_values
 from .result_values import Quantity
 
 MEASURE = '<button type="button" class="soft">measure</button>'
+NONE = "", "–"  # values that are not there
 UNIT = {"extent": " ⟨fₙ⟩"}
 FOLD = '<button type="button" class="fold" aria-label="all numbers, with their meaning"></button>'
 
@@ -130,7 +131,7 @@ def _laid_out(
     left: str = "",
 ) -> str:
     """The line and the tables; rows, values: of the tables; left: what the numbers leave out."""
-    seen = [(one, one.seen, f" (exact {one.exact})" * bool(one.exact)) for one in measures]
+    seen = [(one, one.seen, f" (exact {one.exact})" * (one.exact not in NONE)) for one in measures]
     parts = [*seen, *((one, one.exact, "") for one in packing if one.exact)]
     line = "".join(
         f"<span>{term(one.key, one.symbol)} <b>{value}</b>{more}</span>"
