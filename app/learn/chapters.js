@@ -78,7 +78,7 @@ export const CHAPTERS = [
     doing: "Drag the dot along the edge of S, all the way round. What its path encloses turns blue: between two possible sets of forces, every mixture is possible too.",
     see: ({ high, weight, mu }) => [
       `Both disks together weigh ${weight}. The other ${two(high - weight)} comes from the walls: the disks are wedged between them, and friction there pulls them down. With more, the lower disk would slip on the floor, where friction is at its limit, ${mu} × ${two(high)}.`,
-      "Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip. Change the friction: how much do two disks need to stay?",
+      "Every point of the polygon is one set of forces that holds the same two disks; at its edges a disk is about to slip. Now raise the friction: from which μ on do the disks lock in the box, with forces as large as you like?",
     ],
     count: (facts) => counted(facts, false),
     ...BOX,
@@ -104,9 +104,9 @@ export const CHAPTERS = [
     text: ({ all, mu, start, contacts, equations, free }) => `${all} disks at μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${2 * contacts} forces − ${equations} equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make this force while no disk moves?",
     doing: "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dark: about to slip (wedge) or open (ring).",
-    see: ({ high, opened, sliding, changed, free }) => [
+    see: ({ high, opened, sliding, changed, contacts, free }) => [
       `At ${two(high)}, ${opened} contacts have lost both their forces, and friction is at its limit at ${sliding}.${fixed(opened, sliding, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
-      `How is ${two(high)} found? As in the box, drawn again below: balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner. To find that corner is a linear program; a computer solves it for thousands of forces in a second.`,
+      `How is ${two(high)} found? As in the box, drawn again below: balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner. Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
     ],
     x: { low: 0, high: 6, label: "force of the marked line (mean force = 1)" }, y: null,
     experiment: Grab, options: { axes: BOX, across: 4, up: 0 },
@@ -117,8 +117,8 @@ export const CHAPTERS = [
     ask: "What is the largest green force that chance finds?",
     doing: "Press “Walk”, or drag the slider. Each dot is a network, one after every twentieth step; network 0 is the one in which the packing came to rest.",
     see: ({ part, share, free }) => [
-      `The walk covers ${percent(part)} of what is possible for the green force, only ${percent(share)} of the pale area, and none of its corners. At a corner all ${free} free numbers have to work together, which chance hardly ever arranges.`,
-      `And this is a shadow on two forces. A part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S. A value that chance never finds may still be possible.`,
+      `The walk covers ${percent(part)} of what is possible for the green force. Its dots fill ${percent(share)} of the pale area, far from the edge: to get there, most of the ${free} free numbers have to work together, which chance hardly ever arranges.`,
+      `A walk shows what is typical, not what is possible. And this is only a shadow: a part half as wide as S in each of its ${free} directions fills one part in 10${raised(Math.round(free * Math.log10(2)))} of S.`,
     ],
     x: { low: 0.5, high: 4, label: "green force (mean force = 1)" }, y: { low: 0, high: 3, label: "violet force" },
     experiment: Chance, options: {},

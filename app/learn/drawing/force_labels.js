@@ -58,7 +58,7 @@ export function drawNames(arrows, F) {
     write(x, py + 34 * uy, lines, { left: "right", right: "left" }[side] ?? "center")
   }
   const load = Math.hypot(body.load[0], body.load[1]), thin = arrows.outline(0)
-  if (load > 1e-9) write(cx + (thin ? 6 : 0), cy + (thin ? 0.6 : -0.55) * scene.r[0] * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], thin ? "left" : "center")
+  if (load > 1e-9) write(cx + (thin ? 8 : 0), cy + (thin ? load * arrows.forceUnit : -0.55 * scene.r[0]) * arrows.unit, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], thin ? "left" : "center")
   if (scene.r[0] * arrows.unit > ROOMY) drawParts(arrows, arrows.ends()[0], F)
 }
 

@@ -142,7 +142,7 @@ export class QuantityPlot {
       const [px, py] = this.place(now)
       this.dot.setAttribute("transform", `translate(${px} ${py})`)
       this.reading.setAttribute("x", this.beside(px, (words.length * PILL.letter) / 2, [marker, answer, ...lines]))
-      this.reading.textContent = answer && this.x.px(answer.value) === px ? "" : words
+      this.reading.textContent = answer && Math.abs(this.x.px(answer.value) - px) < GAP ? "" : words
       this.dot.setAttribute("aria-valuetext", words)
       this.dot.setAttribute("aria-valuenow", now[0])
     }

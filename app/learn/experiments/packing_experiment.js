@@ -14,8 +14,8 @@ export class PackingExperiment {
 
   /** Numbers of a packing that the text needs. */
   counted(packing) {
-    const { contacts, free, disks, all_disks: all, mu, spread } = packing
-    return { contacts, free, disks, all, mu, spread, equations: 2 * contacts - free }
+    const { contacts, free, disks, all_disks: all, mu } = packing
+    return { contacts, free, disks, all, mu, equations: 2 * contacts - free }
   }
 
   /** The first network of a packing, in which it came to rest. */
