@@ -135,8 +135,8 @@ def test_a_scene_is_built_by_keyboard_and_its_link_carries_it(look, tmp_path):
     page = look("?scene=own")
     free(page, 2)
     page.get_by_role("img", name="Disks").focus()
-    for _ in range(2):
-        page.keyboard.press("ArrowUp")
+    for key in ["ArrowUp"] * 8 + ["ArrowLeft"] * 2:  # above both
+        page.keyboard.press(key)
     page.keyboard.press("Enter")  # a disk is put, and let go
     page.keyboard.press("Enter")
     page.locator(".count b").filter(has_not_text="8 unknown").wait_for()
