@@ -180,9 +180,8 @@ def test_the_way_back_from_more_disks_leads_to_the_same_chapter(opening, lesson)
 def test_a_prediction_is_not_moved_by_a_grasp_and_stays_within_the_possible(opening, lesson):
     page = opening("?learn=chance", 1280, 900, first=True, at=lesson)
     page.locator("article strong").wait_for()
-    low, high = map(
-        float, re.search(r"from ([\d.]+) to ([\d.]*\d)", page.locator(".text").inner_text()).groups()
-    )
+    words = page.locator(".text").inner_text()
+    low, high = map(float, re.search(r"from ([\d.]+) to ([\d.]*\d)", words).groups())
     marker = page.get_by_role("slider", name="your prediction")
     marker.focus()
     for _ in range(10):
