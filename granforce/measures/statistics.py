@@ -73,9 +73,7 @@ def jackknife_error(statistic: Callable[[list[T]], float], items: Sequence[T]) -
     return float(np.sqrt((count - 1) * without.var()))
 
 
-def stratified_interval(
-    groups: Iterable[Iterable[float]], level: float = LEVEL
-) -> tuple[float, float, float]:
+def stratified_interval(groups: Iterable[Iterable[float]]) -> tuple[float, float, float]:
     """Mean of the means of several groups and its interval: (mean, low, high).
 
     Differences between groups, such as a trend with μ, are not part of the error. The degrees of
@@ -92,7 +90,7 @@ def stratified_interval(
     if not squares.any():
         return mean, mean, mean
     freedom = squares.sum() ** 2 / np.sum(squares**2 / [len(values) - 1 for values in arrays])
-    reach = float(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(squares.sum()))
+    reach = float(stats.t.ppf((1 + LEVEL) / 2, freedom) * np.sqrt(squares.sum()))
     return mean, mean - reach, mean + reach
 
 
@@ -128,23 +126,20 @@ def means(
 
 
 def bootstrap(
-    statistic: Callable[..., float],
-    groups: Sequence[Sequence[Any] | Floats],
-    seed: int = 0,
-    resamples: int = RESAMPLES,
+    statistic: Callable[..., float], groups: Sequence[Sequence[Any] | Floats]
 ) -> tuple[float, float, float]:
     """(value, low, high) of statistic(*groups) with a percentile interval.
 
     groups: sequences, one item per packing; each group is resampled separately. Groups of one
-    packing do not vary; if all groups are such there is no interval (NaN). The result depends only
-    on the seed.
+    packing do not vary; if all groups are such there is no interval (NaN). The resampling is always
+    the same.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     groups = [list(group) for group in groups]
     if max(len(group) for group in groups) < 2:
         return float(statistic(*groups)), float("nan"), float("nan")
-    drawn = np.empty(resamples)
-    for k in range(resamples):
+    drawn = np.empty(RESAMPLES)
+    for k in range(RESAMPLES):
         chosen = [rng.integers(len(group), size=len(group)) for group in groups]
         drawn[k] = statistic(*([g[i] for i in c] for g, c in zip(groups, chosen, strict=True)))
     if not np.isfinite(drawn).any():
@@ -154,7 +149,7 @@ def bootstrap(
     return float(statistic(*groups)), float(low), float(high)
 
 
-def drawn_means(groups: Sequence[npt.ArrayLike], seed: int = 0, draws: int = RESAMPLES) -> Floats:
+def drawn_means(groups: Sequence[npt.ArrayLike], draws: int = RESAMPLES) -> Floats:
     """Means (draws, groups, …) that the values of some packings leave possible, by Student's t.
 
     groups: arrays (n, …), one item per packing. A mean is drawn as m + (s/√n) T, with mean m and
@@ -163,7 +158,7 @@ def drawn_means(groups: Sequence[npt.ArrayLike], seed: int = 0, draws: int = RES
     `mean_interval`, while resampled packings (a bootstrap) would give intervals that are too short
     for few of them. The mean of a single packing does not vary.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = []
     for group in map(np.asarray, groups):
         count, mean = len(group), group.mean(axis=0)

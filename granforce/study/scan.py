@@ -157,16 +157,11 @@ def _check_dtypes(dtypes: Mapping[str, str]) -> None:
 
 
 def walks(
-    path: str | Path,
-    cells: Sequence[Parameters],
-    *,
-    on_row: Callable[[dict[str, Any]], object] | None = None,
-    **options: Any,
+    path: str | Path, cells: Sequence[Parameters], **options: Any
 ) -> tuple[list[dict[str, Any]], list[tuple[Parameters, str]]]:
     """Run walks (their parameters); see `run` for the options.
 
-    on_row(row) is called after each walk. Returns the rows in the order of the cells and a list of
-    (walk parameters, error message).
+    Returns the rows in the order of the cells and a list of (walk parameters, error message).
     """
     store = open_store(path)
     rows: dict[int, dict[str, Any]] = {}
@@ -175,8 +170,6 @@ def walks(
     def done(k: int, cached: bool) -> None:
         # Computed again if another process removed it meanwhile.
         rows[k] = row(cells[k], get(store, *named[k])[0], cached)
-        if on_row is not None:
-            on_row(rows[k])
 
     failed = run(path, named, on_done=done, **options)
     return [rows[k] for k in sorted(rows)], [(cell.parameters, text) for cell, text in failed]
