@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics import lanes
-from granforce.numerics.lanes import MANY, compiled, inline, within
+from granforce.numerics.lanes import MANY, allocating, compiled, inline, within
 from granforce.system import cancelling
 from granforce.system.memory import machine_memory
 from granforce.types import Floats, Integers, Mask
@@ -150,7 +150,7 @@ def follow(
     return np.stack([flight.s for flight in flights]), outs, np.array(counts)
 
 
-@compiled
+@allocating
 def fly(rows, speeds, times, middles, flight, limit, out, stop):
     """Follow paths with speeds (paths, walls) and times (paths,), each from the end of the last.
 

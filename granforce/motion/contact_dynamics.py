@@ -25,6 +25,8 @@ from granforce.motion.box_motion import (
 )
 from granforce.numerics.lanes import (
     ONE,
+    allocating,
+    allocating_part,
     compiled,
     larger,
     load,
@@ -190,7 +192,7 @@ GROWTH = 1.3
 ROUNDING = 1e-14
 
 
-@compiled
+@allocating
 def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
     """Do up to `steps` time steps, ending early when the neighbour list has to be rebuilt.
 
@@ -208,7 +210,7 @@ def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
     return overlap, unbalance
 
 
-@within
+@allocating_part
 def _step(motion, mu, pressure, pace, counters, stop):
     velocity, box = motion.velocity, motion.box
     volume, dt = box[0] * box[1], motion.pace[0]
@@ -237,7 +239,7 @@ def _step(motion, mu, pressure, pace, counters, stop):
     return overlap / motion.r.max(), _unbalance(motion, before, force, dt)
 
 
-@within
+@allocating_part
 def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
     """Sweep until the violation of the contact laws is small enough; return λ.
 
@@ -333,7 +335,7 @@ def _fastest(problem, force, velocity):
     return fastest
 
 
-@within
+@allocating_part
 def _near_contacts(motion, dt, box_inertia):
     """The pairs that may touch during this step, as a StepProblem, and the mean overlap."""
     x, r, box = motion.x, motion.r, motion.box

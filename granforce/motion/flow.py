@@ -29,6 +29,7 @@ from granforce.numerics import contact_matrix, lu
 from granforce.numerics.contact_matrix import Factors
 from granforce.numerics.lanes import (
     ONE,
+    allocating_part,
     compiled,
     inline,
     larger,
@@ -272,7 +273,7 @@ def _clear_lane(values, lane):
         values[k, lane] = 0.0
 
 
-@within
+@allocating_part
 def _search(step, flows, lanes):
     """Halve each lane's Newton step until the squared unbalance (over masses) falls.
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.motion.contact_dynamics import sweep
-from granforce.numerics.lanes import compiled, larger, load, same, size, store, within
+from granforce.numerics.lanes import allocating, larger, load, same, size, store, within
 from granforce.types import Floats, Integers
 
 # Sweeps between two checks of the residual, each of which costs about as much as a sweep.
@@ -31,7 +31,7 @@ class Looks(NamedTuple):
     state: Integers  # UNDER_WAY, SETTLED_DOWN or ENDED
 
 
-@compiled
+@allocating
 def relax(problem, velocity, unit, mu, force, tolerance, most, sweeps, looks, rng, stop, lanes):
     """Sweep in all lanes until a relaxation in progress has ended."""
     order = np.arange(problem.i.shape[0])

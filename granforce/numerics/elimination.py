@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.numerics.lanes import compiled, within
+from granforce.numerics.lanes import allocating, within
 from granforce.system import cancelling
 from granforce.types import Floats, Integers
 
@@ -83,7 +83,7 @@ def _updates(begin: Integers) -> int:
     return np.sum(size * (size + 1) // 2)
 
 
-@compiled
+@allocating
 def _least_degree(start, other, stop):
     """Order of minimum-degree elimination; column k has the grains below[begin[k]:begin[k + 1]].
 
@@ -223,7 +223,7 @@ def _outside(
     return number
 
 
-@compiled
+@allocating
 def _by_subtrees(begin, below):
     """Columns of the elimination tree, children before parents, subtree by subtree."""
     count = len(begin) - 1
@@ -263,7 +263,7 @@ def _renumbered(begin: Integers, below: Integers, after: Integers) -> tuple[Inte
     return start.astype(np.int64), row[np.lexsort((row, column))]
 
 
-@compiled
+@allocating
 def _panels(start, row):
     """First columns of the panels, then the number of columns.
 
@@ -281,7 +281,7 @@ def _panels(start, row):
     return panel[: number + 1].copy()
 
 
-@compiled
+@allocating
 def _targets(start, row, panel, pairs):
     """For every panel, each row q below and each row a from q on: the block of (a, q)."""
     target = np.empty(pairs, np.int32)

@@ -36,6 +36,7 @@ from granforce.numerics.contact_program import (
 )
 from granforce.numerics.lanes import (
     ONE,
+    allocating_part,
     compiled,
     fma,
     larger,
@@ -284,7 +285,7 @@ def _towards(problem, mode, at, work, lanes):
         work.dy[last, lane] = (pulled + work.h[last, lane]) / _load_stiffness(at, mode, lane)
 
 
-@within
+@allocating_part
 def _refine(problem, at, work, lanes):
     """Add to δy and δv the steps that remove the remaining unbalance.
 

@@ -49,12 +49,17 @@ _PART = _KERNEL | {
     "no_cfunc_wrapper": True,
     "pipeline_class": PartCompiler,
 }
-compiled = np.errstate(all="ignore") if config.DISABLE_JIT else njit(**_KERNEL)
-within = njit(**_PART)
+# Counting references to arrays is left out: it takes a third of compiling, and only kernels that
+# allocate or return arrays, and those that receive such an array from a part, need it.
+_COUNTED, _UNCOUNTED = {"_nrt": True}, {"_nrt": False}
+allocating = np.errstate(all="ignore") if config.DISABLE_JIT else njit(**_KERNEL, **_COUNTED)
+compiled = allocating if config.DISABLE_JIT else njit(**_KERNEL, **_UNCOUNTED)
+allocating_part = njit(**_PART, **_COUNTED)
+within = njit(**_PART, **_UNCOUNTED)
 # Inlined into their callers: small kernels, whose numbers would otherwise pass through memory, and
 # kernels called for each contact with a network, which has a hundred fields to pass (a step of one
 # interior-point method takes 0.15 ms instead of 0.27, with the same bits).
-inline = njit(**_PART, forceinline=True)
+inline = njit(**_PART, **_UNCOUNTED, forceinline=True)
 
 # The last argument of kernels, whose length the compiler knows. NumPy integers, because kernels
 # would be compiled again for Python constants.

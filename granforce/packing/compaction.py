@@ -19,7 +19,7 @@ import numpy.typing as npt
 from granforce.fields import record
 from granforce.motion import contact_dynamics as dynamics
 from granforce.motion.rest import Rest, rest
-from granforce.numerics.lanes import compiled
+from granforce.numerics.lanes import allocating
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
@@ -412,7 +412,7 @@ def _no_pairs() -> tuple[Integers, Integers, Integers, Floats]:
     )
 
 
-@compiled
+@allocating
 def _insert(
     r: Floats, order: Integers, side: float, rng: np.random.Generator, attempts: int, stop: Mask
 ) -> tuple[Floats, bool]:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from granforce.numerics.lanes import compiled, within
+from granforce.numerics.lanes import allocating, allocating_part, within
 
 
-@compiled
+@allocating
 def find_pairs(x, r, cell, cutoff):
     """All pairs with gap < cutoff, each periodic image separately.
 
@@ -36,7 +36,7 @@ def find_pairs(x, r, cell, cutoff):
     return _by_cells(x, r, cell, cutoff, low, size, cells)
 
 
-@within
+@allocating_part
 def _heights(cell):
     """Distances between opposite sides of the cell, along a and b."""
     high = cell.box.copy()
@@ -62,7 +62,7 @@ def _nearest_shift(cell, d_x, d_y):
     return s_x, s_y
 
 
-@within
+@allocating_part
 def _every_image(x, r, cell, cutoff, reach):
     n = x.shape[0]
     reach_shift = np.zeros(2, np.int64)
@@ -80,7 +80,7 @@ def _every_image(x, r, cell, cutoff, reach):
     return _columns(rows)
 
 
-@within
+@allocating_part
 def _append(rows, x, r, cell, cutoff, i, j, s_x, s_y):
     d_x, d_y = _step(x, cell, i, j, s_x, s_y)
     reach = r[i] + r[j] + cutoff
@@ -96,7 +96,7 @@ def _step(x, cell, i, j, s_x, s_y):
     return d_x + s_y * cell.tilt, d_y
 
 
-@within
+@allocating_part
 def _by_cells(x, r, cell, cutoff, low, size, cells):
     n = x.shape[0]
     box = cell.box
@@ -136,7 +136,7 @@ def _by_cells(x, r, cell, cutoff, low, size, cells):
     return _columns(rows)
 
 
-@within
+@allocating_part
 def _columns(rows):
     # rows[0] only defines the type of the list for the compiler.
     count = len(rows) - 1
@@ -148,7 +148,7 @@ def _columns(rows):
     return i, j, shift
 
 
-@compiled
+@allocating
 def separations(x, r, cell, i, j, shift):
     """Unit vectors i → j (P, 2), centre distances (P,) and gaps (P,) of the listed pairs."""
     count = i.shape[0]

@@ -4,7 +4,7 @@ import numpy as np
 
 from granforce.cell import Cell
 from granforce.motion.contact_dynamics import REACH, Motion
-from granforce.numerics.lanes import compiled
+from granforce.numerics.lanes import allocating
 from granforce.packing.neighbours import find_pairs
 from granforce.records import NotJammedError
 from granforce.types import Floats, Integers
@@ -50,7 +50,7 @@ def _leant_back(motion: Motion) -> Motion:
     )
 
 
-@compiled
+@allocating
 def _carry_over(
     old_i: Integers,
     old_j: Integers,
