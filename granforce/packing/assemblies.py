@@ -371,7 +371,7 @@ def _normals(given: Mapping[Any, Any] | None, held: Mask) -> dict[tuple[int, int
     """Angles (radians) of the normals of pairs (i, j), i < j, as `blocks` takes them."""
     if not isinstance(given, Mapping | None):
         raise InputError(f"normals must be {{(0, 1): 90, …}}, got {brief(given)}")
-    angles = {}
+    angles: dict[tuple[int, int], float] = {}
     for pair, angle in ({} if given is None else given).items():
         numbers = np.asarray(pair)
         if numbers.shape != (2,) or not are_whole(numbers, len(held) - 1).all():
@@ -379,7 +379,9 @@ def _normals(given: Mapping[Any, Any] | None, held: Mask) -> dict[tuple[int, int
             raise InputError(f"normals are of pairs of bodies 0 … {last}, not {brief(pair)}")
         i, j = numbers.astype(int).tolist()
         turned = np.radians(float(float_array(angle, (), f"the normal of bodies {i} and {j}")))
-        angles[min(i, j), max(i, j)] = turned + (np.pi if i > j else 0.0)
+        if (ends := (min(i, j), max(i, j))) in angles:
+            raise InputError(f"the normal of bodies {i} and {j} is given twice: give it once")
+        angles[ends] = turned + (np.pi if i > j else 0.0)
     return angles
 
 

@@ -221,6 +221,7 @@ def test_bodies_of_parts_are_read_written_and_drawn_as_from_arrays(tmp_path):
         ([FOOT, GROUND], {"normals": {(0, 1): 90}}, "do not meet corner on corner"),
         ([FOOT, GROUND], {"normals": {(0, 2): 90}}, "normals are of pairs of bodies 0 … 1"),
         ([FOOT, GROUND], {"normals": [0, 1, 90]}, "normals must be"),
+        ([FOOT, GROUND], {"normals": {(0, 1): 90, (1, 0): -90}}, "is given twice"),
         ([FOOT, rectangle(1, 3, 2, 4)], {"normals": {(0, 1): np.nan}}, "contains NaN"),
         ([FOOT, rectangle(1, 3, 2, 4)], {"normals": {(0, 1): -90}}, "does not point from one"),
     ],
