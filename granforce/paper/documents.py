@@ -9,12 +9,14 @@ claim of the paper with its verdict, and the numbers behind it), "figures" (thos
 all numbers.
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from granforce.measures import statistics
 from granforce.paper import csv_tables
@@ -24,7 +26,7 @@ from granforce.paper.claims.table import AFTER
 from granforce.paper.claims.verdicts import SYMBOLS
 from granforce.paper.drawings import CAPTIONS, POINTS
 from granforce.paper.formatting import between, concise, listed
-from granforce.paper.highlights import highlights
+from granforce.paper.highlights import Highlight, highlights
 from granforce.paper.resting import resting
 from granforce.paper.tables import StudyTable
 from granforce.records import InputError
@@ -60,13 +62,15 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
 
     claims: as `claims.judge` returns them; findings: dicts of `findings.Finding`.
     """
+    chosen = functools.cache(lambda: highlights(table, claims, findings))
+    means = functools.cache(lambda: csv_tables.by_friction(table))
     known: dict[str, Callable[[], str]] = {
-        "headlines": lambda: headlines(table, claims, findings),
-        "highlights": lambda: highlight_text(table, claims, findings),
+        "headlines": lambda: headlines(chosen()),
+        "highlights": lambda: highlight_text(chosen()),
         "claims": lambda: claim_table(claims),
         "figures": paper_figures,
-        "friction": lambda: at_friction(table, _MEASURES, _FRICTIONS),
-        "sweeps": lambda: sweeps(table),
+        "friction": lambda: at_friction(means(), _MEASURES, _FRICTIONS),
+        "sweeps": lambda: sweeps(table, means()),
         "preparation": lambda: preparation(table),
         "resting": lambda: resting(table),
         "certificates": lambda: certificates(table),
@@ -80,9 +84,8 @@ def renew(paths: Sequence[Path], table: StudyTable, claims: Rows, findings: Rows
     markdown.renew(paths, KIND, text_of)
 
 
-def at_friction(table: StudyTable, columns: dict[str, str], frictions: Sequence[float]) -> str:
-    """Some quantities {head: name} at some μ as a table, without what the study lacks."""
-    rows = csv_tables.by_friction(table)
+def at_friction(rows: pd.DataFrame, columns: dict[str, str], frictions: Sequence[float]) -> str:
+    """Some quantities {head: name} at some μ as a table, of rows of `csv_tables.by_friction`."""
     cells = {(row.quantity, row.mu): _mean(row) for row in rows.itertuples()}
     known = {head: name for head, name in columns.items() if name in set(rows["quantity"])}
     lines = [
@@ -97,8 +100,8 @@ def _mean(row: Any) -> str:
     return concise(row.mean, row.standard_error)
 
 
-def sweeps(table: StudyTable) -> str:
-    """The paper's walk by its final residual: sentences and a table."""
+def sweeps(table: StudyTable, means: pd.DataFrame) -> str:
+    """The paper's walk by its final residual: sentences and a table of means at each μ."""
     ends = [residual for part, residual in plans.SWEEPS.items() if len(table.part(part))]
     columns = {
         f"{word} {_power(residual)}": f"{quantity}, paper's walk to {residual:g}"
@@ -109,7 +112,7 @@ def sweeps(table: StudyTable) -> str:
         head: name + " over nearest-network walk" * name.startswith("η2")
         for head, name in columns.items()
     }
-    return f"{_sweep_notes(table)}\n{at_friction(table, columns, _SWEPT_FRICTIONS)}" if ends else ""
+    return f"{_sweep_notes(table)}\n{at_friction(means, columns, _SWEPT_FRICTIONS)}" if ends else ""
 
 
 def _sweep_notes(table: StudyTable) -> str:
@@ -170,10 +173,9 @@ def _difference(row: Any, level: float) -> str:
     return f"**{text}**" if row.p < level else text
 
 
-def headlines(table: StudyTable, claims: Rows, findings: Rows) -> str:
+def headlines(chosen: Sequence[Highlight]) -> str:
     """The first highlights as a list."""
-    chosen = highlights(table, claims, findings)[:HEADLINES]
-    return "".join(f"- {_with_bold_message(one.sentence)}\n" for one in chosen)
+    return "".join(f"- {_with_bold_message(one.sentence)}\n" for one in chosen[:HEADLINES])
 
 
 def _with_bold_message(sentence: str) -> str:
@@ -182,10 +184,10 @@ def _with_bold_message(sentence: str) -> str:
     return f"**{message}**{colon}{numbers}" if colon else sentence
 
 
-def highlight_text(table: StudyTable, claims: Rows, findings: Rows) -> str:
+def highlight_text(chosen: Sequence[Highlight]) -> str:
     """All highlights, numbered, with caveats, links to methods, and figures."""
     text, shown = "", set()
-    for k, one in enumerate(highlights(table, claims, findings), 1):
+    for k, one in enumerate(chosen, 1):
         words = f"{one.sentence} {one.caveat}".strip()
         text += f"**{k}.** {_with_bold_message(words)} [Method](method.md#{one.method})\n\n"
         if one.figure and one.figure not in shown:

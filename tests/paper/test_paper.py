@@ -435,13 +435,15 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
 
 
 def test_sweeps_are_compared_by_the_residual_at_which_they_end(table):
-    heads, *lines = table_of(documents.sweeps(table))
+    heads, *lines = table_of(documents.sweeps(table, csv_tables.by_friction(table)))
     words = ["10⁻³", "10⁻⁴", "10⁻⁶"]
     assert heads == ["μ", *(f"sweeps to {word}" for word in words), *(f"η2, {w}" for w in words)]
     (swept,) = statistics.grouped(table.part("sweeps_1e-4"), "mean_sweeps")[0.1]
     assert lines[-1][:3:2] == ["0.1", f"{swept:.0f}" if swept >= 1000 else f"{swept:.3f}"]
     only = table.rows[~table.rows["part"].isin(("sweeps_1e-4", "sweeps_1e-6"))]
-    assert "| μ | sweeps to 10⁻³ | η2, 10⁻³ |" in documents.sweeps(table._replace(rows=only))
+    few = table._replace(rows=only)
+    text = documents.sweeps(few, csv_tables.by_friction(few))
+    assert "| μ | sweeps to 10⁻³ | η2, 10⁻³ |" in text
 
 
 def test_what_packings_depend_on_is_told_by_paired_differences(table):
