@@ -189,7 +189,7 @@ OPTIONS = {
         "so that the packing is also jammed against shear, or a layer that rests on a floor under "
         "gravity, periodic in x only",
         default="square",
-        choices=("square", "isotropic", "floor"),
+        choices=("square", "isotropic", "floor", "smooth floor"),
     ),
     "--box:import": Option(
         "sides of the periodic box (default: open)", float, metavar=("LX", "LY"), nargs=2

@@ -66,7 +66,7 @@ BOX_AT_REST = 1e-6
 # than STRIDE (in largest radii).
 SHORTEST, STRIDE = 0.1, 0.02
 # Shapes of the box, with the number of strain rates; a floor has no box that moves.
-BOXES = {"square": 1, "isotropic": 3, "floor": 0}
+BOXES = {"square": 1, "isotropic": 3, "floor": 0, "smooth floor": 0}
 # Counters of a compaction besides its steps and sweeps.
 WORK = (
     *("list_rebuilds", "linear_programs", "certificates_tried", "implicit_steps"),
@@ -154,11 +154,11 @@ def pack(
     drag_below : float, optional
         Drag takes the place of inertia once no grain's momentum changes by more than this in a
         step, in ⟨f_n⟩; by default 0.02, less from 2000 disks on. Only for μ above 10⁻⁴.
-    box : {"square", "isotropic", "floor"}
+    box : {"square", "isotropic", "floor", "smooth floor"}
         Sides and tilt of an isotropic box follow the stress until σ_xx = σ_yy = P0 and σ_xy = 0:
         jammed against shear too. On a floor, disks of weight π r² are poured one by one in a layer
         that is periodic in x and about as deep as wide, and slump until they rest, without inertia:
-        μ above 10⁻⁴, and neither pressure nor settings of the dynamics.
+        μ above 10⁻⁴ (0 at a smooth floor), neither pressure nor settings of the dynamics.
     max_steps : int, default 100,000
         Maximum number of time steps.
     progress : callable, optional
@@ -200,7 +200,7 @@ def pack(
     rng = np.random.default_rng(seed)
     r = draw_radii(radii, n, rng)
     unit = r.max()
-    if box == "floor":
+    if not BOXES[box]:
         given = {
             "pressure": pressure != 1.0,
             "dt, sweeps": (dt, sweeps) != default_steps(mu, None, None),
@@ -210,7 +210,7 @@ def pack(
         }
         info = {"seed": seed, "radii": radii if isinstance(radii, str) else "list", "box": box}
         for name in (name for name, is_given in given.items() if is_given):
-            raise InputError(f'box="floor" has no use for {name}: leave it out')
+            raise InputError(f'box="{box}" has no use for {name}: leave it out')
         return _heap(r / unit, unit, mu, rng, info, progress)
     motion = _dilute_gas(r / unit, rng, BOXES[box])
     motion.pace[:] = SHORTEST * dt, dynamics.MOST_RELAXATION
@@ -279,16 +279,18 @@ def _heap(
 ) -> Packing:
     """Disks at rest on a floor, in the user's units."""
     if mu <= NEARLY_FRICTIONLESS:
-        raise InputError(f'box="floor" needs a friction coefficient above {NEARLY_FRICTIONLESS:g}')
+        least = f"{NEARLY_FRICTIONLESS:g}"
+        raise InputError(f'box="{info["box"]}" needs a friction coefficient above {least}')
+    coefficients = mu if info["box"] == "floor" else np.array([mu, 0.0])
     work, looks = dict.fromkeys(WORK, 0), itertools.count(1)
 
     def look(motion: dynamics.Motion, unbalance: float) -> None:
         if progress is not None:
             progress(next(looks), None)
 
-    motion = slump(poured(r, rng), mu, work, look)
+    motion = slump(poured(r, rng), coefficients, work, look)
     for _ in range(MOST_HEAPS):
-        motion, finished, certificate = come_to_rest(motion, mu, work, look)
+        motion, finished, certificate = come_to_rest(motion, coefficients, work, look)
         if finished is not None and certificate is not None and certificate.at_rest:
             break
     else:

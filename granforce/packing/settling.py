@@ -32,7 +32,13 @@ from granforce.packing.closing import packing_of, prescribed_of, strained
 from granforce.packing.neighbours import separations
 from granforce.packing.pair_list import cell_of, relisted
 from granforce.packing.pouring import behind_floor, weights
-from granforce.records import NotJammedError, Packing, UndecidedError, make_contacts
+from granforce.records import (
+    NotJammedError,
+    Packing,
+    UndecidedError,
+    make_contacts,
+    with_friction,
+)
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, SAME_STATE, TOUCHING
 from granforce.types import Floats, Integers, Mask
@@ -67,6 +73,7 @@ CLOSING_STEPS = 60
 ATTEMPTS = 20
 
 Look = Callable[[Motion, float], object]
+Mu = float | Floats  # friction coefficient, or (2,) those of disks and of the floor
 
 
 class _Near(NamedTuple):
@@ -87,7 +94,7 @@ class _Place(NamedTuple):
 
 
 def come_to_rest(
-    motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None
+    motion: Motion, mu: Mu, work: dict[str, Any], look: Look | None = None
 ) -> tuple[Motion, Packing | None, Rest | None]:
     """The motion at rest, its packing in natural units and the test of rest; None if it moves.
 
@@ -114,7 +121,7 @@ def come_to_rest(
     return motion, packing, certificate
 
 
-def slump(motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None) -> Motion:
+def slump(motion: Motion, mu: Mu, work: dict[str, Any], look: Look | None = None) -> Motion:
     """Overdamped motion of softer disks, in longer strides, SLUMPS times or until they balance."""
     for _ in range(SLUMPS):
         motion, rested = _creep(motion, mu, work, look, SOFTER)
@@ -137,7 +144,7 @@ def same_state(one: Packing, other: Packing) -> bool:
 
 def _creep(
     motion: Motion,
-    mu: float,
+    mu: Mu,
     work: dict[str, Any],
     look: Look | None,
     softness: float = SOFTNESS,
@@ -216,11 +223,11 @@ def _columns(
     return first, second, np.stack([pressure, 0.5 * (rows[0] - rows[1]), rows[2]], axis=1)
 
 
-def _place(motion: Motion, near: _Near, mu: float) -> _Place:
+def _place(motion: Motion, near: _Near, mu: Mu) -> _Place:
     normal, length, gap = _geometry(motion, near.pairs)
     i, j, unit = motion.i[near.pairs], motion.j[near.pairs], float(length.sum())
     network = contact_matrix.turned(
-        near.network.layout, i, j, *_columns(motion, near.pairs, normal, length, mu == 0)
+        near.network.layout, i, j, *_columns(motion, near.pairs, normal, length, np.max(mu) == 0)
     )
     grains = 3 * network.layout.position[:, None] + np.arange(3)
     mass, load = np.empty(grains.size), np.zeros(grains.size)
@@ -235,7 +242,7 @@ def _place(motion: Motion, near: _Near, mu: float) -> _Place:
         load[grains[:, 1]] = weights(motion)
     stiffness = effective_masses(network, mass, box)
     everywhere = np.append(grains.ravel(), grains.size + np.arange(len(box)))
-    closing, friction = np.zeros(len(gap)), np.full(len(gap), mu)
+    closing, friction = np.zeros(len(gap)), _friction(motion, j, mu)
     step = Step(network, load, b, mass, box, stiffness, closing, friction, everywhere)
     return _Place(step, gap, grains, unit)
 
@@ -270,9 +277,7 @@ def _unbalance(step: Step, velocity: Any) -> float:
     return float(np.abs(step.mass * velocity.rows[:, 0]).max())
 
 
-def _closed(
-    motion: Motion, mu: float, work: dict[str, Any], look: Look | None
-) -> tuple[Motion, bool]:
+def _closed(motion: Motion, mu: Mu, work: dict[str, Any], look: Look | None) -> tuple[Motion, bool]:
     """The motion with overlaps closed and at rest again; returns whether it succeeded."""
     for _ in range(CLOSINGS):
         motion, near = _chosen(motion, None)
@@ -318,18 +323,28 @@ def _close(motion: Motion, near: _Near, work: dict[str, Any]) -> bool:
     return True
 
 
-def _packing(motion: Motion, mu: float, work: dict[str, Any]) -> tuple[Packing, Integers]:
+def _packing(motion: Motion, mu: Mu, work: dict[str, Any]) -> tuple[Packing, Integers]:
     """The packing in natural units, and the places of its contacts in the list."""
     gap, pressing = _gaps(motion)
     touching = pressing | (gap < TOUCHING)
     work["touching_without_force"] = int((touching & ~pressing).sum())
-    packing = packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
+    packing = packing_of(
+        motion, motion.x, cell_of(motion), touching, motion.force, float(np.max(mu))
+    )
     if not motion.dilation.size:
-        packing = _on_floor(packing, motion)
+        packing = _on_floor(packing, motion, mu)
     return packing, np.flatnonzero(touching)
 
 
-def _on_floor(packing: Packing, motion: Motion) -> Packing:
+def _friction(motion: Motion, j: Integers, mu: Mu) -> Floats:
+    """Friction coefficients (k,) of pairs with second grains j (k,)."""
+    friction = np.full(len(j), np.max(mu))
+    if np.ndim(mu):
+        friction[j >= len(motion.r) // 2] = np.ravel(mu)[1]
+    return friction
+
+
+def _on_floor(packing: Packing, motion: Motion, mu: Mu) -> Packing:
     """The packing of disks on a floor, whose grains behind it are those that are touched."""
     disks, c = len(packing.r) // 2, packing.contacts
     behind = np.unique(c.j[c.j >= disks])
@@ -338,6 +353,7 @@ def _on_floor(packing: Packing, motion: Motion) -> Packing:
     load[:, 1] = -weights(motion)[kept]
     load[disks:] = np.nan
     j = np.where(c.j < disks, c.j, disks + np.searchsorted(behind, c.j))
+    c, _ = with_friction(c, _friction(motion, c.j, mu))
     return packing._replace(
         x=packing.x[kept],
         r=packing.r[kept],

@@ -353,7 +353,9 @@ def test_isotropic_boxes_end_with_one_pressure_and_no_shear(mu):
 def test_square_boxes_hold_a_shear_stress_that_isotropic_ones_do_not():
     with pytest.raises(NotJammedError):
         ensemble(packed(60, 0.3), prescribed="stress", stress=(1, 1, 0))
-    with pytest.raises(InputError, match="box must be square, isotropic or floor, got 'round'"):
+    with pytest.raises(
+        InputError, match="box must be square, isotropic, floor or smooth floor, got 'round'"
+    ):
         pack(20, 0.3, 0, box="round")
 
 

@@ -93,6 +93,18 @@ def test_a_heap_rests_and_its_bounds_are_those_of_linprog(heap):
     assert gf.pack(25, 0.3, seed=3, box="floor") == heap
 
 
+def test_a_smooth_floor_bears_weight_but_no_friction():
+    heap = gf.pack(25, 0.3, seed=3, box="smooth floor")
+    S, floor = gf.ensemble(heap), heap.contacts.j >= 25
+    exact = gf.intervals(S)
+    assert gf.rest(heap).at_rest and heap.mu == 0.3
+    assert (
+        not exact.high[floor[exact.contacts], 1].any()
+        and exact.high[~floor[exact.contacts], 1].any()
+    )
+    assert heap.forces[floor, 0].sum() == pytest.approx(np.pi * np.sum(heap.r[:25] ** 2))
+
+
 def test_other_programs_take_and_give_layers_that_are_periodic_in_x(heap, tmp_path):
     gf.save_packing(heap, tmp_path / "heap.npz")
     assert gf.load_packing(tmp_path / "heap.npz").forces == pytest.approx(heap.forces)
