@@ -3,7 +3,8 @@
 import { CATCH_UP } from "./live.js"
 
 const PLOTS_MS = 30 // shortest time between two repaints of the plots while playing,
-const PLOTS_FRAMES = 1.5 // also in frames, for slow frames
+const PLOTS_FRAMES = 1.5 // also in frames, for slow frames,
+const PLOTS_CONTACT_MS = 0.05 // and for each contact, as plots of many take longer than the packing
 const CROSSING = 20 // duration of a step between two states, relative to a normal step, so that the eye can follow,
 const LONGEST_S = 6 // with an upper limit
 const REST_MS = 400 // duration of a whole step when a pause moves to the nearest network
@@ -89,7 +90,8 @@ export class Playback {
     replay.go(replay.position + this.direction * this.steps(replay, elapsed / 1000))
     if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.turn(replay.atEnd ? -1 : 1)
     stage.paint()
-    if (now - this.painted > Math.max(PLOTS_MS, PLOTS_FRAMES * elapsed)) stage.paintPlots(now)
+    const wait = Math.max(PLOTS_MS, PLOTS_FRAMES * elapsed, PLOTS_CONTACT_MS * replay.walk.contacts)
+    if (now - this.painted > wait) stage.paintPlots(now)
     if (replay.swinging || !replay.atEnd || stage.grows) return void again()
     this.run(false)
     stage.show(replay.last)
