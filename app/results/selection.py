@@ -147,7 +147,7 @@ def differing(requested: Selection, shown: Selection | None) -> str:
         f"packed at μ = {new['mu']:g}": not requested.same_mu and new["mu"] != old["mu"],
         "a random walk" if walks else f"networks {KINDS['uniform']}": requested.kind != shown.kind,
         f"{requested.states} networks": requested.states != shown.states,
-        holding(requested.held): requested.held != shown.held,
+        held_words(requested.held): requested.held != shown.held,
         SOLVERS[requested.relax]: walks and shown.kind == "walk" and requested.relax != shown.relax,
     }
     return ", ".join(words for words, differs in parts.items() if differs) or next(iter(parts))
@@ -158,7 +158,7 @@ def _plain(selection: Selection) -> Selection:
 
 
 def selected(kind: str, parameters: Parameters) -> Selection | None:
-    """The Selection of these parameters of a walk or sample; None for conditions it has not."""
+    """The Selection of a walk or sample; None if more is prescribed than normal forces."""
     packing, mu = parameters["packing"], float(parameters["mu"])
     relax, known = parameters.get("relax", "nearest"), parameters.get("known", [])
     if "prescribed" in parameters or any(None in row[:3] or row[3:] != NO_BOUNDS for row in known):
@@ -172,7 +172,7 @@ def rows(held: Iterable[Bound]) -> list[list[Any]]:
     return [[*bound, *NO_BOUNDS] for bound in held]
 
 
-def holding(held: Sequence[Bound]) -> str:
+def held_words(held: Sequence[Bound]) -> str:
     """The number of held forces, in words."""
     return f"{len(held) or 'no'} force{'s' * (len(held) != 1)} held"
 
@@ -224,7 +224,7 @@ def series(
     if selection.seed != 0:
         words.append(f"seed {selection.seed} of the networks")
     if selection.held:
-        words.append(holding(selection.held))
+        words.append(held_words(selection.held))
     usual = {"walk": 1, "uniform": 4}[selection.kind]
     chains = (parameters or {}).get("chains", usual)
     if chains != usual:
@@ -237,7 +237,7 @@ def brief(selection: Selection, series: str) -> str:
     """A short form of a series for display over its picture; unchanged for an import."""
     if selection.imported:
         return series
-    held = f", {holding(selection.held)}" if selection.held else ""
+    held = f", {held_words(selection.held)}" if selection.held else ""
     return f"{selection.packing['n']} disks, {selection.states} networks{held}"
 
 

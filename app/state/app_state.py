@@ -158,10 +158,10 @@ class AppState(param.Parameterized):
     @property
     def obeying(self) -> bool:
         """Whether the states on screen are those of S with exactly the held forces."""
-        shown, replay = self.on_screen, self.replay
-        if shown is None or replay is None:
-            return False
-        held = known.bounds(replay, self.knowledge.known)
+        shown, statements = self.on_screen, self.knowledge.known
+        if shown is None or self.replay is None:
+            return not statements
+        held = known.bounds(self.replay, statements)
         return len(held) == len(shown.held) and np.allclose(held, shown.held, rtol=1e-8, atol=0)
 
     @property
@@ -215,7 +215,7 @@ class AppState(param.Parameterized):
             return
         self._request(selection, at_once)
 
-    def sample_held(self, *events: Any) -> None:
+    def sample_held(self) -> None:
         """Select the states of S with the held forces, or of all of S if none are held."""
         if self.cell is not None and not self.obeying:
             self.ask(self.given_held(self.cell.selection), at_once=True)

@@ -300,13 +300,14 @@ def rows(replay: Replay, known: Iterable[Statement]) -> list[list[Any]]:
 
 
 def stated(replay: Replay, held: Iterable[Bound]) -> list[Statement]:
-    """The Statements of the held forces of a Selection."""
-    scale, place = replay.force_scale, replay.backbone.tolist().index
+    """The Statements of the held forces of a Selection, except on contacts that carry nothing."""
+    scale, place = replay.force_scale, {int(c): k for k, c in enumerate(replay.backbone)}
     return [
         Statement(
-            place(contact), _rounded((high + low) / 2 / scale), _rounded((high - low) / 2 / scale)
+            place[contact], _rounded((high + low) / 2 / scale), _rounded((high - low) / 2 / scale)
         )
         for contact, low, high in held
+        if contact in place
     ]
 
 

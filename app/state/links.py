@@ -74,7 +74,7 @@ def _read_selection(given: dict[str, str]) -> Selection:
     rest: Parameters = {
         "states": _whole(given, "states", 200),
         "seed": _whole(given, "walkseed", 0),
-        "held": tuple(map(_bound, given.pop("given").split("~"))) if "given" in given else (),
+        "held": tuple(map(_bound, filter(None, given.pop("given", "").split("~")))),
     }
     if "packing" in given:
         packing = {"imported": given.pop("packing"), "mu": packed}
@@ -117,7 +117,10 @@ def _whole(given: dict[str, str], name: str, usual: int = 0) -> int:
 def _bound(text: str) -> Bound:
     """The bounds on a held force."""
     contact, low, high = text.split(":")
-    return integer(contact), number(low), number(high)
+    least, most = number(low), number(high)
+    if not -np.inf < least <= most < np.inf:  # also refuses NaN
+        raise InputError(f"a held force must lie between two finite numbers, got {brief(text)}")
+    return integer(contact), least, most
 
 
 def _number(given: dict[str, str], name: str) -> float:

@@ -791,6 +791,12 @@ def test_a_link_with_what_is_no_number_names_the_key_in_one_line(key):
         assert "\n" not in line and len(line) < 120
 
 
+def test_a_link_with_impossible_held_forces_is_refused_in_one_line():
+    for text in ("3:1", "3:nan:1", "3:2:1", "3:0:inf", "x:1:1", "~".join(["3:1:1:1"] * 99)):
+        with pytest.raises(InputError, match=r"this link cannot be read: .{,80}$"):
+            read_link(urlencode({"mu": "0.2", "given": text}))
+
+
 def test_a_link_with_a_key_twice_is_refused(state):
     for query in ("mu=0.2&mu=0.3", "mu=0.2&tab=push&tab=friction", "n=20&n=20&n=20"):
         with pytest.raises(InputError, match=r"it contains '(mu|tab|n)' \d times"):
