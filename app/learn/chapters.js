@@ -113,7 +113,7 @@ export const CHAPTERS = [
   },
   {
     name: "chance", title: "A random walk", heading: "How far does chance go?",
-    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: the shadow of S on this force and a violet one. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
+    text: ({ low, high, states }) => `By hand, the green force goes from ${two(low)} to ${two(high)}. Pale: all it can be together with a violet force, a shadow of S. Now chance walks through S in ${states} steps. Each changes all forces at random and then corrects them until all disks are in balance: a new network, one point of S.`,
     ask: "What is the largest green force that chance finds?",
     doing: "Press “Walk”, or drag the slider. Each dot is a network, one after every twentieth step; network 0 is the one in which the packing came to rest.",
     see: ({ part, share, free }) => [

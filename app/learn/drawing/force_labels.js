@@ -77,5 +77,5 @@ function drawParts(arrows, { contact, at, inward, across }, F) {
   g.strokeStyle = look.paper
   g.lineWidth = 3
   if (F[2 * contact] * unit > NAMED) write("normal", nx + (right ? -3 : 3), ny - 9, right ? "right" : "left")
-  if (Math.abs(F[2 * contact + 1]) * unit > NAMED) write("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8, right ? "left" : "right")
+  if (Math.abs(F[2 * contact + 1]) * unit > NAMED && Math.abs(inward[0]) > 0.3) write("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8, right ? "left" : "right")
 }
