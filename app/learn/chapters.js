@@ -103,7 +103,7 @@ export const CHAPTERS = [
     name: "four-hundred", title: "Four hundred disks", heading: "Grab one force",
     text: ({ all, mu, start, contacts, equations, free }) => `${all} disks at μ = ${mu}. A line joins two disks that press on each other, thicker for a larger force. By the same count, ${2 * contacts} forces − ${equations} equations = ${free} free numbers: S, all sets of forces that hold the disks, has ${free} dimensions. The marked line carries ${two(start)} times the mean force.`,
     ask: "How large can you make this force while no disk moves?",
-    doing: "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dark: about to slip (wedge) or open (ring).",
+    doing: "Drag the dot to the right, or the marked line upwards. Other lines follow: orange ones grow, blue ones shrink. Dots: about to slip; rings: about to open.",
     see: ({ high, opened, sliding, changed, contacts, free }) => [
       `At ${two(high)}, ${opened} contacts have lost both their forces, and friction is at its limit at ${sliding}.${fixed(opened, sliding, free)} ${changed} other forces have changed by more than a tenth of the mean force; a photograph would look the same.`,
       `How is ${two(high)} found? As in the box, drawn again below: balance and limits are linear, so S has flat sides, and the largest value of a force is at a corner. Finding this corner is called a linear program. A computer does it for all ${2 * contacts} forces in well under a second.`,
@@ -144,7 +144,7 @@ export const CHAPTERS = [
     ask: "How hard can you push before a disk moves?",
     doing: "Drag the dot to the right, or an arrow away from the marked line.",
     see: ({ high, limit, limits, number, opened, slid, carried, moving, pushed }) => [
-      moving ? `Now ${opened} contacts open (rings), ${slid} slip (wedges), and disks start to move. Arrows and motion are drawn enlarged.`
+      moving ? `Now ${opened} contacts open (rings), ${slid} slip (dots), and disks start to move. Arrows and motion are drawn enlarged.`
         : pushed ? `Without a push, the two disks press on each other with ${two(carried)}. At a push of ${two(high)}, disks start to move.`
           : `The same disks with other forces, network ${number} of the random walk: the two press on each other with ${two(carried)}. Push again.`,
       `Up to ${two(limit)}, the limit load, S is not empty: some set of forces carries the push. The packing gives way earlier, as it starts from the forces it has, and its history chose those. ${limits.length > 1

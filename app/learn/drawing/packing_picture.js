@@ -2,14 +2,13 @@
 // one contact is marked.
 
 import { Scene } from "../../packing/drawing/scene.js"
+import { drawLimits, drawMotion } from "../../packing/drawing/first_motion.js"
 import { markSelected } from "../../packing/drawing/marks.js"
-import { arrow, circle } from "../../browser/canvas_paths.js"
+import { arrow } from "../../browser/canvas_paths.js"
 
 const WIDTH = 0.23 // of a line with the mean force, in largest radii
 const FULL = 0.5 // change in mean forces at full colour
-const WEDGE = { least: 0.3, long: 0.62 } // of a contact about to slip: angle, large enough to be seen, and length in radii
-const ARROW = { rest: 0.8, grown: 3, moved: 3 } // lengths in largest radii: of the push, and of the motion of the fastest disk
-const MOVES = 0.3 // of the largest displacement: disks that move less have no arrow
+const ARROW = { rest: 0.8, grown: 3 } // lengths of the push in largest radii
 const REACH = 14 // px from a contact within which it can be dragged
 
 export class PackingPicture {
@@ -20,7 +19,7 @@ export class PackingPicture {
     this.scene.palette = palettes.scene
     this.scene.onRepaint = () => {}
     this.scene.onMarks = (marks, scene) => this.mark(marks, scene)
-    this.limited = null // {opened, slid}: 1 for each contact that is open, or slips
+    this.limited = null // (N_c,) contacts that are open, or slip, as in drawLimits
     this.push = null // part of the largest push, in the chapter that pushes
     this.motion = null // displacements (2 N,) of the disks that move
     this.held = null // the contact in the hand
@@ -64,7 +63,7 @@ export class PackingPicture {
 
   /** Over the lines: contacts at their limits, the contact in the hand, and arrows of the push and of the motion. */
   mark(marks, scene) {
-    if (this.limited) this.drawLimited(marks, scene)
+    if (this.limited && !this.motion) drawLimits(marks, scene, this.limited)
     if (this.held !== null) markSelected(marks, scene, this.held)
     const { scale } = scene
     marks.lineWidth = 4 / scale
@@ -72,29 +71,7 @@ export class PackingPicture {
     marks.beginPath()
     for (const { from, to } of this.pushes()) arrow(marks, from, to, 12 / scale, 0.5)
     marks.stroke()
-    if (this.motion) this.drawMotion(marks, scene)
-  }
-
-  /** As in the small scenes: a ring where a contact is open, a wedge on both disks where it is about to slip. */
-  drawLimited(marks, scene) {
-    const { opened, slid } = this.limited, { scale, geometry: { radius, i, j } } = scene
-    marks.strokeStyle = marks.fillStyle = scene.palette.strong
-    marks.lineWidth = 1.5 / scale
-    const wide = Math.max(WEDGE.least, this.packing.mu) / 2
-    for (const { k, contact, a, b } of scene.segments((one) => opened[one] || slid[one])) {
-      const part = radius[i[k]] / (radius[i[k]] + radius[j[k]]), at = a.map((v, d) => v + part * (b[d] - v)), along = Math.atan2(b[1] - a[1], b[0] - a[0])
-      if (opened[contact]) {
-        circle(marks, at, 4 / scale)
-        marks.stroke()
-        continue
-      }
-      marks.beginPath()
-      for (const [grain, turn] of [[i[k], Math.PI], [j[k], 0]]) {
-        marks.moveTo(...at)
-        marks.arc(...at, WEDGE.long * radius[grain], along + turn - wide, along + turn + wide)
-      }
-      marks.fill()
-    }
+    if (this.motion) drawMotion(marks, scene, { field: this.motion, contacts: this.limited })
   }
 
   /** The arrows that push the disks of the marked contact apart: {from, to, way: direction}. */
@@ -108,21 +85,6 @@ export class PackingPicture {
         yield { from, to: from.map((v, d) => v + geometry.unit * (ARROW.rest + ARROW.grown * push) * way[d]), way }
       }
     }
-  }
-
-  /** An arrow on each disk that moves: where it goes. */
-  drawMotion(marks, scene) {
-    const { motion } = this, { x, y, grain, unit } = scene.geometry
-    const size = (g) => Math.hypot(motion[2 * g], motion[2 * g + 1]), most = Math.max(...Array.from(grain, size))
-    marks.strokeStyle = scene.palette.strong
-    marks.lineWidth = 2.5 / scene.scale
-    marks.beginPath()
-    for (const [k, g] of grain.entries()) {
-      if (size(g) < MOVES * most) continue
-      const long = (ARROW.moved * unit) / most
-      arrow(marks, [x[k], y[k]], [x[k] + long * motion[2 * g], y[k] + long * motion[2 * g + 1]], 8 / scene.scale, 0.5)
-    }
-    marks.stroke()
   }
 
   listen(host, hand) {

@@ -1,6 +1,7 @@
 // Common parts of the chapters with 400 disks: a packing, a marked contact, a picture of both.
 
 import { createElement } from "../../browser/dom.js"
+import { OPENS } from "../../packing/drawing/first_motion.js"
 import { PackingPicture } from "../drawing/packing_picture.js"
 
 const AT_LIMIT = 1e-4 // mean forces: distance from the limit of friction, or from no force
@@ -21,12 +22,10 @@ export class PackingExperiment {
   /** The first network of a packing, in which it came to rest. */
   asPacked(packing) { return packing.normal.subarray(0, packing.contacts) }
 
-  /** Marks of the contacts that are open, and of those that slip, on the network on screen; null if it has no friction. */
+  /** Contacts that are open, or slip, on the network on screen, as in drawLimits; null if it has no friction. */
   get limited() {
     const { network, tangential, packing: { mu } } = this
-    if (!tangential) return null
-    const opened = Uint8Array.from(network, (v) => v < AT_LIMIT)
-    return { opened, slid: opened.map((open, c) => !open && mu * network[c] - Math.abs(tangential[c]) < AT_LIMIT) }
+    return tangential && Uint8Array.from(network, (v, c) => (v < AT_LIMIT ? OPENS : Number(mu * v - Math.abs(tangential[c]) < AT_LIMIT)))
   }
 
   // The hand in the picture: no effect, except in chapters that override these

@@ -2,6 +2,7 @@
 // pushed again, from other networks of the walk.
 
 import { networkAt } from "../../packing/replay/replay.js"
+import { OPENS } from "../../packing/drawing/first_motion.js"
 import { Sway } from "../../packing/drawing/displacement.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
@@ -77,7 +78,10 @@ export class Push extends PackingExperiment {
   pulled(part) { this.drag(this.taken + 2 * part * this.limit) }
 
   /** In motion the contacts that open and slip in it, otherwise those of the network. */
-  get limited() { return this.moving ? this.path : super.limited }
+  get limited() {
+    const { moving, path: { opened, slid } } = this
+    return moving ? Uint8Array.from(opened, (open, c) => (open ? OPENS : slid[c])) : super.limited
+  }
 
   get picture() {
     const { value, answered, limits, path } = this

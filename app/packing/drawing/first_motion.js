@@ -6,13 +6,12 @@ import { extremes } from "./displacement.js"
 
 const LONGEST = 3 // mean radii, the arrow of the fastest disk
 const SHORTEST = 0.3 // mean radii; shorter arrows are not drawn
-const OPENS = 2 // value of a contact that opens; 1: it slides
+export const OPENS = 2 // value of a contact that opens; 1: it slides
 const RING = 0.3, SPOT = 0.16, LEAST_PX = 2 // radii of the marks, largest radii
 
-/** field: flat (2 N,) displacements; contacts: (N_c,) 0, 1 or OPENS. */
-export function drawMotion(context, scene, { field, contacts }) {
-  const { palette, geometry: { x, y, grain, unit }, scale } = scene, least = LEAST_PX / scale
-  const { mean, most } = extremes(scene, field), per = (LONGEST * mean) / most
+/** Rings around contacts that open, and spots on those that slide; contacts: (N_c,) 0, 1 or OPENS. */
+export function drawLimits(context, scene, contacts) {
+  const { palette, geometry: { unit }, scale } = scene, least = LEAST_PX / scale
   for (const { contact, middle } of scene.segments((c) => contacts[c])) {
     const opens = contacts[contact] === OPENS
     circle(context, middle, Math.max((opens ? RING : SPOT) * unit, opens ? 2 * least : least))
@@ -22,6 +21,13 @@ export function drawMotion(context, scene, { field, contacts }) {
     context.fill()
     context.stroke()
   }
+}
+
+/** field: flat (2 N,) displacements; contacts: as in drawLimits. */
+export function drawMotion(context, scene, { field, contacts }) {
+  const { palette, geometry: { x, y, grain, unit }, scale } = scene
+  const { mean, most } = extremes(scene, field), per = (LONGEST * mean) / most
+  drawLimits(context, scene, contacts)
   context.beginPath()
   context.lineCap = context.lineJoin = "round"
   for (let k = 0; k < x.length; k++) {
