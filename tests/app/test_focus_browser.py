@@ -21,17 +21,17 @@ def focus_is_at(page, condition):
 
 
 def test_buttons_of_a_chapter_pass_the_focus_on(opening):
-    page = opening("?learn=box", 1280, 900)
+    page = opening("?learn=groove", 1280, 900)
     page.get_by_role("slider", name="your prediction").focus()
     page.keyboard.press("ArrowRight")
     press(page, "That is my prediction")
     focus_is_at(page, ".role === 'slider'")
     for _ in range(60):
         page.keyboard.press("ArrowRight")
-    press(page, "Predict again")
+    press(page, "Again")
     focus_is_at(page, ".tagName === 'H1'")
     press(page, "Next")
-    focus_is_at(page, ".textContent === 'How strong can one contact get?'")
+    focus_is_at(page, ".textContent === 'How much can the floor carry?'")
 
 
 def test_undo_of_the_builder_passes_the_focus_on(opening):
