@@ -6,6 +6,7 @@ from packings import reference
 from scipy import sparse
 from scipy.optimize import linprog
 
+from granforce.experiment.carrying import carrying
 from granforce.experiment.infer import infer
 from granforce.experiment.remeasured import remeasured
 from granforce.explore import walls
@@ -185,3 +186,22 @@ def test_frozen_contacts_count_at_their_forces(S):
     given = GrainPressures(np.arange(100), whole, 0.1)
     assert np.abs(rows_of(frozen, given).deviation(frozen.original)).max() < 1e-9
     assert sparse.issparse(no_rows(S).matrix)
+
+
+def test_least_forces_are_those_of_linear_programs(S, states):
+    """f_n over all networks whose pressures are within 3 σ of the measured ones, by SciPy."""
+    given = measured(S, states[7], 0.02)
+    chosen = S.index[[5, 40, 77]]
+    found = carrying(S, contacts=chosen, pressures=given)
+    dev = infer(S, pressures=given).pressure_deviation
+    rows = rows_of(S, given)
+    width = np.maximum(3.0, 1.1 * np.abs(dev)) * rows.sigma
+    A, b, T = S.scaled_form
+    sums = rows.matrix @ T * S.force_scale
+    sides = sparse.vstack([sums, -sums])
+    limits = np.append(rows.values + width, width - rows.values)
+    for place, least in zip([5, 40, 77], found.least, strict=True):
+        cost = T.tocsr()[[2 * place]].toarray().ravel()
+        best = linprog(cost, A_ub=sides, b_ub=limits, A_eq=A, b_eq=b, method="highs")
+        assert least == pytest.approx(S.force_scale * best.fun, abs=1e-6)
+    assert found.carries.any()
