@@ -13,9 +13,12 @@ from granforce.experiment.infer import Draws as Draws
 from granforce.experiment.infer import Inference as Inference
 from granforce.experiment.infer import infer as infer
 from granforce.experiment.informative import Informative as Informative
+from granforce.experiment.informative import InformativeGrains as InformativeGrains
 from granforce.experiment.informative import informative as informative
+from granforce.experiment.informative import informative_grains as informative_grains
 from granforce.experiment.measurements import Measurement as Measurement
 from granforce.experiment.measurements import read_measurement as read_measurement
+from granforce.experiment.measurements import read_pressures as read_pressures
 from granforce.experiment.pegs import Photoelastic as Photoelastic
 from granforce.experiment.pegs import read_pegs as read_pegs
 from granforce.experiment.remeasured import Remeasured as Remeasured

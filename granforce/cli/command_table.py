@@ -271,7 +271,8 @@ COMMANDS = (
     ),
     Command(
         "infer",
-        "find the most likely admissible network given measured forces, with error bars",
+        "find the most likely admissible network given measured forces of contacts or pressures of "
+        "grains, with error bars",
         "granforce infer frame.npz --measured frame.csv\n"
         "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
         (
@@ -280,7 +281,8 @@ COMMANDS = (
             Group(
                 "the inference",
                 options(
-                    "--measured:infer --unmeasured --again --states:infer --certain --sample-seed "
+                    "--measured:infer --pressures --pressure-column --calibration "
+                    "--unmeasured --again --states:infer --certain --sample-seed "
                     "--ensemble-mu --chains:uniform --workers --out:infer --unit"
                 ),
             ),
@@ -307,9 +309,16 @@ COMMANDS = (
                 + COMPACTION
                 + CONDITIONS.options
                 + options(
-                    "--seed --measured:infer --again --certain --chains:uniform --ensemble-mu"
+                    "--seed --measured:infer --pressures --again --certain --chains:uniform "
+                    "--ensemble-mu"
                 ),
             ),
+            Rule(
+                "without --pressures or --frames",
+                lambda arguments: arguments.pressures is None and arguments.frames is None,
+                options("--pressure-column"),
+            ),
+            without("--pressure-column", options("--calibration")),
             Rule(
                 "with --states 0",
                 lambda arguments: arguments.states == 0,

@@ -200,6 +200,11 @@ OPTIONS = {
         StorePath,
         metavar="FOLDER",
     ),
+    "--calibration": Option(
+        "calibration of --pressure-column: the pressure is a times its value plus b, with standard "
+        "error sigma (1,0,sigma for a column of pressures)",
+        metavar="A,B,SIGMA",
+    ),
     "--certain": _switch(
         "also find the unmeasured contacts that carry force in every network within 3 σ, by "
         "exact bounds"
@@ -377,6 +382,17 @@ OPTIONS = {
     "--pressure:table": Option("pressure P0 of a table without forces (default 1)", float),
     "--quick:study": _switch("run a small version, in minutes"),
     "--quick:bench": _switch("small sizes, under 3 minutes"),
+    "--pressure-column": Option(
+        "column of the mean squared gradient G², or of pressures of grains, in the table of "
+        "--pressures or the files of positions of --frames; needs --calibration",
+        metavar="NAME",
+    ),
+    "--pressures": Option(
+        "columns grain, pressure, sigma, in the packing's units (or see --pressure-column); empty "
+        "or nan where not measured",
+        Input,
+        suffixes=("csv",),
+    ),
     "--radii": Option(
         "uniform:LOW,HIGH, bidisperse:SMALL,LARGE,FRACTION_LARGE, or a file with one radius per "
         "line (default uniform:0.5,1)",

@@ -183,6 +183,8 @@ _LINES: dict[str, str | Line] = {
     "error": "median standard error of a measured f_n, in units of the mean measured f_n; without "
     "--error, chosen so that χ² equals its degrees of freedom",
     "mean_change_of_f_n": Line("mean |inferred − measured| f_n", unit=FORCE),
+    "measured_pressures": "number of grains with a measured pressure that is used",
+    "suspect_grains": "grains whose pressure deviates by more than 3 σ",
     "suspects": "contacts that deviate by more than 3 σ",
     "mean_standard_error": Line("mean standard error of a force", "standard_error", "mean", FORCE),
     "unmeasured_spread": Line(
@@ -282,7 +284,8 @@ PERTURB = (
 CRITICAL = ("limit_load", "critical_low", "critical_high")
 INFER = (
     *("entry", "contacts", "measured_components", "measured_where_nothing_can_carry"),
-    *("chi_square", "freedom", "mean_change_of_f_n", "suspects", "unmeasured_spread"),
+    *("measured_pressures", "chi_square", "freedom", "mean_change_of_f_n", "suspects"),
+    *("suspect_grains", "unmeasured_spread"),
     *("unmeasured_contacts", "carry_for_certain", "states", "mean_standard_error"),
     *(*_MIXING, *_SAMPLING, *_END),
 )

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from granforce.experiment.listings.listing import Listing
 from granforce.experiment.walls import Bodies
 from granforce.forces.build import ensemble
+from granforce.forces.grain_pressures import GrainPressures, rows_of
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.records import Packing, UndecidedError, make_contacts, make_packing, positive
@@ -181,7 +182,12 @@ def unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
 
 
 def inferred(
-    packing: Packing, measured: Measured, spread: Floats, error: float | None, unit: float
+    packing: Packing,
+    measured: Measured,
+    pressures: GrainPressures | None,
+    spread: Floats,
+    error: float | None,
+    unit: float,
 ) -> tuple[Likeliest, Floats]:
     """The Likeliest network, and σ (N_c, 2): as given for load cells, else from the factors."""
     S, m = ensemble(packing, prune=False), measured.forces
@@ -206,4 +212,4 @@ def inferred(
                 break
     sigma = np.where(unknown, with_spread(positive(error, "error")), measured.sigma)
     sigma[np.isnan(m)] = np.nan
-    return likeliest(S, m, sigma), sigma
+    return likeliest(S, m, sigma, rows=rows_of(S, pressures)), sigma

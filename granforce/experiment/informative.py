@@ -1,4 +1,5 @@
-"""Which measurement next: the contact whose force, once known, leaves the shortest intervals."""
+"""Which measurement next: the contact whose force, once known, leaves the shortest intervals, or
+the grain whose pressure leaves the smallest errors."""
 
 from __future__ import annotations
 
@@ -6,15 +7,17 @@ from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import UniformSample, sample_uniform
 from granforce.fields import derived, record
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import grain_pressures
 from granforce.forces.nearest import some_network
 from granforce.quantities import Field, quantity
-from granforce.records import InputError, takes, whole
+from granforce.records import InputError, positive, takes, whole
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP, TWINS
 from granforce.types import Cancel, Floats, Integers, Mask, Progress
@@ -145,6 +148,60 @@ def informative(
             progress(done + 1, len(best))
     place = np.argsort(after, kind="stable")  # contacts that were not computed come last
     return ranked(order[place], after[place])
+
+
+@record
+class InformativeGrains(NamedTuple):
+    """Grains whose pressure is most worth measuring, the best first."""
+
+    grains: Annotated[Integers, "(k,) positions in packing.x"]
+    expected: Annotated[Floats, "(k,) expected fraction by which errors of f_n fall"]
+
+
+@takes(Ensemble)
+def informative_grains(
+    ensemble: Ensemble, states: npt.ArrayLike, sigma: float, k: int = 10
+) -> InformativeGrains:
+    """The k grains whose pressure, if measured next, would reduce the errors of f_n most.
+
+    If forces were normally distributed, a pressure with variance v measured with error σ would
+    leave √(1 − ρ² v/(v + σ²)) of the error of a force, where ρ is their correlation over states.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        S.
+    states : (n, N_c, 2) array
+        Networks given what is known: draws.flat of an inference, or flat of a uniform sample.
+    sigma : float
+        Standard error σ of a pressure, force/length.
+    k : int, default 10
+        Number of grains to list.
+
+    Returns
+    -------
+    InformativeGrains
+        The best grain first; grains whose balance is left open are not among them.
+
+    Raises
+    ------
+    InputError
+        For σ ≤ 0 and states of another shape.
+    """
+    networks = ensemble.networks(states)
+    if networks.ndim != 3 or len(networks) < 2:
+        raise InputError(f"states must have shape (n, N_c, 2), n at least 2, got {networks.shape}")
+    pressures = np.nan_to_num(grain_pressures(ensemble, networks))
+    noise, unit = positive(sigma, "sigma"), ensemble.force_scale
+    pressures, normal = (values - values.mean(axis=0) for values in (pressures, networks[..., 0]))
+    spread, variance = normal.std(axis=0), pressures.var(axis=0)
+    covariance = pressures.T @ normal / len(normal)
+    explained = covariance**2 / (variance + noise**2)[:, None]
+    left = np.sqrt(np.maximum(spread**2 - explained, 0.0)).sum(axis=1)
+    expected = 1 - left / max(spread.sum(), INTERVAL_GAP * unit)
+    best = np.argsort(-expected, kind="stable")[: whole(k, "k", 1)]
+    best = best[variance[best] > 0]
+    return InformativeGrains(best, expected[best])
 
 
 def _without_twins(order: Integers, expected: Floats, alike: Mask) -> Integers:

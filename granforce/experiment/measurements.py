@@ -1,17 +1,41 @@
-"""Measured forces of a packing's contacts, as tables (CSV)."""
+"""Measured forces of a packing's contacts and pressures of its grains, as tables (CSV)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from granforce.fields import record
+from granforce.forces.grain_pressures import GrainPressures
 from granforce.packing.importers.text import MISSING, Source, read_csv
-from granforce.records import InputError
+from granforce.records import InputError, positive
 from granforce.types import Floats, Integers
 
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
+
+
+class Calibration(NamedTuple):
+    """A pressure a g + b ± sigma of a measured quantity g, such as G²."""
+
+    a: float
+    b: float
+    sigma: float
+
+    def pressures(self, values: Floats) -> tuple[Floats, Floats]:
+        """Pressures and their standard errors (k,) of values (k,)."""
+        return self.a * values + self.b, np.full(len(values), self.sigma)
+
+
+def checked_calibration(numbers: Sequence[float] | None) -> Calibration:
+    """The Calibration of three numbers; InputError for others."""
+    if numbers is None or len(numbers) != 3 or not np.isfinite(numbers).all() or not numbers[0]:
+        raise InputError(
+            "a column of G² needs its calibration a,b,sigma: the pressure is a G² + b with this "
+            "standard error, a not 0 (1,0,sigma for a column of pressures)"
+        )
+    return Calibration(*numbers)._replace(sigma=positive(numbers[2], "sigma of the calibration"))
 
 
 @record
@@ -68,3 +92,41 @@ def read_measurement(source: Source) -> Measurement:
     for row in np.flatnonzero((sigma <= 0).any(axis=1))[:1]:
         raise InputError(f"{table.place(row)}: a standard error is not above 0")
     return Measurement(contacts, forces, sigma)
+
+
+def read_pressures(
+    source: Source, column: str | None = None, calibration: Sequence[float] | None = None
+) -> GrainPressures:
+    """The GrainPressures in a CSV file.
+
+    Parameters
+    ----------
+    source : path or open file
+        Columns: grain (its number in the packing), pressure and sigma, in the packing's unit; empty
+        or nan where not measured.
+    column : str, optional
+        Column of another quantity, such as G², instead of pressure and sigma.
+    calibration : (a, b, sigma), with column
+        The pressure is a times this quantity plus b, with standard error sigma.
+
+    Returns
+    -------
+    GrainPressures
+        Of the grains in the file.
+
+    Raises
+    ------
+    InputError
+        Naming file and line, and for a column without calibration, or a calibration without column.
+    """
+    table = read_csv(source)
+    grains = table.whole("grain")
+    table.index("grain")  # each occurs once
+    if column is None and calibration is None:
+        values, sigma = (table.numbers(name, MISSING) for name in ("pressure", "sigma"))
+    elif column is None:
+        raise InputError("a calibration needs the name of the column that it applies to")
+    else:
+        of_column = checked_calibration(calibration)
+        values, sigma = of_column.pressures(table.numbers(column.strip().lower(), MISSING))
+    return GrainPressures(grains, values, sigma)

@@ -27,6 +27,7 @@ from granforce.experiment.assembly import (
 from granforce.experiment.listings import solved
 from granforce.experiment.listings.listing import Frames, Listing, plain
 from granforce.experiment.listings.text_frames import read_frames
+from granforce.experiment.measurements import checked_calibration
 from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired
 from granforce.experiment.walls import (
     Bodies,
@@ -39,6 +40,7 @@ from granforce.experiment.walls import (
     wall_contacts,
 )
 from granforce.fields import record
+from granforce.forces.grain_pressures import GrainPressures
 from granforce.forces.likeliest import Likeliest
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
 from granforce.packing.importers.network import WORTH_REVERSING, accuracy_of, worth_reversing
@@ -69,6 +71,9 @@ class Photoelastic(NamedTuple):
     ]
     findings: Annotated[list[Finding], "repairs, and their places"]
     report: Annotated[dict[str, Any], "findings and actions, in plain numbers and words"]
+    pressures: Annotated[GrainPressures | None, "calibrated pressures of grains; None without"] = (
+        None
+    )
 
     def _repr_html_(self) -> str:
         """The import as displayed in notebooks."""
@@ -112,6 +117,7 @@ def read_pegs(
     flag: str | None = None,
     walls: str | None = None,
     wall_forces: Mapping[str, Sequence[float]] | None = None,
+    calibration: Sequence[float] | None = None,
     most_grains: int | None = None,
 ) -> Photoelastic:
     """A Photoelastic of one frame, from files of positions and contacts.
@@ -153,6 +159,10 @@ def read_pegs(
         directions.
     wall_forces : mapping, optional
         {"right": (f_x, f_y, σ)}, forces of the grains on straight walls, measured by load cells.
+    calibration : (a, b, σ), optional
+        The pressure of a grain is a times the column `pressure` of the positions (G², for example)
+        plus b, with standard error σ. Of grains at walls without listed contacts with them, and of
+        those left open, it is not used.
     most_grains : int, optional
         Largest number of grains.
 
@@ -185,7 +195,8 @@ def read_pegs(
     assembly = _assembly(grains, sides, mu, reach)
     saved = _saved_by_reversing(assembly)
     balance = _balance(assembly, listing.names[1])
-    fit = _fit(assembly, balance, error)
+    pressures = _pressures(grains.listing, balance.packing, calibration)
+    fit = _fit(assembly, balance, pressures, error)
 
     notes = [] if frame is not None else [*getattr(opened, "notes", [])]
     notes += grains.notes
@@ -198,6 +209,7 @@ def read_pegs(
         **sides.lines(),
         "unbalance_saved_if_tangential_forces_were_reversed": saved,
         **balance.lines(assembly, ids),
+        **({} if pressures is None else {"measured_pressures": len(pressures.grains)}),
         **fit.lines(balance.unit, len(assembly.listed.pairs)),
         **({"notes": notes} if notes else {}),
         "findings": _finding_lines(grains.account),
@@ -214,6 +226,7 @@ def read_pegs(
         walls=sides.names,
         findings=grains.account.findings,
         report=lines,
+        pressures=pressures,
     )
 
 
@@ -375,10 +388,30 @@ def _balance(assembly: Assembly, name: str) -> _Balance:
     return _Balance(packing._replace(load=load), unit, before, after, left_open)
 
 
-def _fit(assembly: Assembly, balance: _Balance, error: float | None) -> _Fit:
+def _pressures(
+    listing: Listing, packing: Packing, calibration: Sequence[float] | None
+) -> GrainPressures | None:
+    """The calibrated pressures of grains that must balance; None without a calibration."""
+    if calibration is None:
+        return None
+    if listing.pressure is None:
+        raise InputError(
+            f"{listing.names[0]}: no column of pressures to calibrate; name it (--pressure-column, "
+            'columns={"pressure": …})'
+        )
+    values, sigma = checked_calibration(calibration).pressures(listing.pressure)
+    balanced = ~np.isnan(packing.load[: len(values)]).any(axis=1)
+    used = np.flatnonzero(balanced & np.isfinite(values))
+    return GrainPressures(used, values[used], sigma[used])
+
+
+def _fit(
+    assembly: Assembly, balance: _Balance, pressures: GrainPressures | None, error: float | None
+) -> _Fit:
     """The most likely network of the packing."""
     measured, spread = assembly.measured(), assembly.listed.spread
-    return _Fit(measured, *inferred(balance.packing, measured, spread, error, balance.unit))
+    best = inferred(balance.packing, measured, pressures, spread, error, balance.unit)
+    return _Fit(measured, *best)
 
 
 def _packing(balance: _Balance, fit: _Fit, frame: float, walls: int) -> Packing:

@@ -12,6 +12,7 @@ from granforce.experiment.listings.listing import Listing
 from granforce.experiment.pegs import Photoelastic
 from granforce.fields import record
 from granforce.forces.build import ensemble
+from granforce.forces.grain_pressures import grain_pressures
 from granforce.records import (
     Contacts,
     InputError,
@@ -61,15 +62,23 @@ class SyntheticFrame(NamedTuple):
             true[row] = np.nan if j < 0 else 0.0 if k is None else self.forces[k]
         return true
 
-    def write(self, positions: str | Path, adjacency: str | Path) -> None:
-        """Write the files of PeGS: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n."""
+    def write(
+        self, positions: str | Path, adjacency: str | Path, *, pressures: bool = False
+    ) -> None:
+        """Write the files of PeGS: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n.
+
+        pressures: whether grains have them in a last column, under a line of headers.
+        """
         one, number = self.only, self.only.frame
         grains = np.column_stack([one.ids, one.x, one.r, one.flag])
         links = np.column_stack([one.ends, one.forces[:, ::-1]])
-        for path, rows in ((positions, grains), (adjacency, links)):
+        header = "frame,id,x,y,radius,flag,pressure" if pressures else ""
+        if pressures:
+            grains = np.column_stack([grains, np.asarray(one.pressure)])
+        for path, rows, words in ((positions, grains, header), (adjacency, links, "")):
             with written(path) as file:
                 whole = np.column_stack([np.full(len(rows), number), rows])
-                np.savetxt(file, whole, fmt="%.9g", delimiter=",")
+                np.savetxt(file, whole, fmt="%.9g", delimiter=",", header=words, comments="")
 
 
 @takes(Packing)
@@ -93,7 +102,8 @@ def synthetic_frame(
     packing : Packing
         Disks, with forces.
     noise : float, default 0.1
-        Standard error of a component, in ⟨f_n⟩, independent on both sides of a contact.
+        Standard error of a component, in ⟨f_n⟩, independent on both sides of a contact; and of a
+        grain's pressure, in mean pressures.
     missed : float, default 0
         Fraction of contacts that are not listed, weak ones first: a contact of force f is missed
         with probability ∝ 1/(f + ⟨f_n⟩/2).
@@ -143,6 +153,7 @@ def synthetic_frame(
     forces = lines.forces + errors.noise * true.unit * rng.standard_normal(lines.forces.shape)
     x = packing.x + errors.blur * packing.r.mean() * rng.standard_normal(packing.x.shape)
     r = packing.r * (1 + errors.blur * rng.standard_normal(count)).clip(0.5, 1.5)
+    noise_of_pressures = errors.noise * true.pressures.mean() * rng.standard_normal(count)
     flag = np.zeros(count)
     flag[c.i[~inside]] = flag[c.j[~inside]] = 1.0
     listing = Listing(
@@ -159,6 +170,7 @@ def synthetic_frame(
         both_ways=True,
         frame=float(whole(number, "number")),
         description="synthetic frame",
+        pressure=(true.pressures + noise_of_pressures) / float(pixels),
     )
     pairs: Floats = np.column_stack([c.i, c.j])[inside].astype(np.float64) + 1.0
     return SyntheticFrame(listing, pairs, true.forces[inside], true.unit)
@@ -180,6 +192,7 @@ class _TrueContacts(NamedTuple):
     forces: Floats  # (N_c, 2)
     unit: float  # mean normal force
     inside: Mask  # (N_c,) whether they do not cross a side of the box
+    pressures: Floats  # (N,) of the grains
 
 
 class _Lines(NamedTuple):
@@ -205,7 +218,8 @@ def _true_contacts(packing: Packing, unit: float) -> _TrueContacts:
     c = S.contacts
     branch = packing.x[c.j] - packing.x[c.i]
     inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6 * packing.r.max()
-    return _TrueContacts(c, unit * S.original / S.original[:, 0].mean(), unit, inside)
+    forces = unit * S.original / S.original[:, 0].mean()
+    return _TrueContacts(c, forces, unit, inside, grain_pressures(S, forces))
 
 
 def _listed_pairs(

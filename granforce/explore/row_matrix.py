@@ -51,12 +51,12 @@ class RowMatrix(NamedTuple):
         q = self.walls.T @ g.T
         if pulls is not None:
             q = q + (pulls[:, None] if pulls.ndim == 1 else pulls.T)
-        f = (self.C if C is None else C) @ q
-        right = self.joined @ f
+        f, give = (self.C if C is None else C) @ q, C is None
         for _ in range(times * self.times):
-            f = f - self._forces(right)
             right = self.joined @ f
-            right[self.balance :] = 0.0
+            if not give:  # the balance alone is restored
+                right[self.balance :] = 0.0
+            f, give = f - self._forces(right), False
         return np.ascontiguousarray((self.walls @ f).T)
 
     def rows(self, walls: Integers) -> Floats:

@@ -10,6 +10,7 @@ from granforce.experiment.infer import Draws, Inference
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.grain_pressures import GrainPressures
 from granforce.study.schema import extension, labelled, stored
 from granforce.types import Floats, Integers
 
@@ -62,6 +63,7 @@ def inference_dataset(
     inference: Inference,
     measured: Floats,
     sigma: Floats,
+    pressures: GrainPressures | None = None,
     certain: Any = None,
     *,
     unmeasured: float,
@@ -70,8 +72,8 @@ def inference_dataset(
 ) -> xr.Dataset:
     """An Inference and its measurement as a dataset; draws stored as in `walk_dataset`.
 
-    certain: a Carrying of contacts that were not measured, if requested. unmeasured: the standard
-    error of unmeasured components, in ⟨f_n⟩.
+    pressures: the measured ones, if any. certain: a Carrying of contacts that were not measured, if
+    requested. unmeasured: the standard error of unmeasured components, in ⟨f_n⟩.
     """
     arrays: dict[str, Any] = {
         **stored(inference),
@@ -86,6 +88,12 @@ def inference_dataset(
         **S.skipped,
         "seconds": seconds,
     }
+    if pressures is not None:
+        for name, values in zip(
+            ("measured_pressure", "pressure_sigma"), pressures[1:], strict=True
+        ):
+            arrays[name] = np.full(len(S.packing.r), np.nan)
+            arrays[name][pressures.grains] = values
     if certain is not None:
         arrays["least_normal"] = np.full(len(S.index), np.nan)
         arrays["least_normal"][S.positions(certain.contacts)] = certain.least

@@ -123,6 +123,7 @@ def infer_frame(
     S = ensemble(photoelastic.packing)
     drawn = (remeasured if states else infer)(
         *(S, photoelastic.measured[S.index], photoelastic.sigma[S.index]),
+        pressures=photoelastic.pressures,
         states=states,
         unmeasured=unmeasured,
         **options,
@@ -148,6 +149,7 @@ def infer_frame(
                 "inferred": _on_all(photoelastic, S, drawn.forces, 0.0),
                 "deviation": _on_all(photoelastic, S, drawn.deviation, np.nan),
                 "suspect": drawn.suspects,
+                "pressure_deviation": drawn.pressure_deviation,
                 "chi_square": drawn.chi_square,
                 "freedom": drawn.freedom,
                 "regional_stress": stress,
@@ -172,7 +174,7 @@ def _on_all(photoelastic: Photoelastic, S: Ensemble, values: Floats, elsewhere: 
 
 
 FRAME = Kind(
-    name="frame", version=2, title="frames", unit="frame", parameters=parameters, compute=_inferred
+    name="frame", version=3, title="frames", unit="frame", parameters=parameters, compute=_inferred
 )
 
 

@@ -8,7 +8,12 @@ import pandas as pd
 import pytest
 
 from granforce.cli.entry_point import main
-from granforce.packing.importers import load_packing
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.synthetic import synthetic_frame
+from granforce.forces.build import ensemble
+from granforce.forces.grain_pressures import grain_pressures
+from granforce.packing.compaction import pack
+from granforce.packing.importers import load_packing, save_packing
 
 pytestmark = pytest.mark.fast
 
@@ -90,3 +95,51 @@ def test_error_bars_by_measuring_again(folder, capsys):
     assert again["chi_square"] == flat["chi_square"]
     assert again["mean_standard_error [packing]"] != flat["mean_standard_error [packing]"]
     assert told(f"{words} --again", capsys)["cached"]
+
+
+def test_g_squared_of_grains_is_calibrated_and_inferred(folder, capsys):
+    """The same pressures as a column of pressures, as G², and as columns of a frame."""
+    packing = pack(20, 0.3, seed=0)
+    save_packing(packing, "p.npz")
+    S = ensemble(packing)
+    true = grain_pressures(S, S.original)
+    rows = {"grain": np.arange(20), "pressure": true, "sigma": 0.1, "G2": (true - 0.5) / 2}
+    pd.DataFrame(rows).to_csv("grains.csv", index=False)
+    alone = told("infer p.npz --pressures grains.csv --states 0 --out all.csv", capsys)
+    assert alone["measured_pressures"] == 20 and alone["suspect_grains"] == []
+    words = "infer p.npz --pressures grains.csv --states 0 --pressure-column G2"
+    squared = told(f"{words} --calibration 2,0.5,0.1", capsys)
+    assert squared["chi_square"] == pytest.approx(alone["chi_square"], abs=1e-6)
+    frame = synthetic_frame(packing, noise=0.0)
+    frame.write("positions.csv", "links.csv", pressures=True)
+    sigma = 0.1 * float(np.mean(frame.only.pressure))
+    words = "infer positions.csv links.csv --frames all --mu 0.3 --states 0"
+    (one,) = told(f"{words} --pressure-column pressure --calibration 1,0,{sigma}", capsys)
+    (two,) = told(words, capsys)
+    assert one["freedom"] > two["freedom"]
+    photo = read_pegs(frame, mu=0.3, calibration=(1, 0, sigma))
+    assert 0 < len(photo.pressures.grains) == photo.report["measured_pressures"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--pressures grains.csv --pressure-column G2", "needs its calibration"),
+        ("--pressures grains.csv --calibration 1,0,1", "--calibration has no effect"),
+        ("--measured m.csv --pressure-column G2 --calibration 1,0,1", "--pressure-column has no"),
+        ("--pressures grains.csv --pressure-column G2 --calibration 1,0", "calibration a,b,sigma"),
+        ("--pressures grains.csv --pressure-column x --calibration 1,0,1", "no column x"),
+        ("", "give a packing and --measured"),
+    ],
+)
+def test_pressures_that_cannot_be_used_are_refused(folder, capsys, options, words):
+    (folder / "grains.csv").write_text("grain,G2\n0,1\n")
+    (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n3,1.5,,0.1,\n")
+    command = f"infer -n 20 --mu 0.3 --states 0 {options}".split()
+    if "no effect" in words or "has no" in words:  # refused while the options are read
+        with pytest.raises(SystemExit, match="2"):
+            main(command)
+    else:
+        assert main(command) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1

@@ -2,18 +2,19 @@
 
 import argparse
 import json
+from typing import Any
 
 import numpy as np
 
 from granforce.cli import frames
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.cli.report_lines import INFER, INFORMATIVE
-from granforce.cli.results import conditions, sample_notes, stored_result
+from granforce.cli.results import conditions, numbers, sample_notes, stored_result
 from granforce.cli.tables import columns, of_contacts, write_table
 from granforce.experiment.carrying import Carrying
 from granforce.experiment.infer import Inference
 from granforce.experiment.informative import Informative
-from granforce.experiment.measurements import read_measurement
+from granforce.experiment.measurements import checked_calibration, read_measurement, read_pressures
 from granforce.fields import fields
 from granforce.labelled import from_store
 from granforce.quantities import FORCE, whole
@@ -53,24 +54,42 @@ def informative(arguments: argparse.Namespace) -> None:
             write_table(arguments.out, table)
 
 
+def calibrated_column(arguments: argparse.Namespace) -> tuple[str | None, list[float] | None]:
+    """The column of --pressure-column and its --calibration, both or none."""
+    text = arguments.calibration
+    values = None if text is None else numbers("--calibration", text, float)
+    if arguments.pressure_column is not None:
+        checked_calibration(values)
+    return arguments.pressure_column, values
+
+
 def infer(arguments: argparse.Namespace) -> int | None:
     """Report the likeliest network of measured forces, with error bars on request."""
     if arguments.frames is not None:
         options = flaws_and_walls(arguments) | {"columns": named_columns(arguments)}
+        column, calibration = calibrated_column(arguments)
+        if column is not None:
+            options["columns"] = (options["columns"] or {}) | {"pressure": column}
+            options["calibration"] = calibration
         return frames.infer_frames(arguments, options)
-    if arguments.measured is None:
+    if arguments.measured is None and arguments.pressures is None:
         raise InputError(
-            "give --measured FILE.csv and a packing, or files of frames with --frames all"
+            "give a packing and --measured FILE.csv or --pressures FILE.csv, or files of frames "
+            "with --frames all"
         )
     if len(arguments.files) > 1:
         raise InputError("give one packing file, or add --frames all to read files of frames")
     arguments.packing = arguments.files[0] if arguments.files else None
     chosen, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
-    measured = read_measurement(arguments.measured)
+    measured = None if arguments.measured is None else read_measurement(arguments.measured)
+    pressures = None
+    if arguments.pressures is not None:
+        pressures = read_pressures(arguments.pressures, *calibrated_column(arguments))
     result = stored_result(
         *(arguments, kinds.INFERENCE, arguments.out),
-        options={"measured": measured},
+        options={"measured": measured, "pressures": pressures},
         measured=measured,
+        pressures=pressures,
         states=states,
         seed=arguments.sample_seed,
         chains=arguments.chains,
@@ -81,14 +100,19 @@ def infer(arguments: argparse.Namespace) -> int | None:
     )
     dataset, scale = result.dataset, result.dataset["force_scale"].item()
     change = np.abs(dataset["inferred"].values - dataset["measured"].values)
-    used, listed = np.isfinite(change).sum(), np.isfinite(measured.forces + measured.sigma).sum()
-    given = {
-        "contacts": len(change),
-        "measured_components": int(used),
-        "measured_where_nothing_can_carry": int(listed - used),
-        "mean_change_of_f_n": float(np.nanmean(change[:, 0])),
-        "suspects": dataset["suspect"].values.tolist(),
-    }
+    given: dict[str, Any] = {"contacts": len(change)}
+    if measured is not None:
+        used = int(np.isfinite(change).sum())
+        listed = int(np.isfinite(measured.forces + measured.sigma).sum())
+        given |= {
+            "measured_components": used,
+            "measured_where_nothing_can_carry": listed - used,
+            "mean_change_of_f_n": float(np.nanmean(change[:, 0])),
+            "suspects": dataset["suspect"].values.tolist(),
+        }
+    if pressures is not None:
+        given["measured_pressures"] = int(np.isfinite(dataset["pressure_deviation"].values).sum())
+        given["suspect_grains"] = dataset["suspect_grain"].values.tolist()
     if arguments.certain:
         least = dataset["least_normal"].values
         certain = np.flatnonzero(least > CARRYING * scale)

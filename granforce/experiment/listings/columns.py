@@ -20,6 +20,7 @@ from granforce.records import InputError
 from granforce.types import Floats, Integers
 
 GRAINS = ("frame", "id", "x", "y", "radius", "flag")
+PRESSURE = "pressure"  # of grains, recognised by its header only
 CONTACTS = ("frame", "id1", "id2", "tangential", "normal")
 # Synonyms, in lower case without blanks and brackets.
 _WORDS = {
@@ -28,6 +29,7 @@ _WORDS = {
     "x": ("x", "xpos", "x_px", "cx"),
     "y": ("y", "ypos", "y_px", "cy"),
     "radius": ("radius", "r", "r_px", "rad"),
+    "pressure": ("pressure", "g2", "g²"),
     "flag": ("flag", "edge", "wall", "boundary"),
     "id1": ("id1", "i", "particle1", "grain1"),
     "id2": ("id2", "j", "particle2", "grain2"),
@@ -48,8 +50,8 @@ def columns_by_name(columns: Mapping[str, str]) -> dict[str, str]:
         name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
         if name is None:
             raise InputError(
-                f"unknown column {word[:40]!r}; choose from frame, id, x, y, r, flag, i, j, f_t, "
-                "f_n"
+                f"unknown column {word[:40]!r}; choose from frame, id, x, y, r, flag, pressure, "
+                "i, j, f_t, f_n"
             )
         if name in given:
             raise InputError(f"the column {name} is given twice; give each name once")
@@ -93,9 +95,10 @@ def possible_names(
         return [names]
     readings = _of_contacts(numbers) if "id1" in wanted else _of_grains(numbers)
     if not readings:
+        usual = ", ".join(name for name in wanted if name != PRESSURE)
         raise InputError(
             f"{file}: {width} fields in a line, which are not "
-            f"{', '.join(wanted)} (the first and the last may be missing); is it a PeGS file? "
+            f"{usual} (the first and the last may be missing); is it a PeGS file? "
             "Give a header line that names the columns"
         )
     return readings

@@ -31,6 +31,7 @@ class Listing(NamedTuple):
     both_ways: bool  # whether two lines of one contact are independent measurements
     frame: float
     description: str  # the recognised columns, in words
+    pressure: Floats | None = None  # (N,) G², or pressure, of the grains; None: not listed
 
     def place(self, kind: int, row: SupportsIndex) -> str:
         """'file, line n' of a grain (kind 0) or a contact (1)."""
@@ -39,6 +40,8 @@ class Listing(NamedTuple):
     def with_grains(self, rows: Integers | Mask) -> Listing:
         """The listing with a selection of its grains, in this order."""
         columns = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
+        if self.pressure is not None:
+            columns["pressure"] = self.pressure[rows]
         return self._replace(**columns, lines=(self.lines[0][rows], self.lines[1]))
 
     def with_contacts(self, rows: Integers | Mask) -> Listing:

@@ -19,6 +19,7 @@ import numpy as np
 from granforce.experiment.listings.columns import (
     CONTACTS,
     GRAINS,
+    PRESSURE,
     SLIDING,
     ascending_parts,
     columns_by_name,
@@ -143,6 +144,7 @@ class TextFrames(NamedTuple):
             both_ways=False,
             frame=float(frame),
             description=f"{grains.description}; {contacts.description}",
+            pressure=g.get("pressure"),
         )
 
 
@@ -151,14 +153,14 @@ def read_frames(
 ) -> TextFrames:
     """The TextFrames in two files, paths or open files; InputError for other files.
 
-    columns: {frame, id, x, y, r, flag, i, j, f_t or f_n: its header in the files, or its number
-    from 1}. If one column of a file is given, the others are recognised by headers only. frame is
-    that of both files; its number applies to files of which other columns are given, too.
+    columns: {frame, id, x, y, r, flag, pressure, i, j, f_t or f_n: its header in the files, or its
+    number from 1}. If one column of a file is given, the others are recognised by headers only.
+    frame is that of both files; its number applies to files of which other columns are given, too.
     """
     given = columns_by_name(columns or {})
     grains, contacts = (
         _readings(source, wanted, given)
-        for source, wanted in ((positions, GRAINS), (adjacency, CONTACTS))
+        for source, wanted in ((positions, (*GRAINS, PRESSURE)), (adjacency, CONTACTS))
     )
     if "frame" in given and not (grains[0].frame_given or contacts[0].frame_given):
         raise InputError(

@@ -238,10 +238,11 @@ def _volume(
 
 def _inference_parameters(
     packing: Parameters,
-    measured: Any,
+    measured: Any = None,
     states: Any = 0,
     seed: int = 0,
     *,
+    pressures: Any = None,
     unmeasured: float | None = None,
     again: bool = False,
     certain: bool = False,
@@ -252,14 +253,15 @@ def _inference_parameters(
 ) -> Parameters:
     """The parameters of an inference: its packing, its measurement, and its draws.
 
-    measured: a Measurement, identified by a hash of its arrays; mu, keep: as for a walk; states,
-    chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks created
-    by dynamics. certain: whether to test which unmeasured contacts carry force in every network.
-    conditions: on the forces.
+    measured, pressures: a Measurement and GrainPressures, identified by hashes of their arrays; mu,
+    keep: as for a walk; states, chains, unmeasured: as for `infer`. again: draws are those of
+    `remeasured`, for networks created by dynamics. certain: whether to test which unmeasured
+    contacts carry force in every network. conditions: on the forces.
     """
     size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
     spread = None if unmeasured is None else positive(unmeasured, "unmeasured")
-    named = {"measured": hash_of(*measured), "unmeasured": spread}
+    named = {"measured": hash_of(*(measured or ())), "unmeasured": spread}
+    named |= {} if pressures is None else {"pressures": hash_of(*pressures)}
     named |= {"again": True} if again else {}
     return {**cones_of(packing, mu, **conditions), **size, **named, "certain": bool(certain)}
 
@@ -271,21 +273,26 @@ def _inference(
     workers: int,
     progress: Progress | None,
     measured: Any = None,
+    pressures: Any = None,
 ) -> xr.Dataset:
     """Dataset of the likeliest network of a measurement, and of draws around it.
 
-    measured: the Measurement of the parameters.
+    measured, pressures: the Measurement and the GrainPressures of the parameters.
     """
-    if measured is None:
+    if measured is None and pressures is None:
         raise InputError("the measurement is not in this store: infer again")
     begin = time.perf_counter()
     S = ensemble_of(store, parameters)
-    forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
+    forces, sigma = np.full((2, len(S.index), 2), np.nan)
+    if measured is not None:
+        forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
     again = parameters.get("again") and parameters["states"]
     usual = remeasured.UNMEASURED if again else UNMEASURED
     unmeasured = spread_of(S, parameters["unmeasured"], usual)
+    given = (S, forces, sigma) if measured is not None else (S,)
     result = (remeasured.remeasured if again else infer)(
-        *(S, forces, sigma),
+        *given,
+        pressures=pressures,
         states=parameters["states"],
         seed=parameters["seed"],
         chains=parameters["chains"],
@@ -296,11 +303,15 @@ def _inference(
     certain = None
     if parameters["certain"]:
         certain = carrying(
-            S, forces, sigma, unmeasured=unmeasured, workers=workers, progress=progress
+            *given,
+            pressures=pressures,
+            unmeasured=unmeasured,
+            workers=workers,
+            progress=progress,
         )
         cancelling.check("inference")
     return inference_dataset(
-        *(S, result, forces, sigma, certain),
+        *(S, result, forces, sigma, pressures, certain),
         unmeasured=unmeasured,
         keep=parameters["keep"],
         seconds=time.perf_counter() - begin,
@@ -366,7 +377,7 @@ UNIFORM = Kind(
 )
 INFERENCE = Kind(
     name="inference",
-    version=2,
+    version=3,
     title="inference",
     unit="draw",
     parameters=_inference_parameters,
