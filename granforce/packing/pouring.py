@@ -16,8 +16,9 @@ from granforce.types import Floats
 # Radius of the grain behind a touched place, relative to the disk's; of a pressing wall, relative
 # to the largest disk's.
 STUD = 0.25
-# Packing fraction for which the layer is about as deep as wide.
-_FRACTION = 0.8
+# Packing fraction for which the layer is about as deep as wide, and its least width: twice the
+# distance of two disks that a third one touches, so that only the nearest images matter.
+_FRACTION, _NARROWEST = 0.8, 8.0
 # Depth in which grains behind the floor wait for their disks, far apart from each other.
 _FAR = 10.0
 # Distance of a disk from the floor, in largest radii, below which the grain behind waits there.
@@ -30,10 +31,10 @@ def poured(r: Floats, rng: np.random.Generator) -> Motion:
     Grain N + k is behind the floor where disk k touches it. The unit of force is the weight of all
     disks per side of the box, times the largest radius.
     """
-    side = np.sqrt(np.pi * np.sum(r**2) / _FRACTION)
+    side = max(_NARROWEST, np.sqrt(np.pi * np.sum(r**2) / _FRACTION))
     x = np.zeros((2 * len(r), 2))
     for k in range(len(r)):
-        cancelling.check("pouring")
+        cancelling.check("compaction")
         x[k] = _hollow(x[:k], r[:k] + r[k], r[k], side, rng)
     both = np.append(r, STUD * r)
     return relisted(

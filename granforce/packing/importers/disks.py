@@ -101,8 +101,7 @@ def from_disks(
     given, x = x, cell.wrapped(x)
     bodies = np.arange(len(r)) if clumps is None else _bodies(clumps, len(r))
     check_disks(x, r, cell, lambda k: f"disk {k}", rigid=bodies)
-    contacts = touching_contacts(x, r, cell, tolerance)
-    contacts = contacts.picked(bodies[contacts.i] != bodies[contacts.j])
+    contacts = touching_contacts(x, r, cell, tolerance, rigid=bodies)
     closed = bool(np.all(np.isfinite(cell.box)))
     if pressure is not None and not closed:
         raise InputError("pressure applies to periodic boxes: leave it out, or give the box")

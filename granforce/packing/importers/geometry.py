@@ -50,9 +50,17 @@ _ENOUGH, _ROUNDING = 3, 1e-12
 OPEN = Cell(np.full(2, np.inf), 0.0)
 
 
-def touching_contacts(x: Floats, r: Floats, cell: Cell, tolerance: float) -> Contacts:
-    """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
+def touching_contacts(
+    x: Floats, r: Floats, cell: Cell, tolerance: float, rigid: Integers | None = None
+) -> Contacts:
+    """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1).
+
+    rigid (N,): as of `check_disks`; grains of one body have no contacts.
+    """
     i, j, shift = find_pairs(x, r, cell, largest_gap(tolerance) * r.max())
+    if rigid is not None:
+        others = rigid[i] != rigid[j]
+        i, j, shift = i[others], j[others], shift[others]
     normal, length, _ = separations(x, r, cell, i, j, shift)
     return make_contacts(i, j, normal, length, r)
 
