@@ -55,6 +55,7 @@ export function render({ model }) {
 /** The dialog of "?": an explanation, and the keys. */
 function helpOf(model, root) {
   const dialog = root.appendChild(document.createElement("dialog"))
+  dialog.autofocus = true // not the first word with a hint, which may be below and would be scrolled to
   const keys = document.createElement("dl"), words = document.createElement("div")
   dialog.append(createElement("h2", { textContent: "Keys" }), keys, words, button("Close", () => dialog.close(), { className: "soft" }))
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close() })
