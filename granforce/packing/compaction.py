@@ -208,6 +208,7 @@ def pack(
             "box_mass": box_mass != 100.0,
             "accuracy": accuracy != 0.01,
             "drag_below": drag_below is not None,
+            "max_steps": max_steps != 100_000,
         }
         info = {"seed": seed, "radii": radii if isinstance(radii, str) else "list", "box": box}
         for name in (name for name, is_given in given.items() if is_given):

@@ -184,6 +184,7 @@ def one_disk(**options):
         (lambda: one_disk(clumps=[1], box=[4, 4]), "clumps need walls"),
         (lambda: gf.pack(9, 0.5, box="floor", pressure=2.0), "no use for pressure"),
         (lambda: gf.pack(9, 0.5, box="floor", dt=0.01), "no use for dt"),
+        (lambda: gf.pack(9, 0.5, box="floor", max_steps=9), "no use for max_steps"),
         (lambda: gf.pack(9, 0.0, box="floor"), "friction coefficient above"),
     ],
 )  # fmt: skip
