@@ -117,9 +117,8 @@ export class QuantityPlot {
 
   /**
    * state: {now: [x, y], words, marker: {value, words}, answer: {value, words}, seen, exact, dots}: seen and exact are
-   * lists of points, dots a list of points; null hides a part. filled: they are areas; thin: they are curves; walk: seen is one. second:
-   * points of a second quantity, in its units. lines: [{value, words}], named values, the first one a bound on the
-   * others.
+   * lists of points, and so is dots; null hides a part. filled: they are areas; thin: curves; walk: only seen is a curve.
+   * second: points of a second quantity. lines: [{value, words}], named values, the first one a bound on the others.
    */
   draw(state) {
     this.state = state

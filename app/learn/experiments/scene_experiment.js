@@ -16,7 +16,7 @@ const FRICTION = { label: "friction μ", max: 1.2, step: 0.05, stage: 2 }
 export class SceneExperiment {
   /**
    * options: {scene, x, y}: forces on the axes, 2 c for the normal one of contact c; y null for a line. goal: where the dot
-   * has to go: to the "high" end, to "both", or "round" S.
+   * has to go: to "both" ends, "round" S, or by default to the largest value.
    */
   constructor(host, options, changed) {
     Object.assign(this, { host, options, changed, steered: true, locked: true, answered: false, lit: new Set(), way: [] })
@@ -50,7 +50,9 @@ export class SceneExperiment {
 
   end() {
     this.S = this.measured()
-    if (!this.first) [this.low, this.high] = (this.first = this.S).bounds
+    if (this.first) return
+    [this.low, this.high] = (this.first = this.S).bounds
+    this.smooth = this.frictionless()
   }
 
   // Friction
@@ -96,7 +98,7 @@ export class SceneExperiment {
   }
 
   /** On a line S, the quantity where the friction of its contact is zero. */
-  get smooth() {
+  frictionless() {
     const { body, options: { x } } = this, [a, b] = body.corners?.map(({ u }) => body.forces(u)) ?? []
     return a && b ? a[x] - (a[x + 1] * (b[x] - a[x])) / (b[x + 1] - a[x + 1]) : NaN
   }
@@ -111,9 +113,9 @@ export class SceneExperiment {
   }
 
   /** To both ends, or round S, and to the answer. */
-  finish({ x }) {
-    const { outline } = this.S
-    for (const [px, py] of [...outline, [x.low, 0], [this.answer, this.at[1]]]) this.drag(px, py)
+  finish({ x, y }) {
+    const { S: { outline }, options: { goal } } = this, ends = [x.low, x.high, this.answer].map((to) => [to, y?.high ?? 0])
+    for (const [px, py] of goal === "round" ? [...outline, ...ends] : ends) this.drag(px, py)
   }
 
   /** Where S is drawn as a shadow, other forces behind the same dot. */
