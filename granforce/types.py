@@ -14,5 +14,6 @@ Integers = npt.NDArray[np.integer[Any]]
 Mask = npt.NDArray[np.bool_]
 
 Rows = Sequence[dict[str, Any]]  # a table: a row is plain values by name
-Progress = Callable[[float, float | None], object]  # progress(done, total), called repeatedly
+# progress(done, total), called repeatedly; functions for people also take True, which shows a bar.
+Progress = Callable[[float, float | None], object]
 Cancel = Callable[[], bool]  # polled; True ends the computation

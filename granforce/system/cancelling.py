@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from granforce.records import Cancelled, ResultWarning, worker_count
+from granforce.records import Cancelled, InputError, ResultWarning, worker_count
 from granforce.system.interrupts import interrupted
 from granforce.types import Cancel, Mask
 
@@ -90,7 +90,8 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def inside(*arguments: P.args, **options: P.kwargs) -> T:
-        with scope(cast("Cancel | None", options.pop("cancel", None))):
+        cancel = cast("Cancel | None", options.pop("cancel", None))
+        with _shown(function.__name__, options), scope(cancel):
             result = function(*arguments, **options)
             for one in result if isinstance(result, list) else [result]:
                 if (reason := getattr(one, "shortfall", "")) and not cancelled():
@@ -98,6 +99,30 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
             return result
 
     return inside
+
+
+@contextmanager
+def _shown(name: str, options: dict[str, Any]) -> Iterator[None]:
+    """Replace progress=True in options by a tqdm bar; InputError for what cannot be called."""
+    progress = options.get("progress")
+    if progress is False:
+        options["progress"] = None
+    elif progress is not None and progress is not True and not callable(progress):
+        words = f"must be True, or a function progress(done, total), got {progress!r:.40}"
+        raise InputError.of("progress", progress, words)
+    if progress is not True:
+        yield
+        return
+    from tqdm.auto import tqdm  # slow to import
+
+    with tqdm(desc=name, leave=False) as bar:
+
+        def show(done: float, total: float | None) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        options["progress"] = show
+        yield
 
 
 def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:

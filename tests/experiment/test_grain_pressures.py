@@ -222,3 +222,12 @@ def test_the_best_grain_to_measure_next_reduces_the_errors_as_expected(S, states
     after = infer(S, pressures=both, states=1000, unmeasured=1e3)
     gain = 1 - after.error[:, 0].sum() / before.error[:, 0].sum()
     assert gain == pytest.approx(ranked.expected[place], abs=0.04)
+
+
+def test_progress_true_draws_a_bar(S, states, capsys):
+    given = measured(S, states[7], 0.1)
+    one, two = (infer(S, pressures=given, states=8, progress=p) for p in (True, False))
+    assert "infer" in capsys.readouterr().err
+    assert np.array_equal(one.draws.states, two.draws.states)
+    with pytest.raises(InputError, match="progress must be True, or a function"):
+        infer(S, pressures=given, progress=3)
