@@ -503,9 +503,10 @@ COMMANDS = (
         (
             options(
                 "packing:app --port --address --allow-websocket-origin --use-xheaders --no-show "
-                "--warm"
+                "--warm --basic-auth --cookie-secret"
             ),
         ),
+        (without("--basic-auth", options("--cookie-secret")),),
     ),
     Command(
         "docs",

@@ -183,6 +183,9 @@ OPTIONS = {
         repeated=True,
     ),
     "--angles": Option("number of directions in the table", int, 64),
+    "--basic-auth": Option(
+        'ask for a name and a password: a JSON file {"name": "password", …}', Input
+    ),
     "--best": Option("number of contacts to list", int, 10),
     "--box": Option(
         "square (default), or a cell whose sides and tilt adapt until the stress is isotropic, "
@@ -250,6 +253,9 @@ OPTIONS = {
         float,
     ),
     "--draw-seed": Option("seed for the random choice of contacts", int, 0),
+    "--cookie-secret": Option(
+        "secret that signs the cookies of --basic-auth (default: $PANEL_COOKIE_SECRET)"
+    ),
     "--dt": Option("maximum time step (default 0.1; 0.03 for μ ≥ 0.2)", float),
     "--effective": Option("target effective sample size: continue until it is reached", float),
     "--ensemble-mu": Option(

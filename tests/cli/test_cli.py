@@ -575,3 +575,14 @@ def test_too_many_open_files_are_told_in_a_line(run, monkeypatch):
     monkeypatch.setattr(commands, "scan", scan)
     code, out, err = run("scan", "--mu", "0.3")
     assert (code, out, err.count("\n")) == (2, "", 1) and "too many open files; use fewer" in err
+
+
+def test_a_login_needs_a_secret_that_signs_its_cookies(away, capsys, monkeypatch):
+    (away / "users.json").write_text('{"ann": "x"}')
+    monkeypatch.delenv("PANEL_COOKIE_SECRET", raising=False)
+    words = ["app", "--no-show", "--port", "0", "--basic-auth", "users.json"]
+    assert main(words) == 2 and "--cookie-secret" in capsys.readouterr().err
+    monkeypatch.setattr(sys, "argv", list(sys.argv))
+    monkeypatch.setattr("runpy.run_module", lambda *_, **__: None)
+    main([*words, "--cookie-secret", "s"])
+    assert sys.argv[-6:-2] == ["--basic-auth", "users.json", "--cookie-secret", "s"]

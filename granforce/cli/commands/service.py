@@ -54,6 +54,14 @@ def app(arguments: argparse.Namespace) -> None:
     words = ["panel", "serve", str(_page()), "--port", str(port), "--address", arguments.address]
     for origin in arguments.allow_websocket_origin:
         words += ["--allow-websocket-origin", origin]
+    if arguments.basic_auth:
+        secret = arguments.cookie_secret or os.environ.get("PANEL_COOKIE_SECRET")
+        if not secret:
+            raise InputError(
+                "--basic-auth needs a secret that signs the cookies: --cookie-secret, or "
+                "PANEL_COOKIE_SECRET in the environment"
+            )
+        words += ["--basic-auth", arguments.basic_auth, "--cookie-secret", secret]
     words += ["--warm"] if arguments.warm else []
     words += ["--use-xheaders"] if arguments.use_xheaders else []
     words += ["--plugins", "granforce.cli.health"]
