@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from granforce.bench import packings
+from granforce.bench.compiling import FIRST, compiling
 from granforce.bench.conditions import inference
 from granforce.bench.exact import REFERENCES, interval_methods
 from granforce.bench.frames import frames
-from granforce.bench.kernel import growth, pushes, starts
+from granforce.bench.kernel import growth, kernel, pushes, starts
 from granforce.bench.masonry import SMALL, masonry
 from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, table
@@ -50,6 +51,12 @@ PARTS = dict(
             sweeps=100_000,
         ),
         _part(scaling, "One relaxation against the number of disks", tiles=(1, 2, 4), patience=2.0),
+        _part(
+            compiling,
+            "First results, with no kernel compiled yet",
+            first={"pack": FIRST["pack"]},
+        ),
+        _part(kernel, "Factorisation: part of what the machine can do", tiles=(1, 2)),
         _part(starts, "Nearest networks: PIQP, one at a time, and in lanes", n=100, repeats=2),
         _part(pushes, "Critical forces: one contact at a time, and in lanes", n=60, contacts=10),
         _part(

@@ -1,5 +1,8 @@
-"""The solver on S compared with PIQP, in lanes, and against the number of disks."""
+"""The solver on S compared with the machine's limits and PIQP, and against the number of disks."""
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,10 +16,63 @@ from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_problem
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.numerics.lanes import LANES
+from granforce.numerics import cholesky, contact_program
+from granforce.numerics.contact_program import Problem
+from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_force, critical_forces
 from granforce.system.clock import timed
+
+# Operations to subtract one product of two 3×3 blocks from a third.
+_PRODUCT = 54
+# Dense matrix product on one core: the peak in double precision on this machine.
+_DENSE = """
+import time
+import numpy as np
+a = np.random.default_rng(0).random((1200, 1200))
+best = 1e9
+for _ in range(5):
+    begin = time.perf_counter()
+    a @ a
+    best = min(best, time.perf_counter() - begin)
+print(2 * 1200**3 / best / 1e9)
+"""
+
+
+def kernel(n: int = 100, mu: float = 0.1, tiles: Sequence[int] = (1, 2, 4, 8)) -> list[Row]:
+    """Rows: Gflop/s of one factorisation, single and in lanes, and the ratio to a dense product."""
+    dense = _dense_product()
+    rows = []
+    for case, S in tilings("kernel", ensemble(pack(n, mu, 1)), tiles):
+        problem, _ = make_problem(S)
+        for lanes in (ONE, MANY):
+            each = _factorisation(problem, lanes) / len(lanes)
+            below = np.diff(problem.network.layout.start) - 1
+            products = int(np.sum(below * (below + 1) // 2))
+            flops = _PRODUCT * products / each / 1e9
+            row = case | {"lanes": len(lanes), "ms_per_matrix": 1e3 * each, "gflops": flops}
+            rows.append(row | {"dense_gflops": dense, "part": flops / dense})
+    return rows
+
+
+def _dense_product() -> float:
+    single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    called = [sys.executable, "-c", _DENSE]
+    done = subprocess.run(called, env=os.environ | single, capture_output=True, check=True)
+    return float(done.stdout)
+
+
+def _factorisation(problem: Problem, lanes: Any) -> float:
+    """Seconds of the fastest of many factorisations."""
+    work = contact_program.make_workspace(problem, len(lanes))
+    best = np.inf
+    for _ in range(30):
+        # Any positive definite matrix: the operations do not depend on its numbers.
+        work.factors.lower[:] = 0.0
+        work.factors.lower[cholesky.diagonals(problem.network).ravel()] = 1.0
+        arguments = problem.network, work.least, work.factors, work.stop, lanes
+        best = min(best, timed(cholesky.factor, *arguments)[0])
+    return best
 
 
 def starts(n: int = 400, frictions: Sequence[float] = FRICTIONS, repeats: int = 5) -> list[Row]:

@@ -121,6 +121,12 @@ def test_short_runs_are_repeated_and_the_fastest_counts(monkeypatch):
     assert run.seconds == 0.01 and next(taken) == 9.0
 
 
+def test_compiling_one_kernel_is_timed():
+    begin = "import numpy as np; from granforce.numerics.elimination import _by_subtrees"
+    (row,) = bench.compiling({"one": f"{begin}; _by_subtrees(np.zeros(2, int), np.zeros(1, int))"})
+    assert row["seconds"] > row["seconds_compiled"] > 0 and row["ratio"] > 1
+
+
 def test_kernels_are_compiled_before_packings_are_timed(monkeypatch):
     made = []
     monkeypatch.setattr(
