@@ -22,7 +22,8 @@ from granforce.types import Floats, Integers, Mask
 
 # Least distance from a wall to a reliable analytic centre, in ⟨f_n⟩.
 _WELL_INSIDE = 1e-5
-# Unbalance of a centre, rows of order 1, above which its balance is restored.
+# Unbalance of a centre, relative to the right-hand side if that is larger than 1, above which its
+# balance is restored.
 _UNBALANCED = 1e-9
 
 
@@ -89,7 +90,7 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
     inner = np.append(inner, middle.y[y.size :])
     A, b, _ = ensemble.scaled_form
-    if np.abs(A @ inner - b).max(initial=0.0) <= _UNBALANCED:
+    if np.max(np.abs(A @ inner - b) / np.maximum(1.0, np.abs(b)), initial=0.0) <= _UNBALANCED:
         return inner
     inner = in_balance(A, b, inner)
     return inner if inner.min(initial=1.0) > 0 else None

@@ -23,15 +23,15 @@ MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 NAMES = {
     "packing": ((20, 0.1, 1), {}, "packing-e92faea7640195223d3c"),
     "walk": ((MADE, 6), {"keep": 3, "relax": "nearest_piqp"}, "walk-1d62362ee85d8524a995"),
-    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-50d4941ac9f07fe279e3"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-75597dd2cb17663205e9"),
+    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-febf270766dc27162c86"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-0619124b5fa1e63a0f4b"),
     "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-c54698df5db99cfb720a"),
     "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-2130d78dc07681ab080e"),
     "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-348a39809923bad22be4"),
     "stress": ((MADE,), {"angles": 16}, "stress-eff83621cfee69021951"),
     "perturbation": ((MADE,), {"random": 4}, "perturbation-94e3d80e285b8690875e"),
-    "informative": ((MADE,), {"k": 5}, "informative-7f42aaf5fdab74dc1f88"),
-    "volume": ((MADE, 0.1), {}, "volume-aca5da65c0a840eb75ab"),
+    "informative": ((MADE,), {"k": 5}, "informative-6bc3a4e684273fbe1590"),
+    "volume": ((MADE, 0.1), {}, "volume-c25740b845d6f295aabf"),
     "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-6bd9faef7813cda5c390"),
 }
 

@@ -368,7 +368,7 @@ WALK = Kind(
 )
 UNIFORM = Kind(
     name="uniform",
-    version=3,
+    version=4,
     title="uniform sample",
     unit="state",
     parameters=_uniform_parameters,
@@ -386,7 +386,7 @@ INFERENCE = Kind(
 )
 VOLUME = Kind(
     name="volume",
-    version=2,
+    version=3,
     title="volume of S",
     unit="path",
     parameters=_volume_parameters,
@@ -394,7 +394,7 @@ VOLUME = Kind(
 )
 INFORMATIVE = Kind(
     name="informative",
-    version=3,
+    version=4,
     title="which measurement next",
     unit="contact",
     parameters=_informative_parameters,
