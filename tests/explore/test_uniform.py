@@ -33,6 +33,7 @@ from granforce.explore.walls import walls
 from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics.inner_point import inner_point
+from granforce.numerics.wall_matrix import WallMatrix
 from granforce.packing.importers import read_lammps
 from granforce.records import Cancelled, InputError, NotJammedError
 from granforce.study import cells as study
@@ -142,6 +143,7 @@ def test_chains_mix(sample):
     assert sample.reached and sample.mixing.worst_r_hat < 1.05
     assert sample.effective > 100
     assert sample.counts["refused"] == 0 and sample.counts["held"] == 0
+    assert isinstance(sample.walls.matrix, WallMatrix)  # sparse, since S is not thin
     assert np.array_equal(np.unique(sample.chain), np.arange(4))
 
 
