@@ -143,8 +143,11 @@ def test_chains_mix(sample):
     assert sample.reached and sample.mixing.worst_r_hat < 1.05
     assert sample.effective > 100
     assert sample.counts["refused"] == 0 and sample.counts["held"] == 0
-    assert isinstance(sample.walls.matrix, WallMatrix)  # sparse, since S is not thin
     assert np.array_equal(np.unique(sample.chain), np.arange(4))
+
+
+def test_unbalance_of_the_packing_is_not_taken_for_lost_rows():
+    assert isinstance(walls(ensemble(packed(60, 0.3))).matrix, WallMatrix)
 
 
 def test_moments_are_those_of_a_triangulated_s():
