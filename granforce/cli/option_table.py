@@ -6,7 +6,15 @@ import argparse
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from granforce.cli.path_roles import Edited, Input, Output, StorePath, TableOrStore, Workplace
+from granforce.cli.path_roles import (
+    Edited,
+    Input,
+    Output,
+    Series,
+    StorePath,
+    TableOrStore,
+    Workplace,
+)
 from granforce.study.relaxations import STORED
 from granforce.system.wording import number
 
@@ -111,16 +119,19 @@ OPTIONS = {
     "action": Option("", choices=("list", "size", "clear", "verify", "path")),
     "contacts:lammps": Option(
         "dump local of the contacts: two ids, distance, normal force x y, tangential force x y, "
-        "in this order or under the names atom1 atom2 distance fx fy px py",
+        "in this order or under the names atom1 atom2 distance fx fy px py (without px py, fx fy "
+        "are the total force)",
         Input,
     ),
     "contacts:yade": Option(
         "one line per interaction: id1 id2, phys.normalForce x y z, phys.shearForce x y z", Input
     ),
-    "contacts:mercury": Option("contacts: NAME.fstat", Input),
+    "contacts:mercury": Option(
+        "contacts: NAME.fstat, also if its files are NAME.fstat.0000, NAME.fstat.0001, …", Series
+    ),
     "contacts:table": Option(
         "columns i, j (ids, or row numbers from 0); optionally nx, ny, length (otherwise the "
-        "nearest images touch), and f_n, f_t",
+        "nearest images touch), and f_n, f_t, or fx, fy (total force on j)",
         Input,
         nargs="?",
     ),
@@ -141,7 +152,9 @@ OPTIONS = {
         "bodies from export.textExt: x y z r, and id (format x_y_z_r_attrs) if there are walls",
         Input,
     ),
-    "grains:mercury": Option("particles: NAME.data", Input),
+    "grains:mercury": Option(
+        "particles: NAME.data, also if its files are NAME.data.0000, NAME.data.0001, …", Series
+    ),
     "grains:table": Option(
         "columns x, y, r; optionally id, fx, fy, torque (external load, without --box) and open "
         "(1: balance not required, 0)",

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from granforce.system.series import numbered_files
+
 
 class Input(str):
     """A file or folder that a command reads."""
+
+
+class Series(str):
+    """A file that a command reads, or its numbered files."""
+
+    @property
+    def files(self) -> list[Input]:
+        return [Input(name) for name in numbered_files(self)]
 
 
 class Output(str):
@@ -35,4 +45,4 @@ class TableOrStore(str):
         return [Output(self) if self.endswith(".csv") else StorePath(self)]
 
 
-ROLES = (Input, Output, Workplace, StorePath, Edited, TableOrStore)
+ROLES = (Input, Series, Output, Workplace, StorePath, Edited, TableOrStore)

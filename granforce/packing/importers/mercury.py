@@ -29,6 +29,8 @@ from granforce.packing.importers.notes import packing_noted
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import Source, Table, read_rows
 from granforce.records import InputError, Packing
+from granforce.system.files import path_text
+from granforce.system.series import numbered_files
 from granforce.types import Floats, Integers
 
 _CONTACT = ("time", "i", "j", "x", "y", "z", "delta", "deltat", "fn", "ft")
@@ -108,7 +110,8 @@ def read_mercury(
     Parameters
     ----------
     data, fstat : path or open file
-        The two files.
+        The two files; without a file of this name, the files NAME.0000, NAME.0001, … (or NAME.0,
+        NAME.1, …) that hold one step each.
     frame : int, optional
         Number of the time step in the files, from 0; by default the last that is complete in both.
     mu, box, tilt, walls, reverse, most_grains
@@ -257,9 +260,14 @@ def _forces(links: Table, plane: str) -> tuple[Floats, Floats]:
     return normal, force
 
 
+def _read_parts(source: Source) -> Table:
+    """The rows of a file, or of all its numbered files."""
+    return read_rows(*([source] if hasattr(source, "read") else numbered_files(path_text(source))))
+
+
 def _read_steps(source: Source) -> _Steps:
     """The time steps of a .data file."""
-    table = read_rows(source)
+    table = _read_parts(source)
     steps: list[_Step] = []
     at = 0
     while at < len(table.rows):
@@ -316,7 +324,7 @@ def _has_all(particles: Table, count: int) -> bool:
 
 def _read_contacts(source: Source) -> _ContactList:
     """The contacts of an .fstat file."""
-    table = read_rows(source)
+    table = _read_parts(source)
     last = table.some([len(table.rows) - 1])
     is_short = len(table.rows) > 1 and len(last.rows[0]) < len(_CONTACT)
     if is_short:

@@ -54,7 +54,7 @@ class Table(NamedTuple):
     name: str  # file name, for messages
     header: tuple[str, ...]  # column names
     rows: list[list[str]]  # of one table with as many fields as columns
-    lines: list[int]  # line number of each row in the file
+    lines: Sequence[int | str]  # line number of each row, and which of several files it is in
     word: str = "line"  # what these numbers count
     comments: Sequence[str] = ()  # lines that began with a comment sign, without it
     complete: bool = True  # False if the last number may be cut off: its line has no end
@@ -173,7 +173,11 @@ class Table(NamedTuple):
 
 
 def make_table(
-    name: str, header: Sequence[str], rows: list[list[str]], lines: list[int], word: str = "line"
+    name: str,
+    header: Sequence[str],
+    rows: list[list[str]],
+    lines: Sequence[int],
+    word: str = "line",
 ) -> Table:
     """A Table with named columns; InputError as by `Table.named`."""
     return Table(name, (), rows, lines, word).named(header)
@@ -295,14 +299,20 @@ def csv_table(name: str, text: str) -> Table:
     return make_table(name, [column.lower() for column in header], rows, numbers[1:])
 
 
-def read_rows(source: Source) -> Table:
+def read_rows(*sources: Source) -> Table:
     """A Table without names, at least one row, of fields separated by blanks or commas.
 
-    Lines that begin with # are its comments, in lower case. Raises InputError.
+    Lines that begin with # are its comments, in lower case. Several files are read as one. Raises
+    InputError.
     """
-    name, text = read_text(source)
-    lines = [(number, line.lstrip()) for number, line in numbered_lines(text)]
+    texts = [read_text(source) for source in sources]
+    lines = [
+        (number if len(texts) == 1 else f"{number} of {name}", line.lstrip())
+        for name, text in texts
+        for number, line in numbered_lines(text)
+    ]
     rows = [(number, line) for number, line in lines if not line.startswith("#")]
+    name = texts[0][0] if len(texts) == 1 else os.path.splitext(texts[0][0])[0]
     if not rows:
         raise InputError(f"{name}: no line with numbers")
     return Table(
@@ -311,7 +321,7 @@ def read_rows(source: Source) -> Table:
         [line.replace(",", " ").split() for _, line in rows],
         [number for number, _ in rows],
         comments=[line.lstrip("# \t").lower() for _, line in lines if line.startswith("#")],
-        complete=text.endswith("\n") or lines[-1][1].startswith("#"),
+        complete=texts[-1][1].endswith("\n") or lines[-1][1].startswith("#"),
     )
 
 
