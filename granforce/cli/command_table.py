@@ -133,7 +133,7 @@ FORMATS = (
         (
             options(
                 "--json grains:lammps contacts:lammps --mu:import --out:snapshots --frame:lammps "
-                "--columns:import --reverse"
+                "--columns:import --walls:simulation --reverse"
             ),
             SNAPSHOTS,
         ),

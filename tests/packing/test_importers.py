@@ -26,8 +26,16 @@ from granforce.packing.importers import (
     report,
     save_packing,
 )
+from granforce.packing.importers.geometry import vectors
 from granforce.packing.importers.text import make_table
-from granforce.records import InputError, NotJammedError, make_contacts, make_packing, repeated
+from granforce.records import (
+    InputError,
+    InputWarning,
+    NotJammedError,
+    make_contacts,
+    make_packing,
+    repeated,
+)
 
 HERE = Path(__file__).parents[1]
 REFERENCES = sorted((HERE / "reference").glob("n*_s??.npz"))
@@ -291,6 +299,27 @@ def test_lammps_columns_may_be_named():
         read_lammps(*rewritten(contacts=extra), 0.3)
 
 
+def total_only(rows):
+    """Contacts with their total force in columns of any name, as `force` of LIGGGHTS."""
+    sums = ([float(row[k]) + float(row[k + 2]) for k in (3, 4)] for row in rows[1:])
+    total = [[*row[:2], *map(repr, force), "0"] for row, force in zip(rows[1:], sums, strict=True)]
+    return [["ITEM:", "ENTRIES", *"abcde"], *total]
+
+
+def test_lammps_total_forces_are_split_at_the_line_of_centres():
+    columns = dict(zip(("atom1", "atom2", "fx", "fy"), "abcd", strict=True))
+    found = read_lammps(*rewritten(contacts=total_only), 0.3, columns=columns)
+    plain = read_lammps(PARTICLES, CONTACTS, 0.3)
+    np.testing.assert_allclose(found.forces, plain.forces, atol=1e-12)
+    assert found.info["residual"] < 1e-9 and "notes" not in found.info
+
+    def normal_only(rows):
+        return total_only([rows[0], *([*row[:5], "0", "0"] for row in rows[1:])])
+
+    with pytest.warns(InputWarning, match="all forces point along the line of centres"):
+        read_lammps(*rewritten(contacts=normal_only), 0.3, columns=columns)
+
+
 def test_lammps_reads_the_last_common_timestep_and_shifted_boxes():
     low, side = -3.5, 29.747389457354078
     particles = lines(PARTICLES)
@@ -340,11 +369,12 @@ def tilted_text(flags, xy, xz):
     return io.StringIO("\n".join(text)), CONTACTS
 
 
-def triclinic(packing, basis, scaled=False):
+def triclinic(packing, basis, scaled=False, angle=None):
     """The dumps of a packing in another cell of its lattice, turned so that a lies along x.
 
     Written as LAMMPS documents it (docs.lammps.org, Howto triclinic): bounds are those of the
-    rectangle around the cell, tilts stand in a third column.
+    rectangle around the cell, tilts stand in a third column. With an angle the particles' dump is
+    general triclinic: the cell and its positions, but not the contacts, turned by it.
     """
     other, turn = skewed(packing, basis)
     (width, height), tilt = other.box.tolist(), other.tilt
@@ -355,7 +385,16 @@ def triclinic(packing, basis, scaled=False):
         f"{low[1]!r} {low[1] + height!r} 0.0",
         "-0.5 0.5 0.0",
     ]
-    x = other.cell.parts(other.x) if scaled else other.cell.wrapped(other.x) + low
+    spin = np.eye(2)
+    if angle is not None:
+        spin = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        sides = zip((other.cell.vectors @ spin).tolist(), low, strict=True)
+        bounds = [
+            "ITEM: BOX BOUNDS abc origin pp pp pp",
+            *(f"{a} {b} 0 {c}" for (a, b), c in sides),
+        ]
+        bounds.append("0 0 1 -0.5")
+    x = other.cell.parts(other.x) if scaled else other.cell.wrapped(other.x) @ spin + low
 
     def placed(row):
         across, up = x[int(row[0]) - 1].tolist()
@@ -375,19 +414,21 @@ def triclinic(packing, basis, scaled=False):
 
 
 @pytest.mark.parametrize(
-    "basis, scaled",
+    "basis, scaled, angle",
     [
-        (((2, 1), (1, 1)), False),
-        (((2, 1), (1, 1)), True),
-        (((1, 1), (0, 1)), False),
-        (((1, -1), (1, 0)), True),
-        (((1, 3), (0, 1)), False),
+        (((2, 1), (1, 1)), False, None),
+        (((2, 1), (1, 1)), True, None),
+        (((1, 1), (0, 1)), False, None),
+        (((1, -1), (1, 0)), True, None),
+        (((1, 3), (0, 1)), False, None),
+        (((1, 1), (0, 1)), False, 2.0),
+        (((1, -1), (1, 0)), True, -0.3),
     ],
 )
-def test_lammps_tilted_boxes_are_read(basis, scaled):
+def test_lammps_tilted_boxes_are_read(basis, scaled, angle):
     """The same structure in another cell: the same forces, pressure, contacts and dimension."""
     plain = read_lammps(PARTICLES, CONTACTS, 0.3)
-    packing = read_lammps(*triclinic(plain, basis, scaled), 0.3)
+    packing = read_lammps(*triclinic(plain, basis, scaled, angle), 0.3)
     other, turn = skewed(plain, basis)
     assert packing.tilt == pytest.approx(other.tilt, abs=1e-9) and packing.tilt != 0
     np.testing.assert_allclose(packing.box, other.box, rtol=1e-12)
@@ -426,11 +467,11 @@ def test_lammps_bounds_are_those_of_the_manual():
     text = lines(PARTICLES)
     text[3] = "1"
     text[4:8] = ["ITEM: BOX BOUNDS xy xz yz", "0 14.757069 4.91902", "0 8.52 0", "0 15 0"]
-    low, _, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
+    low, *_, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == 4.91902
     text[5] = "-4.91902 9.838049 -4.91902"
-    low, _, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
+    low, *_, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == -4.91902
 
@@ -450,6 +491,13 @@ def test_lammps_boxes_tilted_by_whole_sides_are_straight():
 
 def particle_text(old, new):
     return io.StringIO(PARTICLES.read_text().replace(old, new)), CONTACTS
+
+
+def general_text(*sides):
+    """The particle dump in a general triclinic box."""
+    text = lines(PARTICLES)
+    text[4:8] = ["ITEM: BOX BOUNDS abc origin pp pp pp", *sides, "0 0 1 0"]
+    return io.StringIO("\n".join(text)), CONTACTS
 
 
 def contact_text(old, new):
@@ -481,7 +529,10 @@ def other_force(rows):
         (lambda: particle_text("1900000", "-1"), "line 2: '-1' is not a whole number"),
         (lambda: particle_text("\n400\n", "\n401\n"), "400 rows, but 401 are announced"),
         (lambda: particle_text("pp pp pp", "xy xz yz pp pp pp"), "line 6: 2 fields for 3 columns"),
-        (lambda: particle_text("pp pp pp", "abc origin pp pp pp"), "triclinic/general"),
+        (lambda: particle_text("pp pp pp", "abc origin pp pp pp"), "line 6: 2 fields for 4"),
+        (lambda: general_text("9 0 0 0", "0 9 1 0"), "line 7: a and b must lie in the x–y plane"),
+        (lambda: general_text("0 9 0 0", "9 0 0 0"), "line 6: .* not a right-handed system"),
+        (lambda: particle_text("pp pp pp", "abc pp pp pp"), "of kind 'abc pp pp pp' are not"),
         (lambda: tilted_text("pp pp pp", 0.0, 1.0), "line 7: tilted out of the plane; only xy"),
         (lambda: tilted_text("ff pp pp", 5.0, 0.0), "line 5: a cell tilted by 5 must be periodic"),
         (lambda: tilted_text("pp pp pp", 31.0, 0.0), "line 6: the upper bound of the box"),
@@ -556,6 +607,18 @@ def test_tables_with_forces_give_the_packing_back(path):
     assert_same(again, packing, rtol=1e-9, atol=1e-12)
     assert again.info["residual"] < 1e-8
     assert report(again)["dimension"] == report(packing)["dimension"]
+
+
+def test_tables_with_total_forces_give_the_packing_back():
+    packing = load_packing(SMALL)
+    c, told = packing.contacts, {"box": packing.box, "mu": packing.mu}
+    fx, fy = vectors(packing.forces, c.normal).T
+    links = csv(i=c.i, j=c.j, fx=fx, fy=fy)
+    again = read_table(tables(packing)[0], links, **told)
+    np.testing.assert_allclose(again.forces, packing.forces, atol=1e-7)
+    assert again.info["forces"] == "given"
+    with pytest.raises(InputError, match="no contact presses; check the sign"):
+        read_table(tables(packing)[0], csv(i=c.i, j=c.j, fx=-fx, fy=-fy), **told)
 
 
 def test_tables_without_forces_find_a_network():

@@ -417,6 +417,76 @@ def test_walls_of_mercury(turned):
     assert found.info["walls"] == 4
 
 
+def lammps_in_a_box(walls=("w", "v")):
+    """The same box, shifted; the fixes w and v write walls across x and y."""
+    low = np.array([3.0, -1.0])
+    rows = []
+    for k, place in enumerate(itertools.product((0, 1), (0, 1))):
+        x = low + place + 0.5
+        fixes = []
+        for axis in (0, 1):
+            out = np.eye(2)[axis] * (2 * place[axis] - 1)
+            fixes.append([1, *-out, 0, *(x + out / 2), 0, 0.5])
+        words = [k + 1, *x, 0.5, *fixes[0], *(fixes[1] if "v" in walls else [])]
+        rows.append(" ".join(f"{word:g}" for word in words))
+    columns = " ".join(f"f_{wall}[{k}]" for wall in walls for k in range(1, 9))
+    box = "ITEM: BOX BOUNDS ff ff pp\n3 5\n-1 1\n0 1"
+    pairs = "1 2 0 -1 0 0\n3 4 0 -1 0 0\n1 3 -1 0 0 0\n2 4 -1 0 0 0\n"
+    head = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF {}\n4\n" + box + "\nITEM: {} {}\n{}"
+    return (
+        head.format("ATOMS", "ATOMS", f"id x y radius {columns}", "\n".join(rows)),
+        head.format("ENTRIES", "ENTRIES", "atom1 atom2 fx fy px py", pairs),
+    )
+
+
+@pytest.mark.parametrize("walls", ["pressing", "held"])
+def test_walls_of_lammps(walls):
+    found = read_lammps(*given(*lammps_in_a_box()), 0.5, walls=walls)
+    yade = boxed(OUTER + INNER, walls=walls)
+    assert np.allclose(found.forces, [[1, 0]] * 12) and found.info["walls"] == 4
+    assert ensemble(found).dimension == ensemble(yade).dimension
+    load, same = (values[np.lexsort(values.T)] for values in (found.load, yade.load))
+    assert np.allclose(load, same, equal_nan=True)
+    assert "(v (0, -1), v (0, 1), w (-1, 0), w (1, 0))" in found.info["notes"][0]
+
+
+def test_walls_of_lammps_that_are_no_walls_are_refused():
+    atoms, links = lammps_in_a_box(["w"])
+    for dump, words in (
+        (atoms.replace("f_w[8]", "c_w[8]"), "no contact with a wall; dump the columns"),
+        (atoms.replace("f_w[3]", "g"), r"no column f_w\[3\]"),
+        (atoms.replace(" 3 -0.5 ", " 9 -0.5 "), r"line 10: by f_w\[5\], .* 5.5 from the centre"),
+        (atoms.replace("ff ff", "pp pp"), "periodic in both directions has no walls"),
+    ):
+        with pytest.raises(InputError, match=words) as caught:
+            read_lammps(*given(dump, links), 0.5, walls="held")
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="walls are held or pressing"):
+        read_lammps(*given(atoms, links), 0.5, walls="box")
+
+
+@pytest.mark.parametrize("numbers", [("0000", "0001", "0002"), ("8", "9", "10")])
+def test_one_file_for_each_step_is_a_series(numbers, tmp_path, monkeypatch, capsys):
+    """Steps 1 and 2 are those of the one file, and contacts begin at step 1."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in zip(("run.data", "run.fstat"), mercury_files([2.0, 1.0, 3.0]), strict=True):
+        lines = text.splitlines(keepends=True)
+        for k, number in enumerate(numbers):
+            step = lines[k * len(lines) // 3 : (k + 1) * len(lines) // 3]
+            Path(f"{name}.{number}").write_text("".join(step))
+    Path(f"run.fstat.{numbers[0]}").write_text("# no contacts\n")
+    opened = mercury.open_mercury("run.data", Path("run.fstat"), MU, box=(3, 3))
+    assert opened.numbers == [1, 2] and opened.empty == {0: "contacts"}
+    assert [opened.read(k).packing.pressure for k in (1, 2)] == pytest.approx([1.0, 3.0])
+    command = "import mercury run.data run.fstat --mu 0.3 --box 3 3 --out"
+    assert main([*command.split(), "p.npz"]) == 0 and load_packing("p.npz").pressure == 3.0
+    assert main([*command.split(), f"run.data.{numbers[0]}"]) == 2
+    Path(f"run.fstat.{numbers[1]}").write_text("1 0 1\n")
+    capsys.readouterr()
+    assert main([*command.split(), "p.npz"]) == 2
+    assert f"run.fstat, line 1 of run.fstat.{numbers[1]}: 3 fields" in capsys.readouterr().err
+
+
 def test_ids_are_told_by_the_name_of_the_attribute():
     named = BODIES.replace("# x y z r id", "# made by hand\n#b.id")
     found = read_yade(*given(named, "\n".join(OUTER + INNER)), 0.5)

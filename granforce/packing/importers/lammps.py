@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,18 +11,21 @@ import numpy as np
 from granforce.cell import Cell
 from granforce.packing.importers.geometry import (
     MISFIT,
+    OVERLAP_ALLOWED,
     check_disks,
     components,
     distinct_pairs,
     listed_contacts,
 )
-from granforce.packing.importers.network import (
-    LOAD_MISFIT,
-    refuse_idle_reverse,
-    with_edge,
-    with_given_forces,
+from granforce.packing.importers.layers import (
+    Network,
+    Options,
+    WallContacts,
+    assembled,
+    check_walls,
 )
-from granforce.packing.importers.notes import packing_noted
+from granforce.packing.importers.network import LOAD_MISFIT, refuse_idle_reverse, with_edge
+from granforce.packing.importers.notes import packing_noted, with_notes
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
@@ -33,7 +36,7 @@ from granforce.packing.importers.text import (
     renamed,
     some_of,
 )
-from granforce.records import Contacts, InputError, Packing, friction, make_cell, make_packing
+from granforce.records import Contacts, InputError, Packing, friction, make_cell
 from granforce.types import Floats
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
@@ -59,7 +62,8 @@ class _Item(NamedTuple):
 
 class _Box(NamedTuple):
     low: Floats  # (2,) origin
-    vectors: Floats  # (2, 2) its sides, in rows, periodic or not
+    turn: Floats  # (2, 2) rotates row vectors of the dump by v @ turn, so that a lies along x
+    vectors: Floats  # (2, 2) its sides after that, in rows, periodic or not
     cell: Cell
 
 
@@ -116,6 +120,7 @@ def read_lammps(
     *,
     frame: int | None = None,
     columns: Mapping[str, str] | None = None,
+    walls: str | None = None,
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
@@ -134,13 +139,18 @@ def read_lammps(
     contacts : path or open file
         ``dump local`` with the two grains, their distance, normal and tangential force on the
         first: columns named atom1 atom2 distance fx fy px py, or seven in this order and possibly
-        an index; if they are named, the distance, which is only a check, may be missing.
+        an index; if they are named, the distance, which is only a check, may be missing, and px and
+        py, too, if fx fy are the total force (`force` of LIGGGHTS). Vectors are in LAMMPS' own
+        frame, in which the first side of the box lies along x.
     mu : float
         Friction coefficient.
     frame : int, optional
         The timestep, by default the last that is complete in both files.
     columns : mapping, optional
         {name here: name in the dumps} for columns with other names.
+    walls : {"held", "pressing"}, optional
+        As for `read_yade`, from the columns f_ID[1] … f_ID[8] of ``fix ID … wall/gran … contacts``
+        in the particle dump. Each plane is a wall.
     reverse : bool, default False
         Change the sign of tangential forces.
     most_grains : int, optional
@@ -158,7 +168,11 @@ def read_lammps(
         Naming file and line.
     """
     found = open_lammps(
-        particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
+        *(particles, contacts, mu),
+        columns=columns,
+        walls=walls,
+        reverse=reverse,
+        most_grains=most_grains,
     )
     packing = found.chosen(frame).packing
     refuse_idle_reverse(packing.forces, reverse)
@@ -171,6 +185,7 @@ def open_lammps(
     mu: Any,
     *,
     columns: Mapping[str, str] | None = None,
+    walls: str | None = None,
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Snapshots:
@@ -178,7 +193,7 @@ def open_lammps(
 
     Parameters
     ----------
-    particles, contacts, mu, columns, reverse, most_grains
+    particles, contacts, mu, columns, walls, reverse, most_grains
         As for `read_lammps`.
 
     Returns
@@ -187,6 +202,7 @@ def open_lammps(
         Its `read` gives the Snapshot of a number.
     """
     mu = friction(mu)
+    check_walls(walls)
     first, second = read_dump(particles), read_dump(contacts)
     steps = [step for step in first.at if step in second.at]
     if not steps:
@@ -210,13 +226,18 @@ def open_lammps(
         x, r, index = _disks(atoms, box)
         pairs = _with_names(pairs, bool(set(columns or {}) & set(CONTACT_COLUMNS)))
         joined, forces, skipped = _contacts(pairs, x, r, box.cell, index)
-        packing = make_packing(
-            *(x, r, box.cell.box, joined, forces, mu), info={"source": "lammps"}, tilt=box.cell.tilt
+        on_walls = _wall_contacts(atoms, x, r, index, box) if walls else None
+        found = assembled(
+            *(on_walls, Network(x, r, joined, forces)),
+            *(Options(mu, box.cell, walls, reverse, most_grains), "lammps"),
+            timestep=step,
+            contacts_skipped=skipped,
         )
-        info = {"timestep": step, "contacts_skipped": skipped}
-        found = with_given_forces(packing, reverse=reverse, **info)
-        found = found if np.isfinite(found.volume) else with_edge(found)
-        return Snapshot(found, np.sort(atoms.numbers("id")))
+        if "px" not in pairs.header:
+            found = with_notes(found, _notes_on_total(forces, mu))
+        found = found if walls or np.isfinite(found.volume) else with_edge(found)
+        ids = np.sort(atoms.numbers("id"))
+        return Snapshot(found, np.concatenate([ids, -1.0 - np.arange(len(found.r) - len(ids))]))
 
     whole = steps[:-1] if cut else steps
     empty = {step: empty[step] for step in whole if step in empty}
@@ -287,42 +308,71 @@ def _table(name: str, items: dict[str, _Item], title: str) -> Table:
 
 
 def box_of(name: str, items: dict[str, _Item]) -> _Box:
-    """The box, whose cell is open along directions that are not periodic.
+    """The box, whose cell is open along directions that are not periodic."""
+    item = _item(name, items, "BOX BOUNDS")
+    place, flags = f"{name}, line {item.line}", item.words
+    kind = next((k for k in _SIDES if flags[: len(k)] == list(k)), ())
+    flags = flags[len(kind) :]
+    if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
+        raise InputError(f"{place}: boxes of kind {' '.join(item.words)!r} are not supported")
+    columns, sides_of = _SIDES[kind]
+    rows = [row[: len(columns)] for row in item.body[:3]]
+    if len(rows) < 3:
+        raise InputError(f"{place}: the box bounds are incomplete")
+    lines = [item.line + k for k in (1, 2, 3)]
+    low, sides = sides_of(make_table(name, columns, rows, lines))
+    turn = np.array([[sides[0, 0], -sides[0, 1]], [sides[0, 1], sides[0, 0]]])
+    turn /= np.hypot(*sides[0])
+    sides = sides @ turn
+    # Dumps of old versions have no flags; they were periodic by default.
+    is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
+    try:
+        cell = make_cell(np.where(is_open, np.inf, np.diag(sides)), sides[1, 0])
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+    return _Box(low, turn, sides, cell)
+
+
+def _straight_sides(bounds: Table) -> tuple[Floats, Floats]:
+    """The lower corner (2,) and the sides (2, 2) of a box with a along x.
 
     Bounds of a tilted box (title ``xy xz yz``, tilts in a third column) are those of the rectangle
     around it: x_lo + min(0, xy), x_hi + max(0, xy) (docs.lammps.org, Howto triclinic).
     """
-    item = _item(name, items, "BOX BOUNDS")
-    place, flags = f"{name}, line {item.line}", item.words
-    tilted = flags[:3] == ["xy", "xz", "yz"]
-    flags = flags[3:] if tilted else flags
-    if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
-        raise InputError(
-            f"{place}: boxes of kind {' '.join(item.words)!r} are not supported; dump the box with "
-            "its first side along x (without triclinic/general)"
-        )
-    # The height of the layer does not matter, but its tilts do.
-    columns = ["lo", "hi", "tilt"] if tilted else ["lo", "hi"]
-    rows = [row[: len(columns)] for row in item.body[: len(columns)]]
-    if len(rows) < len(columns):
-        raise InputError(f"{place}: the box bounds are incomplete")
-    bounds = make_table(name, columns, rows, [item.line + 1 + k for k in range(len(rows))])
     low, high = bounds.numbers("lo")[:2], bounds.numbers("hi")[:2]
-    tilt = bounds.numbers("tilt") if tilted else np.zeros(1)
+    # The height of the layer does not matter, but its tilts do.
+    tilt = bounds.numbers("tilt") if "tilt" in bounds.header else np.zeros(1)
     for k in np.flatnonzero(tilt[1:])[:1] + 1:
         raise InputError(f"{bounds.place(k)}: tilted out of the plane; only xy may differ from 0")
     low[0] -= min(0.0, tilt[0])
     high[0] -= max(0.0, tilt[0])
     for k in np.flatnonzero(high <= low)[:1]:
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
-    # Dumps of old versions have no flags; they were periodic by default.
-    is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
     (width, height), lean = high - low, tilt[0]
-    try:
-        cell = make_cell(np.where(is_open, np.inf, high - low), lean)
-        return _Box(low, np.array([[width, 0.0], [lean, height]]), cell)
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from None
+    return low, np.array([[width, 0.0], [lean, height]])
+
+
+def _general_sides(bounds: Table) -> tuple[Floats, Floats]:
+    """The origin (2,) and the sides a, b (2, 2) of a box with any orientation in the plane.
+
+    Rows are a, b, c with a component of the origin each (title ``abc origin``).
+    """
+    sides = np.column_stack([bounds.numbers(axis) for axis in "xyz"])
+    flat = sides.copy()
+    flat[:2, :2] = flat[2, 2] = 0.0
+    for k in np.flatnonzero(flat.any(axis=1))[:1]:
+        raise InputError(f"{bounds.place(k)}: a and b must lie in the x–y plane, and c along z")
+    if np.linalg.det(sides) <= 0:
+        raise InputError(f"{bounds.place(0)}: the sides a, b, c are not a right-handed system")
+    return bounds.numbers("origin")[:2], sides[:2, :2]
+
+
+# By the first words after BOX BOUNDS: the columns, and what reads the sides from them.
+_SIDES: dict[tuple[str, ...], tuple[Sequence[str], Callable[[Table], tuple[Floats, Floats]]]] = {
+    ("xy", "xz", "yz"): (("lo", "hi", "tilt"), _straight_sides),
+    ("abc", "origin"): (("x", "y", "z", "origin"), _general_sides),
+    (): (("lo", "hi"), _straight_sides),
+}
 
 
 def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int]]:
@@ -332,7 +382,7 @@ def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int
     index = {label: int(rank[row]) for label, row in table.index("id").items()}
     axes = next((pair for pair in AXES if set(pair) <= set(table.header)), AXES[0])
     x = np.column_stack([table.numbers(axis) for axis in axes])
-    x = x @ box.vectors if axes in SCALED else x - box.low
+    x = x @ box.vectors if axes in SCALED else (x - box.low) @ box.turn
     if "radius" not in table.header and "diameter" in table.header:
         r = table.numbers("diameter") / 2
     else:
@@ -347,15 +397,14 @@ def _contacts(
 ) -> tuple[Contacts, Floats, int]:
     """Contacts that carry force, their forces (N_c, 2), and the number of pairs without force."""
     i, j = (table.lookup(column, index) for column in ("atom1", "atom2"))
-    normal_force, tangential_force = (
-        np.column_stack([table.numbers(column) for column in pair])
-        for pair in (("fx", "fy"), ("px", "py"))
-    )
-    active = np.flatnonzero(normal_force.any(axis=1) | tangential_force.any(axis=1))
+    pairs = [("fx", "fy"), ("px", "py")][: 2 if "px" in table.header else 1]
+    # Forces are on atom1 = i; granforce uses those on j.
+    parts = -np.array([[table.numbers(column) for column in pair] for pair in pairs])
+    parts = np.moveaxis(parts, 1, 2)
+    active = np.flatnonzero(parts.any(axis=(0, 2)))
     if not len(active):
         raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
-    # Forces are on atom1 = i; granforce uses those on j.
-    on_j = -(normal_force + tangential_force)[active]
+    on_j = parts.sum(axis=0)[active]
     left = distinct_pairs(i[active], j[active], on_j, LOAD_MISFIT, lambda c: table.place(active[c]))
     skipped, active = len(i) - len(active), active[left]
 
@@ -365,18 +414,71 @@ def _contacts(
     joined = listed_contacts(x, r, cell, i[active], j[active], place)
     if "distance" in table.header:
         _check_distances(joined.length, table.numbers("distance")[active], r.max(), place)
-    forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)
+    forces = components(on_j[left], joined.normal)
+    if len(parts) == 2:
+        _check_along(components(parts[0][active], joined.normal), forces, place)
     return joined, forces, skipped
+
+
+def _notes_on_total(forces: Floats, mu: float) -> list[str]:
+    """A note if total forces, as components (N_c, 2), have no tangential part despite friction."""
+    if mu == 0 or np.abs(forces[:, 1]).max() > SKEW * np.hypot(*forces.T).mean():
+        return []
+    return [
+        "all forces point along the line of centres: if fx, fy are only the normal force, name the "
+        "columns of the tangential force, too, as in --columns px=…,py=… (columns=)"
+    ]
+
+
+def _wall_contacts(
+    atoms: Table, x: Floats, r: Floats, index: Mapping[Any, int], box: _Box
+) -> WallContacts:
+    """The WallContacts in the columns f_ID[1] … f_ID[8] of ``fix ID … wall/gran … contacts``.
+
+    They are whether a grain touches, the force on it, the point of contact and its radius
+    (docs.lammps.org, fix wall/gran), in LAMMPS' own frame.
+    """
+    fixes = [name[:-3] for name in atoms.header if name[:2] == "f_" and name.endswith("[8]")]
+    axes = (1, 2, 3, 5, 6)
+    values = {fix: np.column_stack([atoms.numbers(f"{fix}[{k}]") for k in axes]) for fix in fixes}
+    at = [(fix, row) for fix in fixes for row in np.flatnonzero(values[fix][:, 0])]
+    if not at:
+        raise InputError(
+            f"{atoms.name}: no contact with a wall; dump the columns f_ID[*] of a fix wall/gran "
+            "with the keyword contacts, or leave out walls (--walls)"
+        )
+    names, rows = zip(*at, strict=True)
+    force, point = np.hsplit(np.array([values[fix][row, 1:] for fix, row in at]), 2)
+    grain = atoms.some(rows).lookup("id", index)
+    out = box.cell.nearest(point - box.low - x[grain])
+    length = np.hypot(*out.T)
+    for c in np.flatnonzero(np.abs(length - r[grain]) > OVERLAP_ALLOWED * r[grain])[:1]:
+        raise InputError(
+            f"{atoms.place(rows[c])}: by {names[c]}[5], {names[c]}[6] the wall is "
+            f"{length[c]:.3g} from the centre, but the radius is {r[grain[c]]:.3g}; are they of a "
+            "fix wall/gran with the keyword contacts, and its planes across the layer?"
+        )
+    normal = out / length[:, None]
+    # A fix has up to two parallel planes.
+    sides = [
+        f"{fix[2:]} ({u:g}, {v:g})"
+        for fix, (u, v) in zip(names, np.round(normal) + 0.0, strict=True)
+    ]
+    planes, wall = np.unique(sides, return_inverse=True)
+    return WallContacts(grain, wall, normal, -force, planes.tolist())
 
 
 def _with_names(table: Table, named: bool) -> Table:
     """The table of contacts with CONTACT_COLUMNS as header, matched by name or else by order.
 
-    By name, the distance may be missing, as it is only a check.
+    By name, the distance may be missing, as it is only a check, and px and py both, if fx and fy
+    are the total force.
     """
-    needed = set(CONTACT_COLUMNS) - {"distance"}
-    if named or needed <= set(table.header):
-        table.require(*(column for column in CONTACT_COLUMNS if column in needed))
+    is_total = not {"px", "py"} & set(table.header)
+    optional = ("distance", "px", "py") if is_total else ("distance",)
+    needed = [column for column in CONTACT_COLUMNS if column not in optional]
+    if named or set(needed) <= set(table.header):
+        table.require(*needed)
         return table
     columns = [column for column in table.header if column != "index"]
     if len(columns) != len(CONTACT_COLUMNS):
@@ -399,14 +501,10 @@ def _check_distances(
         )
 
 
-def _components(
-    n: Floats, normal_force: Floats, tangential_force: Floats, place: Callable[[int], str]
-) -> Floats:
-    total = normal_force + tangential_force
-    skew = np.abs(components(normal_force, n)[:, 1])
-    for c in np.flatnonzero(skew > SKEW * np.hypot(*total.T).mean())[:1]:
+def _check_along(normal_force: Floats, forces: Floats, place: Callable[[int], str]) -> None:
+    """InputError if a normal force has a tangential component; all (N_c, 2) are components."""
+    for c in np.flatnonzero(np.abs(normal_force[:, 1]) > SKEW * np.hypot(*forces.T).mean())[:1]:
         raise InputError(
             f"{place(c)}: the normal force does not point along the line of centres; "
             "name the columns, as in --columns fx=…,fy=… (columns=)"
         )
-    return components(total, n)

@@ -70,7 +70,7 @@ class Layer(NamedTuple):
     on_walls: WallContacts | None  # None without contacts with walls
 
 
-class _Network(NamedTuple):
+class Network(NamedTuple):
     """Grains, their contacts that carry force, and the forces."""
 
     x: Floats  # (N, 2)
@@ -96,17 +96,26 @@ def packing_of(layer: Layer, options: Options, source: str) -> Packing:
     """The packing of a layer with the simulation's forces; source: name of the program."""
     check_grains(len(layer.grains.rows), options.most_grains, layer.grains.name)
     x, r = _disks(layer, options.cell)
-    _check_walls(layer, options.walls)
+    check_walls(options.walls)
+    if options.walls and layer.on_walls is None:
+        raise InputError(f"{layer.links.name}: no contact with a wall; leave out walls (--walls)")
+    skipped = int(np.sum(~layer.force.any(axis=1)))
     network = _network(layer, x, r, options)
-    info: dict[str, Any] = {
-        "forces": "given",
-        "contacts_skipped": int(np.sum(~layer.force.any(axis=1))),
-    }
-    if layer.on_walls is not None:
-        info["notes"] = [_note_of(layer.on_walls, options)]
-    if options.walls and layer.on_walls is not None:
-        network = _with_walls(network, layer.on_walls)
-        info["walls"] = len(network.r) - len(r)
+    return assembled(
+        layer.on_walls, network, options, source, forces="given", contacts_skipped=skipped
+    )
+
+
+def assembled(
+    on_walls: WallContacts | None, network: Network, options: Options, source: str, **info: Any
+) -> Packing:
+    """The packing of a network and, if requested, its walls; source: name of the program."""
+    count = len(network.r)
+    if on_walls is not None:
+        info["notes"] = [_note_of(on_walls, options)]
+    if options.walls and on_walls is not None:
+        network = _with_walls(network, on_walls)
+        info["walls"] = len(network.r) - count
     packing = make_packing(
         *(network.x, network.r, options.cell.box, network.contacts, network.forces, options.mu),
         info={"source": source},
@@ -115,7 +124,7 @@ def packing_of(layer: Layer, options: Options, source: str) -> Packing:
     packing = with_given_forces(packing, reverse=options.reverse, **info)
     if options.walls == "held":
         load = packing.load.copy()
-        load[len(r) :] = np.nan
+        load[count:] = np.nan
         packing = packing._replace(load=load)
     return packing
 
@@ -145,15 +154,13 @@ def _disks(layer: Layer, cell: Cell) -> tuple[Floats, Floats]:
     return x, r
 
 
-def _check_walls(layer: Layer, walls: str | None) -> None:
-    """InputError unless the layer has contacts with walls if they are requested."""
+def check_walls(walls: str | None) -> None:
+    """InputError unless walls take part in one of the ways of WALLS, or none."""
     if walls not in (None, *WALLS):
         raise InputError(f"walls are {' or '.join(WALLS)}, got {walls!r:.40}")
-    if walls and layer.on_walls is None:
-        raise InputError(f"{layer.links.name}: no contact with a wall; leave out walls (--walls)")
 
 
-def _network(layer: Layer, x: Floats, r: Floats, options: Options) -> _Network:
+def _network(layer: Layer, x: Floats, r: Floats, options: Options) -> Network:
     """The network of the contacts of two grains that carry force, each once."""
     carrying = np.flatnonzero(layer.force.any(axis=1))
     if not len(carrying) and not options.walls:
@@ -169,7 +176,7 @@ def _network(layer: Layer, x: Floats, r: Floats, options: Options) -> _Network:
     contacts = listed_contacts(
         *(x, r, options.cell, layer.i[rows], layer.j[rows]), lambda c: layer.links.place(rows[c])
     )
-    return _Network(x, r, contacts, components(layer.force[rows], contacts.normal))
+    return Network(x, r, contacts, components(layer.force[rows], contacts.normal))
 
 
 def _note_of(on_walls: WallContacts, options: Options) -> str:
@@ -187,7 +194,7 @@ def _note_of(on_walls: WallContacts, options: Options) -> str:
     )
 
 
-def _with_walls(network: _Network, on_walls: WallContacts) -> _Network:
+def _with_walls(network: Network, on_walls: WallContacts) -> Network:
     """The network with a grain for each wall, behind the places where it is touched.
 
     Forces on it have no lever arm, so its torque does not count.
@@ -204,7 +211,7 @@ def _with_walls(network: _Network, on_walls: WallContacts) -> _Network:
     radii = np.concatenate([r, np.full(len(walls), radius)])
     contacts = make_contacts(grain, len(r) + wall, normal, r[grain] + radius, radii)
     contacts = contacts._replace(arm_i=r[grain], arm_j=np.zeros(len(grain)))
-    return _Network(
+    return Network(
         np.concatenate([x, places]),
         radii,
         network.contacts.joined(contacts),

@@ -12,6 +12,7 @@ from granforce.cell import Cell
 from granforce.packing.importers.disks import enclosed
 from granforce.packing.importers.geometry import (
     check_disks,
+    components,
     listed_contacts,
     touching_contacts,
     with_doubts_noted,
@@ -47,6 +48,7 @@ from granforce.types import Floats
 NAMES = ("id", "x", "y", "r", "fx", "fy", "torque", "open")
 NAMES += ("i", "j", "nx", "ny", "length", "f_n", "f_t")
 _SHORT = {"fn": "f_n", "ft": "f_t"}  # names that many tables have
+_TOTAL = ("fx", "fy")  # the force on j, instead of its components f_n, f_t
 
 
 @packing_noted
@@ -75,8 +77,8 @@ def read_table(
         open, 1 if the balance of a grain is not required and 0 otherwise.
     contacts : path, open file or DataFrame, optional
         Columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny, length
-        (otherwise nearest images are joined) and f_n, f_t (or fn, ft). Without contacts, grains
-        closer than the tolerance touch.
+        (otherwise nearest images are joined) and f_n, f_t (or fn, ft), or the total force on j as
+        fx, fy. Without contacts, grains closer than the tolerance touch.
     mu : float
         Friction coefficient.
     box : (2,) array, optional
@@ -206,7 +208,7 @@ def _full(columns: Mapping[str, str]) -> Mapping[str, str]:
 def _with_full_names(table: Table) -> Table:
     """The table with forces called f_n and f_t, without their unit."""
     named = table.named([_SHORT.get(name, name) for name in table.header])
-    return named.in_packing_unit(_SHORT.values())
+    return named.in_packing_unit((*_SHORT.values(), *_TOTAL))
 
 
 def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:
@@ -241,10 +243,15 @@ def _contacts_and_forces(
 ) -> tuple[Contacts, Floats | None]:
     """Contacts of a table and their forces (N_c, 2), or None without forces."""
     joined = _contacts(table, grains, x, r, cell)
+    header = set(table.header)
+    is_total = not header & {"f_n", "f_t"} and bool(header & set(_TOTAL))
     if forces is None:
-        forces = "f_n" in table.header or "f_t" in table.header
+        forces = is_total or bool(header & {"f_n", "f_t"})
     if not forces:
         return joined, None
+    if is_total:
+        total = np.column_stack([table.numbers(column) for column in _TOTAL])
+        return joined, components(total, joined.normal)
     normal = table.numbers("f_n")
     without_friction = mu == 0 and "f_t" not in table.header
     tangential = np.zeros(len(normal)) if without_friction else table.numbers("f_t")
