@@ -17,7 +17,7 @@ from packings import packed
 
 from granforce.cli import command_table, commands, entry_point, option_table, parser
 from granforce.cli import frames as series_of_frames
-from granforce.cli.path_roles import ROLES, Input, Output, StorePath, Workplace
+from granforce.cli.path_roles import ROLES, Input, Output, Series, StorePath, Workplace
 from granforce.forces.build import ensemble
 from granforce.packing.exporters import save_lammps
 from granforce.packing.importers import load_packing, read_table, save_packing
@@ -376,7 +376,7 @@ def _clashes():
     """(command, words) in which an output is an input, another output, or inside the store."""
     for command, one in PARSERS.items():
         outputs = _of_role(one, Output, Workplace)
-        others = [*outputs, *_of_role(one, Input, StorePath)]
+        others = [*outputs, *_of_role(one, Input, Series, StorePath)]
         for out in outputs:
             for other in others:
                 if other is not out:

@@ -118,6 +118,8 @@ READ = {
 # Arguments for files that no command writes, or that a server opens.
 OTHERS = {
     ("app", "packing"),
+    ("app", "basic_auth"),
+    ("infer", "pressures"),
     *((f"import {name}", "grains") for name in ("table", "blocks", "pegs")),
     *((f"import {name}", "contacts") for name in ("table", "pegs")),
 }
