@@ -288,9 +288,10 @@ class Player {
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
   }
 
-  /** The packing as SVG text; between two compared networks, its caption says where. */
+  /** The packing as SVG text; its caption names the push, or the place between two compared networks. */
   picture(caption) {
-    const { replay } = this, where = replay.swinging ? [`Shown: ${replay.title}.`] : []
+    const { pushed, replay, scene } = this, where = replay.swinging ? [`Shown: ${replay.title}.`] : []
+    if (pushed.held && pushed.load) where.push(`Contact ${replay.walk.backbone[this.pins.pushedContact(scene)]}: ${pushed.words}.`)
     return this.scene.picture({ ...caption, lines: [...where, ...caption.lines] })
   }
 

@@ -23,7 +23,12 @@ export class Pins {
 
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
-    if (this.player.pushable && !scene.frozen) this.push(context, scene)
+    if (this.player.pushable && !scene.frozen) {
+      context.save()
+      if (scene.selected === null) markSelected(context, scene, this.pushedContact(scene))
+      this.push(context, scene)
+      context.restore()
+    }
     if (this.player.pushes) return // which ignores held forces
     if (!contacts.length && !ranked.length) return
     const held = new Map(), rank = new Map(), { ratio } = scene
@@ -39,37 +44,38 @@ export class Pins {
     context.restore()
   }
 
-  /** The two forces that push the disks of a contact apart, the selected or the highlighted one; faint at its
-   * periodic copies. */
+  /** The contact to push: the selected or the highlighted one. */
+  pushedContact(scene) {
+    const { walk } = this.player.replay
+    return scene.selected ?? walk.contact[walk.inviting] ?? -1
+  }
+
+  /** The two forces that push the disks of a contact apart; faint at its periodic copies. */
   push(context, scene) {
-    const { geometry, ratio, palette, scale } = scene, { replay, pushed } = this.player
-    const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
-    const first = geometry.contact.indexOf(contact), arrow_px = ARROW_PX + GROWN_PX * pushed.part
-    if (scene.selected === null) markSelected(context, scene, contact)
-    context.save()
-    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    const { geometry, palette, scale } = scene, contact = this.pushedContact(scene)
+    const first = geometry.contact.indexOf(contact), beyond = (ARROW_PX + GROWN_PX * this.player.pushed.part) / scale
     context.lineCap = context.lineJoin = "round"
-    for (const { k, ...ends } of scene.segments((each) => each === contact)) {
-      const a = scene.toPixel(...ends.a), b = scene.toPixel(...ends.b)
+    for (const { k, a, b } of scene.segments((each) => each === contact)) {
       const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
       context.globalAlpha = k === first ? 1 : COPY
       context.beginPath()
       for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
         const edge = scene.outline(grain) ? geometry.unit / 2 : geometry.radius[grain]
-        const long = way * (scale * edge + arrow_px)
-        arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
+        const long = way * (edge + beyond)
+        arrow(context, from, from.map((v, d) => v + long * u[d]), 12 / scale, 0.7)
       }
       for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
-        context.lineWidth = width
+        context.lineWidth = width / scale
         context.strokeStyle = colour
         context.stroke()
       }
     }
-    context.restore()
+    context.globalAlpha = 1
   }
 
-  /** In an exported picture: a spot on each known contact, hollow with an error bar. */
+  /** In an exported picture: the push, or a spot on each known contact, hollow with an error bar. */
   onSheet(sheet, scene) {
+    if (this.player.pushed.held) return this.push(sheet, scene)
     const { contacts = [], exact = [] } = this.pins, { known, halo } = scene.palette
     for (const [n, held] of [...contacts].entries()) {
       for (const { middle } of scene.segments((contact) => contact === held)) {

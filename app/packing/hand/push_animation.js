@@ -36,10 +36,12 @@ export class Pushed {
   }
 
   /** path: networks under loads up to the largest one with equilibrium; part: fraction of the longest arrow. */
-  take(path, load, part) {
+  take(path, load, part, limit) {
     const { player } = this, known = path.values?.length > 0 && path.normal.length === path.values.length * player.replay?.walk.contacts
     if (!this.possible) return
     Object.assign(this, { load, part, moves: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
+    this.words = `push ${load.toFixed(2)} ⟨fₙ⟩`
+    if (known && limit !== null) this.words += `, F_crit ${path.values.at(-1).toFixed(2)} ⟨fₙ⟩, limit load ${limit.toFixed(2)} ⟨fₙ⟩`
     this.tellMotion()
     if (load > 0 && known) this.show({ ...networkAt(path, load), place: "pushed" })
     else if (load > 0 || this.held) this.show()

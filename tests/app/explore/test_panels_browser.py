@@ -137,6 +137,13 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit, serv
     until(page, "scene.hand.player.pushed.motion !== null")
     assert scene(page, "scene.offset") is None  # a still, with arrows
     drawn(page)
+    picture = scene(
+        page,
+        "scene.hand.player.picture({ lines: [], width: 1, "
+        "bar: { low: '0', high: '1', stops: ['#fff', '#000'] } })",
+    )
+    assert re.search(r"Contact \d+: push [\d.]+ .*F_crit [\d.]+ .*limit load", picture)
+    assert picture.count(scene(page, "scene.palette.selected")) > 6  # the arrows
     page.get_by_label("animate the first motion").click()
     until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
     assert scene(page, "scene.offset.field.length") == 2 * DISKS

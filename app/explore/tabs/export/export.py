@@ -120,7 +120,8 @@ FILES = {
 }
 KINDS = {key: kind for group in GROUPS.values() for key, kind in group.items()}
 HELP = """
-Each file shows the current view, including pulled and held forces; playing pauses. Pictures have a
+Each file shows the current view, including pulled and held forces but not a push, which ends with
+its tab; playing pauses. Pictures have a
 colour bar, scales and a caption. The movie plays from the first network to the last, or back and
 forth between two, at the player's speed. The HTML page needs no server and no network connection.
 Contacts: one row each, with disks, forces as packed and on screen, the range over the networks and,

@@ -55,7 +55,7 @@ export function render({ model, view }) {
     player()?.listeners.add(look)
     owner = player()?.pushed
     shows = true
-    owner?.take(model.path, load, load / most())
+    owner?.take(model.path, load, load / most(), model.limit)
     shows = false
   }
 

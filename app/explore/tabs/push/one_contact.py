@@ -25,7 +25,7 @@ ASKED = (
 FOUND = (
     "<b>At F<sub>crit</sub> {opened} contacts open {ring}, {slid} slide {spot} and {kept} "
     "hold.</b> Arrows {arrow}: the first motion, {most:.3g} times its rms for the fastest disk; "
-    "rotations are not drawn."
+    "rotations are not drawn. Links keep the contact, not the push: repeat it there."
 )
 MARKS = {
     "ring": '<span style="display:inline-block;width:8px;height:8px;border:2px solid;'
