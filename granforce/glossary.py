@@ -120,9 +120,8 @@ TERMS = {
         "indeterminacy by intervals",
         "The mean length of the intervals of fₙ and fₜ, divided by the mean of their midpoints,"
         " which are signed for fₜ: η3 = ⟨max − min⟩ / ⟨(max + min)/2⟩. The paper multiplies it by "
-        "0.15, so that its curve lies beside those of η1 and η2. The value seen "
-        "grows with the number of networks. It can exceed the exact one: midpoints differ, and "
-        "networks of the paper's walk are slightly outside S.",
+        "0.15, to plot it beside η1 and η2. The value seen grows with the number of networks, and "
+        "can exceed the exact one, as midpoints differ.",
         "η3",
     ),
     "width": Term(

@@ -107,6 +107,7 @@ def measured(S):
 
 
 MEASUREMENT = b"contact,f_n,f_t,sigma_n,sigma_t\n0,1.5,,0.1,\n"
+PRESSURES = b"grain,pressure,sigma\n0,1.5,0.1\n"
 BOUNDS = b"contact,f_n_low,f_n_high\n0,0,2\n"
 _part = {"states": 8, "chains": 2}
 
@@ -118,6 +119,11 @@ CALLS = {
     "infer, drawn": lambda S, _: gf.infer(S, *partly(S, 4), **_part),
     "remeasured": lambda S, _: gf.remeasured(S, *partly(S, 4), **_part),
     "carrying": lambda S, _: gf.carrying(S, *partly(S, 4)),
+    "grain_pressures": lambda S, _: gf.grain_pressures(S, S.original),
+    "informative_grains": lambda S, _: gf.informative_grains(
+        S, gf.sample_uniform(S, 8).flat, 0.1, 2
+    ),
+    "read_pressures": lambda S, _: read(gf.read_pressures, [PRESSURES]),
     "informative": lambda S, _: gf.informative(S, 2, check=1, states=40),
     "pack": lambda S, _: gf.pack(6, 0.5, 1),
     "margin": lambda S, _: gf.margin(S.packing),

@@ -275,7 +275,10 @@ MEANINGS = {
     for command in (*COMMAND_TABLE, *FORMATS)
     for name in (*command.lines, *command.columns)
 }
-RARE = {"directions_taken_as_pinned", "as_narrower_than"}  # in an S too thin to be resolved
+RARE = {  # of a thin S, of wedges, of measured pressures
+    *("directions_taken_as_pinned", "as_narrower_than", "wedged_grains"),
+    *("measured_pressures", "suspect_grains"),
+}
 
 
 def test_help_explains_every_line_of_every_report_as_the_store_does(cache, capsys):

@@ -325,6 +325,16 @@ COMMANDS = (
                 options("--sample-seed --chains:uniform --again"),
             ),
             Rule(
+                "with --pressures alone, --states 0 and no --out",
+                lambda arguments: (
+                    arguments.pressures is not None
+                    and arguments.measured is None
+                    and arguments.states == 0
+                    and arguments.out is None
+                ),
+                options("--unit"),
+            ),
+            Rule(
                 "with --states 0 and without --certain or --frames",
                 lambda arguments: (
                     arguments.states == 0 and not arguments.certain and arguments.frames is None

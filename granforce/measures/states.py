@@ -139,7 +139,7 @@ def eta3(low: Floats, high: Floats | None = None) -> float:
     Returns
     -------
     float
-        Mean length of the intervals over the mean of their midpoints.
+        Mean length of the intervals, divided by the mean of their midpoints.
 
     Raises
     ------

@@ -70,7 +70,8 @@ def test_a_narrow_page_and_its_help_have_no_serious_finding(visit):
     page.get_by_role("button", name="Help and keys").click()
     help = page.get_by_role("dialog")
     help.get_by_text("play; pause at the nearest network").wait_for()
-    assert help.evaluate("e => e.scrollHeight > e.clientHeight && !e.scrollTop")
+    page.wait_for_function("e => e.scrollHeight > e.clientHeight", arg=help.element_handle())
+    assert help.evaluate("e => e.scrollTop") == 0
     expect(help.get_by_role("button", name="Close")).to_be_in_viewport(ratio=1)
     assert findings(page) == []
 

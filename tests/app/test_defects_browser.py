@@ -230,7 +230,7 @@ def test_uploaded_packings_show_their_own_number_of_disks_and_stay(visit, tmp_pa
     page.get_by_role("tab", name="Friction").click()
     searched(page, "tab=statistics")
     page.get_by_role("link", name="Learn", exact=True).first.click()
-    page.get_by_role("heading", name="How hard does the wall press?").first.wait_for()
+    page.get_by_role("heading", name="Which will it be?").first.wait_for()
     page.get_by_role("link", name="Explore", exact=True).click()
     page.locator(".source", has_text="mine.npz").wait_for(state="attached")
     page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()

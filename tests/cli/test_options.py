@@ -41,6 +41,7 @@ LINES = {
         f"{MU} --measured m.csv --states 0",
         f"{MU} --measured m.csv --states 0 --certain",
         "p.npz --measured m.csv --states 8",
+        "p.npz --pressures g.csv --pressure-column G2 --calibration 1,0,0.1 --states 0",
         f"{FRAMES} --frames all --mu 0.3 --states 4 --workers 1 --strict",
     ],
     "informative": [f"{MU} --states 8", "p.npz --states 8"],
@@ -71,7 +72,7 @@ LINES = {
         "--quick --reduce done/cells.zarr --out here",
         "--table table.zarr --out here",
     ],
-    "app": [""],
+    "app": ["", "--basic-auth users.json --cookie-secret signs"],
     "docs": ["--out reference.html"],
     "completion": ["bash"],
     "import lammps": [
@@ -130,6 +131,8 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("place")
     save_packing(packed(8, 0.3), folder / "p.npz")
     save_packing(scene("slope"), folder / "blocks.npz")
+    (folder / "users.json").write_text('{"ann": "word"}')
+    (folder / "g.csv").write_text("grain,G2\n0,1\n")
     (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     (folder / "bodies.csv").write_text("body,x,y\n")

@@ -71,7 +71,7 @@ def test_a_script_sends_what_its_component_handles_and_reads_what_it_is_sent(nam
 
 def test_components_that_send_and_hear_are_known():
     handled = {name for name, kind in COMPONENTS.items() if kind._handlers}
-    assert len(handled) == 13 and {"Player", "Workbench", "Lesson"} <= handled
+    assert len(handled) == 14 and {"Player", "Workbench", "Lesson"} <= handled
 
 
 @pytest.mark.parametrize(
