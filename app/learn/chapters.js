@@ -44,8 +44,8 @@ const BOX = { x: { low: 1, high: 4, label: "normal force at the floor (green)" }
 export const CHAPTERS = [
   {
     name: "ladder", title: "A ladder", heading: "Which will it be?",
-    text: ({ mu }) => `A ladder of weight 1 leans against a wall. Floor and wall are rough: friction is at most μ = ${mu} times the normal force. A mechanics course cannot solve this: there are four unknown forces, a normal force and friction at each end, but only three equations of balance.`,
-    ask: "How hard does the wall push back, that is, how large is its normal force?",
+    text: ({ mu }) => `A ladder of weight 1 leans against a rough wall on a rough floor: friction is at most μ = ${mu} times the normal force (pale wedges). A mechanics course solves it without friction at the wall. With it, four forces are unknown, two at each end, and there are three equations of balance.`,
+    ask: "The drawing shows one solution. How large is the wall’s normal force?",
     doing: "Drag the dot as far as it goes, to both sides, or drag an arrow. Wherever you stop, the ladder is in balance.",
     verdict: ({ low, high }, prediction) => ({
       answer: `Anything from ${two(low)} to ${two(high)}.`,

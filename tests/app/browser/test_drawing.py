@@ -653,7 +653,7 @@ def test_a_pull_is_back_after_a_push(run):
             look()
             pushed.begin()
             look()
-            pushed.take(path, 0.5, 0.5)
+            pushed.take(path, 0.5, 0.5, null)
             look()
             hand.receive({ held: pulled(4) })
             look()
