@@ -370,16 +370,6 @@ def test_friction_shows_figures_1_4_and_6_and_the_claims_with_verdicts(lasting):
     assert verdicts.count() >= 5 and "largest" in verdicts.first.inner_text()
 
 
-def test_the_line_of_results_opens_tables_at_the_height_of_a_laptop(visit):
-    page = visit()
-    page.set_viewport_size({"width": 1440, "height": 900})
-    results = page.get_by_role("region", name="Results")
-    note = results.get_by_text("Not counted:")
-    expect(note).to_be_hidden()
-    results.get_by_role("button", name="tables").click()
-    expect(note).to_be_visible()
-
-
 def test_what_is_unfolded_comes_into_view(visit):
     page = visit("?tab=intervals")
     page.get_by_role("button", name="How many networks does it take?").click()
