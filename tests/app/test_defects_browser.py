@@ -414,3 +414,13 @@ MOST_BARS = """() => {
     }
     count()
 }"""
+
+
+def test_the_line_of_results_opens_tables_at_the_height_of_a_laptop(visit):
+    page = visit()
+    page.set_viewport_size({"width": 1440, "height": 900})
+    results = page.get_by_role("region", name="Results")
+    note = results.get_by_text("Not counted:")
+    expect(note).to_be_hidden()
+    results.get_by_role("button", name="all numbers").click()
+    expect(note).to_be_visible()
