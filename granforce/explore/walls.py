@@ -18,7 +18,7 @@ from granforce.explore.billiard import BLOCK
 from granforce.explore.row_matrix import RowMatrix, with_rows
 from granforce.explore.thin import ThinMatrix
 from granforce.forces import hull
-from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
+from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of, unbalance
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.grain_pressures import Rows, no_rows
 from granforce.numerics import certificates, contact_program, wall_matrix
@@ -264,9 +264,7 @@ def _is_thin(setup: _Setup, y: Floats) -> bool:
         return False
     for _ in range(POLISH):
         y = _balanced(setup, y, matrix, moving)
-    # Global rows add up forces of all contacts, and so do their rounding errors.
-    off = np.abs(A @ y - b) / np.maximum(1.0, np.abs(b))
-    if not (off.max(initial=0.0) <= BALANCED / 10 and y[moving].min() > 0):
+    if not (unbalance(A, b, y) <= BALANCED / 10 and y[moving].min() > 0):
         return True
     g = np.random.default_rng(0).standard_normal((PROBES, matrix.count))
     change = matrix.moved(g, None, POLISH)[:, : len(moving)]

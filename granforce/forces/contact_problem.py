@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
 
 from granforce.forces import knowledge
 from granforce.forces.balance import left_open_in
@@ -22,6 +21,7 @@ from granforce.numerics import (
     certified_values,
     contact_matrix,
     contact_program,
+    inner_point,
     interior_point,
     linear_programs,
 )
@@ -40,8 +40,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, depend on others. Dense matrices are used
 # up to this number of rows.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
-# Number of corrections in `in_balance`, and ε there.
-_RESTORED, _DEPENDENT_SHIFT = 3, 1e-12
+# Number of corrections in `in_balance`.
+_RESTORED = 3
 
 
 def balance_of(
@@ -294,21 +294,19 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
 
 
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
-    """y (n,), corrected to A y = b by the least change relative to y + away.
-
-    With D ∝ diag(|y| + away) the change is D s of the least |s|, from (1, D Aᵀ; A D, −ε) (s, λ) =
-    (0, b − A y); ε > 0 keeps rows that depend on others solvable.
-    """
-    rows, columns = A.shape
+    """y (n,), corrected to A y = b by the least change relative to |y| + away."""
     for _ in range(_RESTORED):
         size = np.abs(y) + away
         size /= size.max(initial=1e-300)
-        scaled = A @ sparse.diags(size)
-        both = [
-            [sparse.identity(columns), scaled.T],
-            [scaled, -_DEPENDENT_SHIFT * sparse.identity(rows)],
-        ]
-        factor = partial(splu, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
-        factors = cancelling.apart(factor, sparse.block_array(both, format="csc"))
-        y = y + size * factors.solve(np.append(np.zeros(columns), b - A @ y))[:columns]
+        scaled, still = sparse.csc_matrix(A @ sparse.diags(size)), np.zeros(len(y))
+        change, _ = cancelling.apart(inner_point.balanced, scaled, b - A @ y, still)
+        y = y + size * change
     return y
+
+
+def unbalance(A: sparse.csr_matrix, b: Floats, y: Floats) -> float:
+    """Largest |A y − b|, relative to b in rows where that exceeds 1.
+
+    Global rows add up forces of all contacts, and so do their rounding errors.
+    """
+    return float(np.max(np.abs(A @ y - b) / np.maximum(1.0, np.abs(b)), initial=0.0))

@@ -11,7 +11,12 @@ from scipy import sparse
 from scipy.sparse.linalg import norm
 
 from granforce.forces.balance import LARGEST_RANK, left_free
-from granforce.forces.contact_problem import centre_of, in_balance, independent_problem_of
+from granforce.forces.contact_problem import (
+    centre_of,
+    in_balance,
+    independent_problem_of,
+    unbalance,
+)
 from granforce.forces.ensemble import Ensemble, Hull
 from granforce.numerics import wall_matrix
 from granforce.numerics.contact_program import PINNED
@@ -22,8 +27,7 @@ from granforce.types import Floats, Integers, Mask
 
 # Least distance from a wall to a reliable analytic centre, in ⟨f_n⟩.
 _WELL_INSIDE = 1e-5
-# Unbalance of a centre, relative to the right-hand side if that is larger than 1, above which its
-# balance is restored.
+# `unbalance` of a centre above which its balance is restored.
 _UNBALANCED = 1e-9
 
 
@@ -90,7 +94,7 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
     inner = np.append(inner, middle.y[y.size :])
     A, b, _ = ensemble.scaled_form
-    if np.max(np.abs(A @ inner - b) / np.maximum(1.0, np.abs(b)), initial=0.0) <= _UNBALANCED:
+    if unbalance(A, b, inner) <= _UNBALANCED:
         return inner
     inner = in_balance(A, b, inner)
     return inner if inner.min(initial=1.0) > 0 else None
