@@ -45,6 +45,7 @@ from granforce.forces.likeliest import Likeliest
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
 from granforce.packing.importers.network import WORTH_REVERSING, accuracy_of, worth_reversing
 from granforce.packing.importers.notes import noted
+from granforce.packing.importers.snapshots import with_walls
 from granforce.packing.importers.text import Source, check_grains
 from granforce.records import InputError, Packing, friction, positive
 from granforce.types import Floats, Integers, Mask
@@ -202,7 +203,7 @@ def read_pegs(
     notes += grains.notes
     notes += [worth_reversing(saved, reverse)] if saved > WORTH_REVERSING else []
     notes += sides.notes
-    ids = _ids(grains, sides)
+    ids = with_walls(grains.listing.ids, len(sides.names))
     lines = {
         **grains.lines(),
         **_pair_lines(grains, assembly),
@@ -426,11 +427,6 @@ def _packing(balance: _Balance, fit: _Fit, frame: float, walls: int) -> Packing:
         "largest_gap": float(np.abs(c.gap / shorter).max()),
     }
     return packing._replace(info=info | accuracy_of(packing))
-
-
-def _ids(grains: _Grains, sides: _Sides) -> Floats:
-    """Ids of the grains in the files; −1, −2, … for walls."""
-    return np.concatenate([grains.listing.ids, -1.0 - np.arange(len(sides.names))])
 
 
 def _pair_lines(grains: _Grains, assembly: Assembly) -> dict[str, Any]:

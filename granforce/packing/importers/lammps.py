@@ -26,7 +26,7 @@ from granforce.packing.importers.layers import (
 )
 from granforce.packing.importers.network import LOAD_MISFIT, refuse_idle_reverse, with_edge
 from granforce.packing.importers.notes import packing_noted, with_notes
-from granforce.packing.importers.snapshots import Snapshot, Snapshots
+from granforce.packing.importers.snapshots import Snapshot, Snapshots, with_walls
 from granforce.packing.importers.text import (
     Source,
     Table,
@@ -237,7 +237,7 @@ def open_lammps(
             found = with_notes(found, _notes_on_total(forces, mu))
         found = found if walls or np.isfinite(found.volume) else with_edge(found)
         ids = np.sort(atoms.numbers("id"))
-        return Snapshot(found, np.concatenate([ids, -1.0 - np.arange(len(found.r) - len(ids))]))
+        return Snapshot(found, with_walls(ids, len(found.r) - len(ids)))
 
     whole = steps[:-1] if cut else steps
     empty = {step: empty[step] for step in whole if step in empty}

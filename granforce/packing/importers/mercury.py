@@ -26,7 +26,7 @@ from granforce.packing.importers.layers import (
 )
 from granforce.packing.importers.network import refuse_idle_reverse
 from granforce.packing.importers.notes import packing_noted
-from granforce.packing.importers.snapshots import Snapshot, Snapshots
+from granforce.packing.importers.snapshots import Snapshot, Snapshots, with_walls
 from granforce.packing.importers.text import Source, Table, read_rows
 from granforce.records import InputError, Packing
 from granforce.system.files import path_text
@@ -183,8 +183,7 @@ def open_mercury(
         layer = _layer(step.grains(), contacts.of(times[number]), options.cell)
         packing = packing_of(layer, options, "mercury")
         info = packing.info | {"time": step.time}
-        walls = -1.0 - np.arange(info.get("walls", 0))
-        ids = np.concatenate([np.arange(len(layer.grains.rows)), walls])
+        ids = with_walls(np.arange(float(len(layer.grains.rows))), info.get("walls", 0))
         return Snapshot(packing._replace(info=info), ids)
 
     return Snapshots("time step", numbers, read, lost, empty)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from granforce.fields import record
 from granforce.packing.importers.notes import noted, with_notes
 from granforce.records import InputError, Packing, brief_list
@@ -17,6 +19,11 @@ class Snapshot(NamedTuple):
 
     packing: Annotated[Packing, "with the simulation's own forces"]
     ids: Annotated[Floats, "(N,) of its grains"]
+
+
+def with_walls(ids: Floats, walls: int) -> Floats:
+    """Ids of grains, and −1, −2, … for walls."""
+    return np.concatenate([ids, -1.0 - np.arange(walls)])
 
 
 @record
