@@ -9,6 +9,7 @@ rest; there, linear programs finish the packing (`closing`).
 
 from __future__ import annotations
 
+import inspect
 import itertools
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
@@ -202,17 +203,16 @@ def pack(
     r = draw_radii(radii, n, rng)
     unit = r.max()
     if not BOXES[box]:
-        given = {
-            "pressure": pressure != 1.0,
-            "dt, sweeps": (dt, sweeps) != default_steps(mu, None, None),
-            "box_mass": box_mass != 100.0,
-            "accuracy": accuracy != 0.01,
-            "drag_below": drag_below is not None,
-            "max_steps": max_steps != 100_000,
-        }
+        _refuse_unused(
+            box,
+            (dt, sweeps) != default_steps(mu, None, None),
+            pressure=pressure,
+            box_mass=box_mass,
+            accuracy=accuracy,
+            drag_below=drag_below,
+            max_steps=max_steps,
+        )
         info = {"seed": seed, "radii": radii if isinstance(radii, str) else "list", "box": box}
-        for name in (name for name, is_given in given.items() if is_given):
-            raise InputError(f'box="{box}" has no use for {name}: leave it out')
         return _heap(r / unit, unit, mu, rng, info, progress)
     motion = _dilute_gas(r / unit, rng, BOXES[box])
     motion.pace[:] = SHORTEST * dt, dynamics.MOST_RELAXATION
@@ -269,6 +269,15 @@ def pack(
         **work,
     }
     return _in_users_units(finished, unit, unit * pressure, pressure, info)
+
+
+def _refuse_unused(box: str, steps_given: bool, **settings: Any) -> None:
+    """InputError for settings of the dynamics, which a floor does not use."""
+    parameters = inspect.signature(pack).parameters
+    given = ["dt, sweeps"] if steps_given else []
+    given += [name for name, value in settings.items() if value != parameters[name].default]
+    if given:
+        raise InputError(f'box="{box}" has no use for {given[0]}: leave it out')
 
 
 def _heap(
