@@ -23,6 +23,7 @@ from zarr.storage import LocalStore, MemoryStore
 
 from granforce.records import InputError
 from granforce.study import keys, schema
+from granforce.system import interrupts
 
 STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
 
@@ -99,21 +100,23 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
     memory = MemoryStore(encoded)
     arrays = {}
     for name, variable in variables.items():
-        array = zarr.create_array(
-            memory,
-            name=name,
-            shape=variable.shape,
-            dtype=variable.dtype,
-            chunks=_chunks(variable),
-            compressors=(ZstdCodec(level=3),),
-            dimension_names=[str(name) for name in variable.dims],
-            attributes=schema.attributes(str(name)),
-            config={"write_empty_chunks": True},  # otherwise Zarr 3.0 loses a chunk of −0.0
-            zarr_format=3,
-        )
+        with interrupts.deferred():
+            array = zarr.create_array(
+                memory,
+                name=name,
+                shape=variable.shape,
+                dtype=variable.dtype,
+                chunks=_chunks(variable),
+                compressors=(ZstdCodec(level=3),),
+                dimension_names=[str(name) for name in variable.dims],
+                attributes=schema.attributes(str(name)),
+                config={"write_empty_chunks": True},  # otherwise Zarr 3.0 loses a chunk of −0.0
+                zarr_format=3,
+            )
         arrays[str(name)] = json.loads(encoded[f"{name}/zarr.json"].to_bytes())
         for rows in _by_chunks(variable):
-            array[rows] = variable.values[rows]
+            with interrupts.deferred():
+                array[rows] = variable.values[rows]
             move(encoded, folder)
     seal(folder, arrays, attrs)
 
@@ -265,7 +268,8 @@ def _lazily(folder: Path, metadata: _Metadata | None, reason: str) -> Look[xr.Da
     try:
         # Not decoded: only plain numbers are saved, and "units" must not turn them into times.
         store = _Whole(folder, metadata)
-        return xr.open_zarr(store, consolidated=True, chunks=None, decode_cf=False), ""
+        with interrupts.deferred():
+            return xr.open_zarr(store, consolidated=True, chunks=None, decode_cf=False), ""
     except Exception as error:  # the exception depends on codec, zarr and xarray
         return None, f"an array cannot be read: {type(error).__name__}"
 
@@ -315,7 +319,8 @@ def _checked(folder: Path) -> Look[xr.Dataset]:
     if dataset is None or metadata is None:
         return None, reason
     try:
-        dataset.load()
+        with interrupts.deferred():
+            dataset.load()
     except InputError:
         return None, "a part of an array is missing"
     except Exception as error:  # as above

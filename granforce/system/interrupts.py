@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 _pressed = threading.Event()
+_deferring = 0  # open deferred() of the main thread
 
 
 def interrupted() -> bool:
@@ -46,6 +47,26 @@ def check() -> None:
         raise KeyboardInterrupt
 
 
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Within, Ctrl-C is recorded, and its KeyboardInterrupt raised at the end.
+
+    For short calls of libraries that print messages if they are interrupted, as Zarr's event loop.
+    """
+    global _deferring
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _deferring += 1
+    try:
+        yield
+    finally:
+        _deferring -= 1
+    if not _deferring:
+        check()
+
+
 def _note(number: int, frame: FrameType | None) -> None:
     _pressed.set()
-    raise KeyboardInterrupt
+    if not _deferring:
+        raise KeyboardInterrupt

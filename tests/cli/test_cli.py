@@ -496,6 +496,30 @@ def test_an_interrupt_that_a_library_swallows_ends_the_command(command, monkeypa
     assert not interrupts.interrupted()  # the next command begins anew
 
 
+# The command `verify` in a process where Ctrl-C comes while Zarr makes its event loop.
+ZARR_INTERRUPTED = """
+import asyncio, os, signal
+from zarr.core import sync
+from granforce.cli import command
+from granforce.study import store
+
+class Loop(asyncio.SelectorEventLoop):
+    def _make_self_pipe(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        super()._make_self_pipe()
+
+asyncio.new_event_loop = Loop
+command()
+"""
+
+
+def test_an_interrupt_within_zarr_leaves_no_message_of_it(run):
+    run("pack", "-n", "20", "--mu", "0.3")
+    running = heeding("-c", ZARR_INTERRUPTED, "cache", "verify")
+    _, err = running.communicate(timeout=60)
+    assert (running.returncode, err) == (130, "granforce: interrupted\n")
+
+
 # A program that HiGHS works on for minutes, as the command `pack`.
 LONG_PROGRAM = """
 import numpy as np
