@@ -19,7 +19,7 @@ import pytest
 from bokeh.client.websocket import WebSocketClientConnectionWrapper
 from bokeh.protocol import Protocol
 from bokeh.protocol.receiver import Receiver
-from heeding import computed
+from heeding import computed, until_it_left
 from serving import CLOSED, serve
 from small_store import ROOT, cell_parameters
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
@@ -370,7 +370,7 @@ def test_a_hundred_sessions_leave_nothing(served):
 def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, times):
     for _ in range(times):
         with serve(tmp_path) as (url, server):
-            visits(_computing(url, server))
+            visits(_computing(url, server, tmp_path / "cache"))
             children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text().split()
             os.kill(server.pid, signal.SIGTERM)
             server.wait(PATIENCE)
@@ -381,10 +381,11 @@ def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, time
         assert not [child for child in children if Path(f"/proc/{child}").exists()]
 
 
-async def _computing(url, server):
+async def _computing(url, server, cache):
     clients = [await Client.opened(url, LONG.format(k)) for k in range(3)]
     for client in clients:
         await client.ready()
+    await asyncio.to_thread(until_it_left, cache, "packing-*", 1, server)
     before = computed(server)
     while computed(server) < before + 1.0:
         await asyncio.sleep(0.05)
