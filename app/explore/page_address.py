@@ -32,6 +32,7 @@ class Address(Scripted):
         state.param.watch(self._tell, ["selection", "cell"])
         for part in state.parts:
             part.param.watch(self._tell, [name for name in VIEW if name in part.param])
+        state.looks.param.watch(self._tell, "pulled")
         self._tell()
 
     def _tell(self, *events: Any) -> None:

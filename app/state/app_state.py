@@ -583,6 +583,8 @@ class AppState(param.Parameterized):
         if view["beside"] == self.selection.mu:
             # Between the choice of another μ and its states, the old comparison is still on screen.
             view["beside"] = None
+        if self.looks.pulled == "push":  # every push begins with the network as packed
+            view["frame"] = self._viewed["frame"].default
         changed = {
             name: value for name, value in view.items() if value != self._viewed[name].default
         }

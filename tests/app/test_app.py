@@ -29,6 +29,7 @@ from app.explore.results_line import left_out
 from app.explore.status_line import StatusLine, power
 from app.explore.tabs.intervals.intervals import View
 from app.explore.tabs.intervals.order import SOME, ordered
+from app.packing.captions import caption
 from app.packing.legend import COMING, exact_intervals
 from app.packing.player import Player, frames
 from app.page import learns
@@ -292,6 +293,16 @@ def test_the_view_travels_with_the_link(state, visited):
     older = "mu=0.1&n=30&states=30&relax=nearest_piqp"
     assert visited(f"{older}&frame=4").looks.paused  # as it was meant
     assert not visited(older).looks.paused
+
+
+def test_no_address_of_a_pushed_network_names_the_network_that_comes_back_after_it(state):
+    state.looks.param.update(tab="perturb", frame=5, paused=True)
+    address, number = Address(state), f"network={state.replay.number[5]}"
+    assert number in address.query
+    state.looks.pulled = "push"
+    assert not any("network=" in given for given in (address.query, caption(state)["lines"][-1]))
+    state.looks.pulled = ""
+    assert number in address.query
 
 
 def test_a_view_that_is_gone_back_to_is_settled_once_it_is_there_or_refused(state):
