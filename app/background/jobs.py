@@ -258,6 +258,12 @@ class Job:
             return self.stage
         return f"{WAITING}: {count} {'computation' if count == 1 else 'computations'} before it"
 
+    @property
+    def words(self) -> str:
+        """Its current step and, if it can be estimated, the time left, in words."""
+        left = self.seconds_left
+        return self.doing + ("" if left is None else f" — about {_duration(left)} more")
+
     def begin(self, stage: str, expected: float = math.inf) -> None:
         """Enter a stage, whose bar and remaining time start anew.
 
@@ -371,6 +377,13 @@ class Job:
             _log.exception("the end of a job could not be reported")
 
 
+def _duration(seconds: float) -> str:
+    """In whole seconds below ten, tens of seconds below two minutes, and minutes."""
+    if seconds < 10:
+        return f"{max(1.0, seconds):.0f} s"
+    return f"{round(seconds, -1):.0f} s" if seconds < 115 else f"{seconds / 60:.0f} min"
+
+
 def error_line(error: BaseException) -> str:
     """An error in one line for the page."""
     line = " ".join(str(error).split())[:LONGEST_LINE]
@@ -387,6 +400,7 @@ class Task(param.Parameterized):
 
     running = param.Boolean()
     fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
+    words = param.String(doc="step of the running job and time left, or empty")
     dismissed = param.Boolean(doc="triggered when the visitor cancels; never stays True")
     message = param.String(doc="one line about what went wrong, or empty")
 
@@ -416,7 +430,7 @@ class Task(param.Parameterized):
             return
         on_end = None if self._wake is None else partial(self._wake, self.poll)
         self.job, self._done = Job(work, self.pool, on_end, self._visitor), done
-        self.param.update(running=True, fraction=None, message="")
+        self.param.update(running=True, fraction=None, words=self.job.words, message="")
 
     def poll(self) -> None:
         """Update the progress of the job and, when it has ended, its result."""
@@ -425,15 +439,15 @@ class Task(param.Parameterized):
             return
         if job.cancelled():  # it ends soon, or continues for others
             self.job = self._done = None
-            self.param.update(running=False, message="")
+            self.param.update(running=False, words="", message="")
             return
         if not job.ended:
-            self.fraction = job.fraction
+            self.param.update(fraction=job.fraction, words=job.words)
             return
         done, self.job, self._done = self._done, None, None
         # Announced together, so that the work is never over without its result.
         with as_one(self):
-            self.param.update(running=False, message=job.error)
+            self.param.update(running=False, words="", message=job.error)
             if done is not None and not job.error:
                 try:
                     done(job.result)

@@ -42,7 +42,7 @@ class Results(Scripted):
         observe(self._look, state, "replay")
         observe(
             self._tell, state, "exact", "shown", "missing", "work.computation.running",
-            "knowledge.known", "knowledge.narrowed", "work.measuring.running",
+            "knowledge.known", "knowledge.narrowed", "work.measuring.running", "looks.tab",
         )  # fmt: skip
         state.looks.sync_opened(self, "results")
         self._look()
@@ -88,6 +88,7 @@ def results(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     heading = f"seen in all {count}"
     if known:
         heading = f"seen{known} ({count})" if state.obeying else f"seen in all of S ({count})"
+        heading += "" if state.obeys_held else ", which a push ignores" * state.obeying
     if not state.replay.summary["dimension"]:
         heading = "the only network"
     if sampling and sampling.verdict:

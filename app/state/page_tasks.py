@@ -107,13 +107,9 @@ class Work(param.Parameterized):
         return next((one for one in self.tasks if one.running and one.pool is computing), None)
 
     def _report(self) -> None:
-        task = self.foremost
-        job = None if task is None else task.job
-        now: dict[str, Any] = {}
-        if job is not None:
-            left = job.seconds_left
-            words = job.doing + ("" if left is None else f" — about {_duration(left)} more")
-            now = {"fraction": job.fraction, "words": words, "keeps": job.keeps}
+        task, now = self.foremost, {}
+        if task is not None and task.job is not None:
+            now = {"fraction": task.fraction, "words": task.words, "keeps": task.job.keeps}
         if now != self.progress:
             self.progress = now
 
@@ -149,10 +145,3 @@ class Work(param.Parameterized):
         if not self.computation.running:
             self.param.update(live=None, moving=False, arriving=None)
         return self.live or self.arriving
-
-
-def _duration(seconds: float) -> str:
-    """In whole seconds below ten, tens of seconds below two minutes, and minutes."""
-    if seconds < 10:
-        return f"{max(1.0, seconds):.0f} s"
-    return f"{round(seconds, -1):.0f} s" if seconds < 115 else f"{seconds / 60:.0f} min"

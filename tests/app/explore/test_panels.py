@@ -43,6 +43,7 @@ from app.results.library import Library
 from app.results.replays import first_replay
 from app.results.saved_file import csv
 from app.state import app_state, perturbations
+from app.state.app_state import AppState
 from app.state.links import link, read_link
 from app.state.scene_links import request_of
 from app.widgets import label_places
@@ -754,6 +755,19 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
         pushed.opened,
         pushed.slid,
     )
+
+
+def test_a_push_is_never_without_a_sentence_and_says_what_it_waits_for(state, library):
+    nothing = AppState(library, query=None)
+    nothing.looks.tab = state.looks.tab = "perturb"
+    assert perturb_view.View(nothing).lead.object == nothing.nothing
+    view = perturb_view.View(state)
+    view.load.hear({"push": True})
+    assert "In progress" in view.doing.object
+    wait_for(state)
+    assert not view.doing.object
+    view.what.value = "store"
+    assert view.lead.object and "In progress" in view.doing.object
 
 
 def test_what_is_held_is_said_not_to_be_respected_by_a_push(state):

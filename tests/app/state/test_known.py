@@ -124,7 +124,11 @@ def test_networks_are_sampled_with_what_is_held(state, visited):
     assert state.obeying and not player.ignoring and replay.summary["dimension"] == fewer == h - 1
     shown = Known(state).words
     assert f"{fewer} of {h}" in shown and "played have it" in shown
-    assert "seen given the held forces (30 networks)" in results(state, None, False)
+    seen = "seen given the held forces (30 networks)"
+    assert seen in results(state, None, False) and "ignores" not in results(state, None, False)
+    state.looks.tab = "perturb"
+    assert f"{seen}, which a push ignores" in results(state, None, False)
+    state.looks.tab = "intervals"
     assert state.knowledge.narrowed is narrowed  # not computed again
     assert np.all(np.isfinite(View(state).drawing.bars.data["high"]))
     assert state.looks.frame == 1 and planes.other_states(state.catalogue, state.cell) is None

@@ -25,6 +25,11 @@ ISOSTATIC = (
     "<b>Without friction, any push moves the packing:</b> it has only as many contacts as "
     "equations (it is isostatic)."
 )
+OVER_STORE = (
+    "<b>Do packings whose forces are less determined give way earlier?</b> All pushed packings of "
+    "the study and of this page."
+)
+COMING = '<p role="status">In progress: {}.</p>'
 SCALE = 2.0  # of the largest force, initial end of the slider
 
 
@@ -51,7 +56,7 @@ class View(TabView):
             label="animate the first motion", value=False, size="small", margin=(4, 10)
         )
         self.plots = pn.Column(sizing_mode="stretch_width")
-        self.lead, self.numbers, self.details = note(), note(), note()
+        self.lead, self.doing, self.numbers, self.details = note(), note(), note(), note()
         self.task = state.work.task()
         self.loads: tuple[Loads, ContactScatter] | None = None
         self.pushed: tuple[Pushed, int, Replay] | None = None  # of this contact in this packing
@@ -61,6 +66,7 @@ class View(TabView):
         self.animate.param.watch(self._animate, "value")
         self.every.on_click(lambda event: self._find_loads())
         self.task.param.watch(lambda event: self.load.param.update(running=event.new), "running")
+        self.task.param.watch(self._tell, "words")
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
 
@@ -68,8 +74,8 @@ class View(TabView):
         """Choices, buttons, numbers and plot."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            self.what, self.lead, self.load, self.every, self.numbers, self.animate, self.plots,
-            self.details, **wide,
+            self.what, self.lead, self.load, self.every, self.doing, self.numbers, self.animate,
+            self.plots, self.details, **wide,
         )  # fmt: skip
 
     def update(self) -> None:
@@ -85,6 +91,7 @@ class View(TabView):
         self.every.visible = what == "all" and not fixed and self.loads is None
         self.animate.visible = one and self.reached
         if replay is None:
+            self._show(Shown(self.state.nothing))
             return
         self.load.param.update(
             contact=self.contact,
@@ -113,6 +120,10 @@ class View(TabView):
         )
         self.numbers.object = shown.numbers
         self.plots.objects = [plotted(fig) for fig in shown.plots]
+
+    def _tell(self, event: Any) -> None:
+        """Show what is being computed, and the time left."""
+        self.doing.object = COMING.format(event.new) if event.new else ""
 
     # One contact
 
@@ -182,7 +193,7 @@ class View(TabView):
 
     def _over_store(self) -> None:
         state = self.state
-        self._show(Shown(""))
+        self._show(Shown(OVER_STORE))
         self._animate()
         work = over_store(state.library, list(state.catalogue), state.cell)
         self.task.start(work, self._show_store)
