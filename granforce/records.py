@@ -80,7 +80,7 @@ class UndecidedError(InputError):
 class UnboundedError(InputError):
     """The forces in S have no upper bounds."""
 
-    named = False  # whether the message names grains and contacts
+    described = False  # whether an Ensemble has put the reason into words
 
 
 class Cancelled(Exception):
@@ -329,10 +329,10 @@ def takes(kind: type | None = None, **kinds: type) -> Callable[[Callable[P, T]],
             try:
                 return function(*arguments, **options)
             except UnboundedError as error:
-                named = [one for one in given.values() if hasattr(one, "unbounded")]
-                if error.named or not named:
+                able = [one for one in given.values() if hasattr(one, "describe_unbounded")]
+                if error.described or not able:
                     raise
-                raise named[0].unbounded() from None
+                raise able[0].describe_unbounded() from None
 
         return inside
 

@@ -336,7 +336,10 @@ class Job:
         return self._ended.wait(timeout)
 
     def run(self) -> None:
-        """Do the work unless cancelled; called by a thread of the pool."""
+        """Do the work unless cancelled, and end; called by a thread of the pool.
+
+        Whoever holds `_taken` may end the job: this thread, or the first `cancel` before it runs.
+        """
         if not self._taken.acquire(blocking=False):
             return
         if self.stage == WAITING:
@@ -355,7 +358,7 @@ class Job:
                 self.cancel()
             return
         except Cancelled:
-            # Otherwise a visitor no longer needs it, or the server is ending.
+            # By the time limit; or nobody needs it any more, or the server is ending: no words.
             if time.monotonic() > self._until and not self.cancelled():
                 self.error = (
                     f"this took longer than the {self._pool.seconds:g} s allowed per computation "

@@ -192,8 +192,8 @@ def account(report: dict[str, Any]) -> Iterator[str]:
         f"The files list {count('contacts_listed')} contacts of {count('grains')} disks. "
         f"{_walls(report)}"
     )
-    mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
-              if spoils and report[kind]]  # fmt: skip
+    mended = [f"{kind.words} ({report[name]})" for name, kind in KINDS.items()
+              if kind.repaired and report[name]]  # fmt: skip
     if mended:
         yield f"Repaired, and marked with crosses: {'; '.join(mended)}."
     for key, words in DOUBTS:

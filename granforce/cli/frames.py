@@ -129,7 +129,7 @@ def _rows(dataset: xr.Dataset, word: str) -> list[dict[str, Any]]:
         mean = Unit("mean measured", float(dataset["unit"][k]))
         unit = mean if word == "mean" else PACKING_UNIT
         account = dict(zip(dataset["kind"].values, one["account"].values, strict=True))
-        mended = sum(int(account[kind]) for kind in KINDS if kind != "beyond_friction")
+        mended = sum(int(account[kind]) for kind in KINDS if KINDS[kind].repaired)
         rows.append(
             {
                 "frame": number,

@@ -443,10 +443,10 @@ def _pair_lines(grains: _Grains, assembly: Assembly) -> dict[str, Any]:
 def _finding_lines(account: Account) -> list[str]:
     """The findings of each kind, in lines of words, only the first ones of many."""
     lines = []
-    for kind, (words, *_) in KINDS.items():
-        findings = account.of(kind)
+    for name, kind in KINDS.items():
+        findings = account.of(name)
         if findings:
             more = f"; and {len(findings) - _LISTED} more" if len(findings) > _LISTED else ""
             text = "; ".join(one.text for one in findings[:_LISTED])
-            lines.append(f"{words} ({len(findings)}): {text}{more}")
+            lines.append(f"{kind.words} ({len(findings)}): {text}{more}")
     return lines

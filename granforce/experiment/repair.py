@@ -15,22 +15,34 @@ from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
 from granforce.records import InputError
 from granforce.types import Floats, Integers
 
-# Kind of finding → its description, whether it concerns grains (0) or contacts (1), and whether the
-# data are dropped or count as not measured (1) or the finding is only reported (0).
+
+class Kind(NamedTuple):
+    """A kind of finding."""
+
+    words: str
+    of_grains: bool = False  # otherwise of contacts
+    repaired: bool = True  # data are dropped, or count as not measured; otherwise only reported
+    is_error: bool = True  # in the file: raised if `strict`; otherwise measurement noise
+
+
 KINDS = {
-    "unreadable_grains": (
-        "grains with a field that is not a finite number, or without a radius",
-        0,
-        1,
+    "unreadable_grains": Kind(
+        "grains with a field that is not a finite number, or without a radius", of_grains=True
     ),
-    "doubled_grains": ("grains listed twice", 0, 1),
-    "false_detections": ("grains inside others, which fit fewer contacts and sizes", 0, 1),
-    "unreadable_contacts": ("contacts with a field that cannot be a name or a force", 1, 1),
-    "contacts_with_themselves": ("contacts of a grain with itself", 1, 1),
-    "contacts_of_missing_grains": ("contacts that name a missing grain", 1, 1),
-    "contacts_too_long": ("contacts of grains too far apart to touch", 1, 1),
-    "negative_normal_forces": ("contacts that pull, taken as not measured", 1, 1),
-    "beyond_friction": ("measured forces beyond the friction limit at this μ, not changed", 1, 0),
+    "doubled_grains": Kind("grains listed twice", of_grains=True),
+    "false_detections": Kind(
+        "grains inside others, which fit fewer contacts and sizes", of_grains=True
+    ),
+    "unreadable_contacts": Kind("contacts with a field that cannot be a name or a force"),
+    "contacts_with_themselves": Kind("contacts of a grain with itself"),
+    "contacts_of_missing_grains": Kind("contacts that name a missing grain"),
+    "contacts_too_long": Kind("contacts of grains too far apart to touch"),
+    "negative_normal_forces": Kind("contacts that pull, taken as not measured", is_error=False),
+    "beyond_friction": Kind(
+        "measured forces beyond the friction limit at this μ, not changed",
+        repaired=False,
+        is_error=False,
+    ),
 }
 # Overlap, as a fraction of the smaller radius, beyond which one of two disks must be false.
 OVERLAP = 0.5
@@ -64,8 +76,8 @@ class Account(NamedTuple):
     most: float  # largest fraction of grains and of contacts to repair
 
     def note(self, kind: str, texts: Sequence[str], places: Floats) -> None:
-        """Record findings of one kind: texts and places (k, 2). InputError if `strict`."""
-        if self.strict and texts and KINDS[kind][2] and kind != "negative_normal_forces":
+        """Record findings of a kind, places (k, 2). If strict, errors raise InputError."""
+        if self.strict and texts and KINDS[kind].is_error:
             raise InputError(f"{texts[0]}; correct or remove the line, or read it with repair")
         for text, (x, y) in zip(texts, places, strict=True):
             self.findings.append(Finding(kind, text, float(x), float(y)))
@@ -81,13 +93,18 @@ class Account(NamedTuple):
 
     def check(self, grains: int, contacts: int) -> None:
         """InputError if too many of these grains and contacts were repaired."""
-        for which, (count, what) in enumerate(((grains, "grains"), (contacts, "contacts"))):
-            spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
+        for count, what in ((grains, "grains"), (contacts, "contacts")):
+            concerned = {
+                name: kind
+                for name, kind in KINDS.items()
+                if kind.repaired and kind.of_grains == (what == "grains")
+            }
+            spoilt = [one for one in self.findings if one.kind in concerned]
             if len(spoilt) > self.most * count and not self.strict:
                 kinds = ", ".join(
-                    f"{words} ({len(self.of(kind))})"
-                    for kind, (words, *_) in KINDS.items()
-                    if KINDS[kind][1:] == (which, 1) and self.of(kind)
+                    f"{kind.words} ({len(self.of(name))})"
+                    for name, kind in concerned.items()
+                    if self.of(name)
                 )
                 raise InputError(
                     f"{len(spoilt)} of {count} {what} would have to be repaired, more than "

@@ -28,19 +28,23 @@ from granforce.tolerances import ADMISSIBLE, CARRYING, INTERVAL_GAP, SEEN_CARRYI
 from granforce.types import Floats, Integers, Mask
 
 
-def without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:
-    """Drop, one after another, contacts of unloaded grains that have no other contact."""
+def without_danglers(packing: Packing, unfrozen: Integers, frozen: Mask) -> Integers:
+    """Drop, one after another, contacts of unloaded grains that have no other contact.
+
+    unfrozen: numbers of contacts, of which the remaining ones are returned. Grains of a frozen
+    contact count as loaded, by its force.
+    """
     i, j = packing.contacts.i, packing.contacts.j
     count = len(packing.r)
-    anchored = np.any(packing.load != 0, axis=1)
-    anchored[i[held]] = anchored[j[held]] = True
+    loaded = np.any(packing.load != 0, axis=1)
+    loaded[i[frozen]] = loaded[j[frozen]] = True
     while True:
-        number = np.bincount(i[free], minlength=count) + np.bincount(j[free], minlength=count)
-        lonely = (number == 1) & ~anchored
-        keep = ~(lonely[i[free]] | lonely[j[free]])
+        ends = np.concatenate([i[unfrozen], j[unfrozen]])
+        lonely = (np.bincount(ends, minlength=count) == 1) & ~loaded
+        keep = ~(lonely[i[unfrozen]] | lonely[j[unfrozen]])
         if keep.all():
-            return free
-        free = free[keep]
+            return unfrozen
+        unfrozen = unfrozen[keep]
 
 
 def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:

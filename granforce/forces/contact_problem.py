@@ -40,8 +40,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, depend on others. Dense matrices are used
 # up to this number of rows.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
-# Number of corrections in `in_balance`.
-_RESTORED = 3
+# Number of corrections in `restored_balance`: each changes the weights of the next.
+_CORRECTIONS = 3
 
 
 def balance_of(
@@ -293,13 +293,16 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
     return (axes * value).sum(axis=(-2, -1))
 
 
-def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
-    """y (n,), corrected to A y = b by the least change relative to |y| + away."""
-    for _ in range(_RESTORED):
-        size = np.abs(y) + away
+def restored_balance(A: sparse.csr_matrix, b: Floats, y: Floats, floor: float = 0.0) -> Floats:
+    """y (n,), corrected to A y = b by the least change relative to |y| + floor.
+
+    A positive floor lets zeros change.
+    """
+    for _ in range(_CORRECTIONS):
+        size = np.abs(y) + floor
         size /= size.max(initial=1e-300)
-        scaled, still = sparse.csc_matrix(A @ sparse.diags(size)), np.zeros(len(y))
-        change, _ = cancelling.apart(inner_point.balanced, scaled, b - A @ y, still)
+        scaled, zeros = sparse.csc_matrix(A @ sparse.diags(size)), np.zeros(len(y))
+        change, _ = cancelling.apart(inner_point.balanced, scaled, b - A @ y, zeros)
         y = y + size * change
     return y
 

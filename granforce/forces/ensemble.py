@@ -304,37 +304,49 @@ class Ensemble:
         """Whether S is bounded; the pressure bounds every force."""
         return self.has_pressure_row or certificates.recession(self.scaled_form[0]) is None
 
-    def unbounded(self) -> UnboundedError:
-        """The error for unbounded forces: which can grow without a load, and what bounds them."""
-        ray = certificates.widest_recession(self.scaled_form[0])
-        locked = np.zeros(0, dtype=np.int64)
-        if ray is not None:
-            cones = ray[: self.per_contact * len(self.index)].reshape(len(self.index), -1)
-            locked = np.flatnonzero(cones.max(axis=1) > LOCKED * ray.max())
+    def describe_unbounded(self) -> UnboundedError:
+        """An UnboundedError that names the wedged grains, and the bounds that would help.
+
+        `takes` raises it in place of a plain one. Grains are named only if the growing forces lock
+        grains whose balance is required between walls, or grains whose balance is not.
+        """
+        growing = self._growing_contacts()
         left_open = balance.left_open_in(self.packing)
-        i, j = self.contacts.i[locked], self.contacts.j[locked]
-        group = _groups(i, j, left_open)
-        error = UnboundedError(certificates.UNBOUNDED)
+        i, j = self.contacts.i[growing], self.contacts.j[growing]
         ends = np.union1d(i, j)
-        if left_open[ends].any() and not left_open[ends].all():
-            free = ends[~left_open[ends]]
-            grains, are = ("Grain", "is") if len(free) == 1 else ("Grains", "are")
-            numbers = self.index[locked]
-            one = numbers[np.unique(group, return_index=True)[1]]
-            smaller = ""
-            if self.mu > 0 and not self._grows_without_friction:
-                smaller = "a smaller friction coefficient (--ensemble-mu, mu=) or "
-            some = "of one of these contacts"
-            if len(one) > 1:
-                some = f"of one contact in each of {len(one)} groups, such as {brief_list(one)},"
-            error = UnboundedError(
-                "the forces in S are not bounded: some can press against each other without a "
-                f"load. {grains} {brief_list(free)} (counted from 0) {are} wedged between walls or "
-                f"fixed grains by contacts {brief_list(numbers)} at friction {self.mu:g}. Use "
-                f"{smaller}an upper bound on f_n {some} (f_n_high in --known, known=)"
-            )
-        error.named = True
+        wedged = ends[~left_open[ends]]
+        error = UnboundedError(certificates.UNBOUNDED)
+        if 0 < len(wedged) < len(ends):
+            numbers = self.index[growing]
+            one_each = numbers[np.unique(_groups(i, j, left_open), return_index=True)[1]]
+            error = UnboundedError(self._wedged_words(wedged, numbers, one_each))
+        error.described = True
         return error
+
+    def _growing_contacts(self) -> Integers:
+        """Contacts whose forces can grow together without a load, as many as possible."""
+        ray = certificates.widest_recession(self.scaled_form[0])
+        if ray is None:
+            return np.zeros(0, dtype=np.int64)
+        cones = ray[: self.per_contact * len(self.index)].reshape(len(self.index), -1)
+        return np.flatnonzero(cones.max(axis=1) > LOCKED * ray.max())
+
+    def _wedged_words(self, wedged: Integers, numbers: Integers, one_each: Integers) -> str:
+        """wedged: grains; numbers: their contacts; one_each: one contact of each group."""
+        grains, are = ("Grain", "is") if len(wedged) == 1 else ("Grains", "are")
+        smaller = ""
+        if self.mu > 0 and not self._grows_without_friction:
+            smaller = "a smaller friction coefficient (--ensemble-mu, mu=) or "
+        some = "of one of these contacts"
+        if len(one_each) > 1:
+            some = f"of one contact in each of {len(one_each)} groups, such as "
+            some += f"{brief_list(one_each)},"
+        return (
+            "the forces in S are not bounded: some can press against each other without a "
+            f"load. {grains} {brief_list(wedged)} (counted from 0) {are} wedged between walls or "
+            f"fixed grains by contacts {brief_list(numbers)} at friction {self.mu:g}. Use "
+            f"{smaller}an upper bound on f_n {some} (f_n_high in --known, known=)"
+        )
 
     @property
     def _grows_without_friction(self) -> bool:
@@ -569,11 +581,11 @@ class Ensemble:
         return (self.residual(forces) <= residual) & (self.violation(forces) <= violation)
 
 
-def _groups(i: Integers, j: Integers, held: Mask) -> Integers:
-    """Number (k,) of the group of each contact i, j that shares grains which are not held."""
-    both = ~held[i] & ~held[j]
-    bonds = sparse.coo_matrix((np.ones(both.sum()), (i[both], j[both])), (len(held),) * 2)
-    return csgraph.connected_components(bonds, directed=False)[1][np.where(held[i], j, i)]
+def _groups(i: Integers, j: Integers, left_open: Mask) -> Integers:
+    """Number (k,) of the group of each contact i, j that shares grains which are not left open."""
+    both = ~left_open[i] & ~left_open[j]
+    bonds = sparse.coo_matrix((np.ones(both.sum()), (i[both], j[both])), (len(left_open),) * 2)
+    return csgraph.connected_components(bonds, directed=False)[1][np.where(left_open[i], j, i)]
 
 
 def _plain(values: Floats) -> Floats | float:

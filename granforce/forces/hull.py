@@ -13,8 +13,8 @@ from scipy.sparse.linalg import norm
 from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.forces.contact_problem import (
     centre_of,
-    in_balance,
     independent_problem_of,
+    restored_balance,
     unbalance,
 )
 from granforce.forces.ensemble import Ensemble, Hull
@@ -96,7 +96,7 @@ def _centre(ensemble: Ensemble) -> Floats | None:
     A, b, _ = ensemble.scaled_form
     if unbalance(A, b, inner) <= _UNBALANCED:
         return inner
-    inner = in_balance(A, b, inner)
+    inner = restored_balance(A, b, inner)
     return inner if inner.min(initial=1.0) > 0 else None
 
 

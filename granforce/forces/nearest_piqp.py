@@ -12,7 +12,7 @@ import numpy as np
 import piqp
 from scipy import sparse
 
-from granforce.forces.contact_problem import in_balance
+from granforce.forces.contact_problem import restored_balance
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.grain_pressures import Rows, no_rows
 from granforce.numerics import highs as programs
@@ -22,7 +22,7 @@ from granforce.tolerances import BALANCED
 from granforce.types import Floats
 
 # Coordinates y (in ⟨f_n⟩) far below this hardly change when balance is restored.
-_AWAY = 1e-6
+_FLOOR = 1e-6
 
 
 @takes(Ensemble)
@@ -96,7 +96,7 @@ def restored(ensemble: Ensemble, y: Floats) -> Floats:
     A program ends at its tolerance; the remaining residual is removed by the least relative change.
     """
     A, b, T = ensemble.scaled_form
-    y = np.maximum(in_balance(A, b, y, _AWAY), 0.0)
+    y = np.maximum(restored_balance(A, b, y, _FLOOR), 0.0)
     return ensemble.pin(ensemble.to_forces(T @ y * ensemble.force_scale))
 
 

@@ -303,7 +303,7 @@ def _outlines(body: Any, name: str) -> list[Floats]:
         given = []
     if not given:
         raise InputError(f"{name} has no parts; give corners (k, 2), or a disk (x, y, r)")
-    if not any(map(_is_part, given)):
+    if not any(map(_is_outline, given)):
         return [_outline(body, name)]
     several = len(given) > 1
     return [
@@ -311,8 +311,11 @@ def _outlines(body: Any, name: str) -> list[Floats]:
     ]
 
 
-def _is_part(given: Any) -> bool:
-    """Whether it is no number and no corner, but a disk, or a list of corners."""
+def _is_outline(given: Any) -> bool:
+    """Whether an item of a body is an outline: a disk (x, y, r), or corners (k, 2).
+
+    Otherwise it is a number or a corner (x, y) of the body's only outline.
+    """
     if isinstance(given, np.ndarray):
         return given.ndim == 2 or given.shape == (3,)
     if not isinstance(given, list | tuple) or not given:

@@ -14,7 +14,7 @@ from scipy import sparse
 from granforce.bench.runner import tile
 from granforce.explore.random_walk import walk
 from granforce.forces.build import ensemble
-from granforce.forces.contact_problem import in_balance, problem_of
+from granforce.forces.contact_problem import problem_of, restored_balance
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics import cone_projection, contact_matrix, contact_program
@@ -227,7 +227,7 @@ def test_the_balance_is_restored_by_the_least_relative_change(rng):
     A[5] = A[0] + A[1]  # as rows of the stress may follow from others
     y = rng.uniform(0.5, 2.0, 12)
     b = A @ (y * (1 + 1e-3 * rng.standard_normal(12)))
-    restored = in_balance(sparse.csr_matrix(A), b, y)
+    restored = restored_balance(sparse.csr_matrix(A), b, y)
     least = y + y * np.linalg.lstsq(A * y, b - A @ y, rcond=1e-12)[0]
     assert np.abs(A @ restored - b).max() < 1e-14 * np.abs(A).sum()
     assert np.allclose(restored, least, rtol=1e-5)  # of changes of 10⁻³, to second order

@@ -32,7 +32,7 @@ from granforce.packing.importers.text import (
     EmptyError,
     Source,
     Table,
-    finite_number,
+    number_or_nan,
     numbered_lines,
     read_text,
     separator_of,
@@ -207,7 +207,7 @@ def _separated(source: Source) -> tuple[Table, str | None]:
 def _header_and_rows(table: Table) -> tuple[Sequence[str] | None, Table]:
     """The last line without numbers above the first with numbers, and the rows from there."""
     first = next(
-        (k for k, row in enumerate(table.rows) if np.isfinite(list(map(finite_number, row))).any()),
+        (k for k, row in enumerate(table.rows) if np.isfinite(list(map(number_or_nan, row))).any()),
         None,
     )
     if first is None:
@@ -226,7 +226,7 @@ def _numbers(table: Table) -> Floats:
     numbers = np.full((len(counts), width), np.nan)
     for row, fields in zip(numbers, table.rows, strict=True):
         if len(fields) == width:
-            row[:] = [finite_number(field) for field in fields]
+            row[:] = [number_or_nan(field) for field in fields]
     return numbers
 
 

@@ -124,7 +124,7 @@ class Table(NamedTuple):
         """
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
-            values[row] = value = finite_number(text)
+            values[row] = value = number_or_nan(text)
             if math.isnan(value) and text.lower() not in missing:
                 raise InputError(
                     f"{self.place(row)}: {column} is {_quoted(text)}, not a finite number; "
@@ -380,7 +380,7 @@ def is_number(text: str) -> bool:
     return True
 
 
-def finite_number(text: str) -> float:
+def number_or_nan(text: str) -> float:
     """The number in a text, NaN unless it is finite and at most LARGEST."""
     try:
         value = number(text)
