@@ -1,7 +1,7 @@
 """Photoelastic frames uploaded by a visitor: measured and inferred forces, as plain arrays."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,11 +74,13 @@ def infer(
     mu: float,
     reverse: bool = False,
     walls: Any = None,
+    calibration: Sequence[float] | None = None,
     number: int | None = None,
 ) -> Callable[[Job], Frame]:
     """Work for jobs.Task that reads a frame and infers its forces with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse, walls: as for `read_pegs`; number: of the frame.
+    files: {role: (name, content)}; mu, reverse, walls, calibration: as for `read_pegs`; number: of
+    the frame.
     """
 
     def work(job: Job) -> Frame:
@@ -87,7 +89,13 @@ def infer(
         roles = uploads.FAMILIES[uploads.family(files)][1]
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
         photo = read_pegs(
-            frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
+            frames,
+            frame=number,
+            mu=mu,
+            reverse=reverse,
+            walls=walls,
+            calibration=calibration,
+            most_grains=LIMITS.n,
         )
         job.begin("simulating repeated measurements, for error bars")
         dataset = series.infer_frame(photo, states=DRAWS)
@@ -113,7 +121,7 @@ def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame
     left_open, at_wall = np.zeros((2, count + walls), dtype=bool)
     left_open[account["left_open"]] = True
     at_wall[account["at_wall"]] = True
-    mended = [one for one in account["findings"] if KINDS[one["kind"]][2]]
+    mended = [one for one in account["findings"] if KINDS[one["kind"]].repaired]
     places = np.array([[one["x"], one["y"]] for one in mended]).reshape(-1, 2)
     pressure = np.abs(of["regional_stress"][:, :2].mean()) or 1.0
     return Frame(
@@ -210,6 +218,8 @@ def account(report: dict[str, Any]) -> Iterator[str]:
         "pairs at similar distances were added as unmeasured contacts."
     )
     yield _left(report)
+    if "measured_pressures" in report:
+        yield f"The pressures of {count('measured_pressures')} disks count as measurements, too."
     yield (
         "The admissible network nearest to the measurement differs from it by "
         f"{count('mean_change_of_f_n'):.2f} ⟨mₙ⟩ in fₙ and {count('mean_change_of_f_t'):.2f} ⟨mₙ⟩ "

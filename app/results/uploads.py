@@ -38,6 +38,7 @@ WORDS = {
     "adjacency": "adjacency list with the forces",
     "solved": "frame solved by PeGS 2",
 }
+PRESSURES = {"pressure", "g2", "g²"}  # columns of positions
 # Largest ratio of an archive's unpacked size to the upload limit.
 UNPACKED = 8
 # Bytes and rows examined to recognise photoelastic files.
@@ -67,6 +68,8 @@ def role(name: str, content: bytes) -> str:
             return "contacts"
         raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
     columns, measured = _columns(content), _photoelastic(content)
+    if "frame" in columns and columns & PRESSURES:
+        return "positions"
     if measured and "frame" in columns:
         return measured
     if {"body", "x", "y"} <= columns or content.lstrip()[:1] == b"{":
@@ -95,6 +98,11 @@ def loose(files: Files) -> bool:
     """Whether these are tables in which nothing holds the disks: no load, no force."""
     named = [_columns(files[part][1]) for part in ("grains", "joined") if part in files]
     return "grains" in files and not set().union(*named) & {"fx", "fy", "torque", "fn", "f_n"}
+
+
+def lists_pressures(files: Files) -> bool:
+    """Whether the positions of a photoelastic frame have a column of pressures, or of G²."""
+    return "positions" in files and bool(_columns(files["positions"][1]) & PRESSURES)
 
 
 def _photoelastic(content: bytes) -> str | None:

@@ -119,6 +119,21 @@ def test_what_does_not_fit_is_one_clear_line(state):
     assert "no frame in common" in view.error.title and not len(view.frame)
 
 
+def test_calibrated_pressures_of_a_frame_count_as_measurements(state, tmp_path):
+    made = gf.synthetic_frame(gf.pack(40, 0.3, seed=2), noise=0.05)
+    made.write(tmp_path / "p.csv", tmp_path / "a.csv", pressures=True)
+    view = dropped(state, [(name, (tmp_path / name).read_bytes()) for name in ("p.csv", "a.csv")])
+    wait_for(state, lambda: len(view.frame))
+    assert view.calibration.visible and "pressures" not in view.frame[1].object
+    view.calibration.value = "1, 0"
+    view.read.clicks += 1
+    assert "calibration a,b,sigma" in view.error.title and "--" not in view.error.title
+    view.calibration.value = f"1, 0, {0.05 * np.mean(made.only.pressure)}"
+    view.read.clicks += 1
+    wait_for(state, lambda: len(view.frame) and "pressures of" in view.frame[1].object)
+    assert not view.error.visible
+
+
 def test_it_can_be_cancelled(state):
     import time
 

@@ -8,6 +8,8 @@ from urllib.parse import quote
 import panel as pn
 import panel_material_ui as pmui
 
+from granforce.experiment.measurements import checked_calibration
+from granforce.packing.importers.text import number_or_nan
 from granforce.records import InputError, brief, friction, make_cell, positive
 from granforce.system.wording import number
 
@@ -43,11 +45,12 @@ j and f_n, f_t ({_sample("disks.csv")}; walls: a floor and two sides, gravity: 1
 (CSV or JSON): convex polygons and disks, with columns body, x, y, as for
 <code>granforce import blocks</code> ({_sample("bodies.csv")});
 <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x, y, r, flag at a wall) and
-an adjacency list (frame, id, id, fₜ, fₙ), or a
-<code>_solved.mat</code> of PeGS 2, for which the nearest balanced forces are computed. Something
-must hold the disks of a table: enter a periodic box, or walls and gravity, or give columns fx, fy,
-torque with the load on each disk. Files are read into memory. A packing is saved in the cache; a
-frame is saved only if you open it as a packing.
+an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code> of PeGS 2, for which the
+nearest balanced forces are computed. Positions with a line of headers may have a column G2 or
+pressure: with its calibration a, b, σ, each disk has a measured pressure a G² + b ± σ, too.
+Something must hold the disks of a table: enter a periodic box, or walls and gravity, or give
+columns fx, fy, torque with the load on each disk. Files are read into memory. A packing is saved in
+the cache; a frame is saved only if you open it as a packing.
 """
 HOLD_WANTED = (
     "What holds the disks? Enter the sides of a periodic box in Box, such as 30, 30, and its tilt, "
@@ -91,6 +94,9 @@ class View:
         self.around = Select(label="Walls", options=by_words(AROUND), width=190, margin=(4, 8))
         self.gravity = pmui.TextInput(label="Gravity", placeholder="0", **SMALL)
         self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
+        self.calibration = pmui.TextInput(
+            label="Pressure calibration a, b, σ", placeholder="not used", **SMALL | {"width": 200}
+        )
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", margin=(8, 8), **PRIMARY)
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
@@ -109,7 +115,7 @@ class View:
             self.dropper,
             pn.FlexBox(
                 *(self.mu, self.box, self.pressure, self.around, self.gravity),
-                *(self.walls, self.reverse, self.read),
+                *(self.walls, self.calibration, self.reverse, self.read),
                 sizing_mode="stretch_width",
             ),
             self.error,
@@ -127,6 +133,7 @@ class View:
         kind = uploads.family(self.files) if self.files else None
         self.mu.visible = kind not in (None, "npz")
         self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
+        self.calibration.visible = uploads.lists_pressures(self.files)
         for field in (self.box, self.pressure, self.around, self.gravity):
             field.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
@@ -170,31 +177,34 @@ class View:
     def _options(self) -> dict[str, Any]:
         kind = uploads.family(self.files)
         options: dict[str, Any] = (
-            {} if kind == "npz" else {"mu": friction(typed(self.mu.value_input or self.mu.value))}
+            {} if kind == "npz" else {"mu": friction(typed(_entered(self.mu)))}
         )
         if kind in ("pegs", "solved"):
             options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
+        if given := self.calibration.visible and _entered(self.calibration):
+            numbers = map(number_or_nan, given.replace(",", " ").split())
+            options["calibration"] = checked_calibration(list(numbers))
         if kind == "table":
             options |= self._holding()
         return options
 
     def _holding(self) -> dict[str, Any]:
         """The options of a table on what holds its disks."""
-        sides = (self.box.value_input or self.box.value).replace(",", " ").split()
+        sides = _entered(self.box).replace(",", " ").split()
         if len(sides) not in (0, 2, 3):
             raise InputError(
                 "enter the two sides of the box, such as 30, 30, and its tilt, if any; leave "
                 "it empty for an open packing"
             )
         box = [positive(typed(side), "a side of the box") for side in sides[:2]] or None
-        gravity = (self.gravity.value_input or self.gravity.value).strip() or "0"
+        gravity = _entered(self.gravity) or "0"
         options = {
             "box": box,
             "tilt": make_cell(box, _tilt(sides[2])).tilt if box and sides[2:] else 0.0,
             "walls": self.around.value or None,
             "gravity": positive(typed(gravity), "Gravity", or_zero=True),
         }
-        pressure = (self.pressure.value_input or self.pressure.value).strip()
+        pressure = _entered(self.pressure)
         if pressure and not (box and uploads.loose(self.files)):
             raise InputError(IDLE_PRESSURE)
         return options | ({"pressure": positive(typed(pressure), "Pressure")} if pressure else {})
@@ -247,6 +257,11 @@ class View:
     def _refuse(self, line: str) -> None:
         line = OPTIONS.sub("", line)  # the page has fields instead
         self.error.param.update(title=line, visible=bool(line))
+
+
+def _entered(field: pmui.TextInput) -> str:
+    """The text of a field, also before Enter was pressed."""
+    return (field.value_input or field.value).strip()
 
 
 def _tilt(text: str) -> float:
