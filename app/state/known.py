@@ -190,7 +190,7 @@ class Knowledge(param.Parameterized):
         self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
     def _rank(self, ranked: Ranked | None) -> None:
-        if ranked is not None:
+        if ranked is not None and ranked is not self.ranked:
             self.ranked = ranked if ranked.known == tuple(self.known) else None
 
     def _stated(self, contact: int, value: float, error: float) -> Statement:
@@ -376,10 +376,10 @@ def ranking(
         params = kinds.INFORMATIVE.parameters(
             selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
         )
-        stage = "the best contacts to measure next"
+        stage = "the best contacts to measure next, from random networks"
 
         def watch(found: Any) -> None:
-            job.so_far = ranked(*found[:4])
+            job.so_far, job.stage = ranked(*found[:4]), "exact bounds of the best contacts"
 
         informative = compute.load_or_compute(
             library, job, stage, kinds.INFORMATIVE, params, watch=watch

@@ -98,7 +98,8 @@ def informative(
     watch : callable, optional
         watch(Informative) is called before the first check, with the order by covariance.
     progress : callable, optional
-        progress(done, total) counts the checked contacts.
+        progress(done, total) counts computations of all bounds, in fractions: of the present ones,
+        then of those with each checked contact known.
     cancel : callable, optional
         Polled; returning True raises Cancelled.
 
@@ -138,14 +139,18 @@ def informative(
 
     if watch is not None:
         watch(ranked(order, after.copy()))
+
+    def extent(S: Ensemble, number: int) -> float:
+        def tell(solved: float, total: float | None) -> None:
+            if progress is not None and total:
+                progress(number + solved / total, 1 + len(best))
+
+        return _mean_extent(S, workers, tell)
+
     if len(best):
-        if progress is not None:
-            progress(0, len(best))
-        before = _mean_extent(ensemble, workers)
+        before = extent(ensemble, 0)
     for done, c in enumerate(best):
-        after[done] = _mean_extent(ensemble.with_normal(c, held), workers)
-        if progress is not None:
-            progress(done + 1, len(best))
+        after[done] = extent(ensemble.with_normal(c, held), 1 + done)
     place = np.argsort(after, kind="stable")  # contacts that were not computed come last
     return ranked(order[place], after[place])
 
@@ -229,9 +234,9 @@ def _expected(normal: Floats) -> tuple[Floats, Mask]:
     return np.where(spread > INTERVAL_GAP, part, 0.0), np.abs(correlation) > 1 - TWINS
 
 
-def _mean_extent(ensemble: Ensemble, workers: int) -> float:
+def _mean_extent(ensemble: Ensemble, workers: int, progress: Progress) -> float:
     """Mean exact interval of f_n, in ⟨f_n⟩; NaN if a bound has no certificate."""
-    bounds = intervals(ensemble, workers=workers)
+    bounds = intervals(ensemble, workers=workers, progress=progress)
     cancelling.check("exact bounds")
     if not bounds.converged:
         return np.nan

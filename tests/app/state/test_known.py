@@ -322,13 +322,16 @@ def test_bounds_arrive_the_held_contact_first(state, monkeypatch):
 
 def test_which_to_measure_next_is_in_order_and_worth_it(state):
     held(state, 4)
+    known = Known(state)
     state.knowledge.rank()
+    assert known.meaning.startswith("In progress: ") and known.asking
     wait_for(state)
     best = state.knowledge.ranked
+    assert known.meaning == meaning(best, "") and not known.asking
     assert best.known == tuple(state.knowledge.known) and 4 not in best.contacts
-    assert meaning(best, False).startswith("Exact: mean interval")
+    assert meaning(best, "").startswith("Exact: mean interval")
     some = best._replace(after=np.where(np.arange(len(best.after)) < 3, best.after, np.nan))
-    assert "best 3" in meaning(some, False) and "standard deviation" in meaning(some, False)
+    assert "best 3" in meaning(some, "") and "standard deviation" in meaning(some, "")
     assert np.all(np.diff(best.after) >= 0) and best.after[0] < best.before
     assert best.before == pytest.approx(state.knowledge.narrowed.mean[1], abs=1e-6)
     held(state, int(best.contacts[0]))

@@ -35,7 +35,7 @@ class Known(Scripted):
         observe(self._show, state, "shown", "replay")
         observe(
             self._show, state.knowledge, "known", "narrowed", "ranked", "task.running",
-            "ranking.running",
+            "ranking.words",
         )  # fmt: skip
         self._show()
 
@@ -59,7 +59,7 @@ class Known(Scripted):
             chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
             words=words(knowledge, number) + sampled(state),
             ranked=[] if best is None else _ranks(best, number),
-            meaning="" if best is None else meaning(best, knowledge.ranking.running),
+            meaning=meaning(best, knowledge.ranking.words),
             asking=knowledge.ranking.running,
         )
 
@@ -109,10 +109,15 @@ def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
     ]
 
 
-def meaning(best: Ranked, running: bool) -> str:
-    """The meaning of the numbers in a list of contacts to measure, and which of them are exact."""
+def meaning(best: Ranked | None, running: str) -> str:
+    """The meaning of the numbers in a list of contacts to measure, and which of them are exact.
+
+    running: what is being computed, in words; empty if nothing is.
+    """
+    lines = [f"In progress: {running}."] if running else []
+    if best is None:
+        return " ".join(lines)
     exact, listed = int(np.isfinite(best.after).sum()), len(best.after)
-    lines = []
     if exact:
         which = "" if exact == listed else f" for the best {exact}"
         lines.append(f"Exact{which}: mean interval of all fₙ, now → with this force known.")
