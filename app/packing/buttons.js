@@ -58,7 +58,7 @@ const BUTTONS = `
     <span class="differs">from that <b class="origin"></b>, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span class="running">
-      <span>of the <b class="played"></b> stored networks played so far:</span>
+      <span>of the stored networks up to this one, <b class="upto"></b>:</span>
       <span tabindex="0" data-term="eta1">η₁ <b class="eta1"></b></span>
       <span tabindex="0" data-term="eta2">η₂ <b class="eta2"></b></span>
       <span tabindex="0" data-term="eta3">0.15 η₃ <b class="eta3"></b></span>
@@ -207,7 +207,7 @@ export class Buttons {
       eta1: form(walk.eta1[passed], 3),
       eta2: form(walk.eta2[passed], 3),
       eta3: form(0.15 * walk.eta3[passed], 3),
-      played: `${passed} of ${walk.number.length - 1}`,
+      upto: `${passed} of ${walk.number.length - 1}`,
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text

@@ -26,7 +26,7 @@ export class Replay {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
     this.held = null // a pulled network, shown instead of the states
-    this.passed = 0 // number of networks passed; the original one (frame 0) is not a state of the walk
+    this.passed = 0 // number of stored networks up to the position; the original one (frame 0) is not a state of the walk
     this.follow(between)
   }
 
