@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 import numpy as np
 
 from granforce.records import Cancelled, InputError, ResultWarning, worker_count
+from granforce.system.compiled import tell_when_compiling
 from granforce.system.interrupts import interrupted
 from granforce.types import Cancel, Mask
 
@@ -118,11 +119,18 @@ def _shown(name: str, options: dict[str, Any]) -> Iterator[None]:
     with tqdm(desc=name, leave=False) as bar:
 
         def show(done: float, total: float | None) -> None:
+            bar.set_description_str(name, refresh=False)
             bar.total = total
             bar.update(done - bar.n)
 
         options["progress"] = show
-        yield
+        end = tell_when_compiling(
+            lambda: bar.set_description_str(f"{name}, compiling once per machine")
+        )
+        try:
+            yield
+        finally:
+            end()
 
 
 def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:

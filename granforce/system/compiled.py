@@ -35,10 +35,10 @@ def find_a_place() -> None:
 
 def tell_when_compiling(
     say: Callable[[], object], compiled: Callable[[], object] = lambda: None
-) -> None:
+) -> Callable[[], None]:
     """Call say() once, as soon as a kernel is compiled that is not in the cache.
 
-    compiled() is called after each compilation.
+    compiled() is called after each compilation. Returns a function that ends this.
     """
     from numba.core import event
 
@@ -53,7 +53,9 @@ def tell_when_compiling(
         def on_end(self, happening: Any) -> None:
             compiled()
 
-    event.register("numba:compile", Listener())
+    listener = Listener()
+    event.register("numba:compile", listener)
+    return lambda: event.unregister("numba:compile", listener)
 
 
 def are_cached(last: str) -> bool:

@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 
 import granforce
 from granforce.numerics import lanes
-from granforce.system import compiled
+from granforce.system import cancelling, compiled
 
 PACKAGE = Path(granforce.__file__).parent
 
@@ -101,3 +102,16 @@ def test_kernels_kept_by_another_version_are_compiled_anew(tmp_path, monkeypatch
     assert kept.load(key) is None
     kept.save("another", "compiled anew")
     assert kept.load("another") == "compiled anew"
+
+
+def test_the_bar_of_a_call_says_that_kernels_are_compiled(capsys):
+    @cancelling.cancellable
+    def work(*, progress=None, cancel=None):
+        with event.trigger_event("numba:compile", data={}):
+            pass
+
+    work(progress=True)
+    assert "work, compiling once per machine" in capsys.readouterr().err
+    listening = len(event._registered["numba:compile"])
+    work(progress=True)
+    assert len(event._registered["numba:compile"]) == listening
