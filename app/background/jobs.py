@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +30,10 @@ from .notifications import as_one
 # Time, s, and part of a stage after which its end can be estimated: earlier, it is off by factors.
 ESTIMATED, ESTIMATED_PART = 1.0, 0.05
 LONGEST_LINE = 500  # characters of an error message on a page
+# Options of the command and arguments of the function in a message, such as " (--walls floor, or
+# walls=)", and what the page has instead, where its name is not the same.
+OPTIONS = re.compile(r" \((?:(?:[^()]* )?(--[a-z-]+)|\w+=)[^()]*\)")
+INSTEAD = {"--ensemble-mu": " (Friction μ)", "--known": " (select the contact and press H)"}
 LONG = 3.0  # s after which a job is a long one
 _ASK = 0.2  # s between two polls, and for which a job waits for its turn before it frees the thread
 WAITING = "waiting for a free processor"  # stage of a job that has not begun
@@ -389,7 +394,8 @@ def _duration(seconds: float) -> str:
 
 def error_line(error: BaseException) -> str:
     """An error in one line for the page."""
-    line = " ".join(str(error).split())[:LONGEST_LINE]
+    line = OPTIONS.sub(lambda found: INSTEAD.get(found[1], ""), " ".join(str(error).split()))
+    line = line[:LONGEST_LINE]
     if isinstance(error, InputError):
         return line
     return f"the computation failed: {type(error).__name__}: {line}"

@@ -13,6 +13,7 @@ import xarray as xr
 from granforce.measures.sampling import FEWEST, MIXED
 
 from ..results.library import Shown
+from ..results.progress_feed import Summary
 from ..results.replays import Replay, worded
 from ..results.selection import SOLVERS, Selection
 from ..state.app_state import AppState
@@ -76,17 +77,29 @@ def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]
     if held is not None and not state.elsewhere:
         free = "{} → {} given the held forces".format(*held.dimension)
     each = worded(state.shown, "contacts per disk")
-    values = (
-        ""
-        if volume is None
-        else with_error(volume["log_volume"].item(), volume["log_volume_error"].item())
-    )
     return [
         Quantity("z", "z", each, exact=f"{summary['coordination']:.3f}"),
-        Quantity("phi", "φ", "packing fraction", exact="–" if math.isnan(phi) else f"{phi:.4f}"),
+        Quantity(
+            "phi", "φ", "packing fraction",
+            exact="– (open box)" if math.isnan(phi) else f"{phi:.4f}",
+        ),
         Quantity("h", "h", "free dimensions", exact=free),
-        Quantity("volume", "ln V", "volume of S", exact=values),
+        Quantity("volume", "ln V", "volume of S", exact=_volume(summary, volume)),
     ]  # fmt: skip
+
+
+def _volume(summary: Summary, volume: xr.Dataset | None) -> str:
+    """ln V, or why there is none; empty if it can be measured."""
+    if volume is not None:
+        return with_error(volume["log_volume"].item(), volume["log_volume_error"].item())
+    if unbounded(summary):
+        return "∞"
+    return "" if summary["dimension"] else "– (one network)"
+
+
+def unbounded(summary: Summary) -> bool:
+    """Whether S is certified to be unbounded."""
+    return math.isnan(summary.get("eta1", 0.0))
 
 
 def changes(*compared: Shown) -> str:

@@ -1,6 +1,5 @@
 """The results for the states on screen: one line, and two tables with errors that it unfolds."""
 
-import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -21,6 +20,11 @@ from .result_values import Quantity
 
 MEASURE = '<button type="button" class="soft">measure</button>'
 NONE = "", "–"  # values that are not there
+UNBOUNDED = (
+    "S is unbounded: some forces can grow together without a load and have no largest value, so η "
+    "is undefined. To bound S, select such a contact and hold its force (H) or, if it is friction "
+    "that wedges the grains, choose a smaller μ."
+)
 UNIT = {"extent": " ⟨fₙ⟩"}
 FOLD = '<button type="button" class="fold" aria-label="all numbers, with their meaning"></button>'
 
@@ -63,8 +67,7 @@ class Results(Scripted):
     def _tell(self, *events: Any) -> None:
         replay = self._state.replay
         if replay is not None:
-            free = replay.summary["dimension"] > 0 and not self._work.measuring.running
-            self.html = results(self._state, self._volume, free)
+            self.html = results(self._state, self._volume)
 
     @from_browser(measure=True)
     def _measure(self) -> None:
@@ -74,8 +77,8 @@ class Results(Scripted):
             self._work.measuring.start(work, self._take)
 
 
-def results(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
-    """All numbers as HTML, and a note on omitted work; offered: whether to measure the volume.
+def results(state: AppState, volume: xr.Dataset | None = None) -> str:
+    """All numbers as HTML, and a note on omitted work.
 
     While other states are being computed, dashes, except for what is known of their packing.
     """
@@ -99,9 +102,11 @@ def results(state: AppState, volume: xr.Dataset | None, offered: bool) -> str:
     elif any(one.exact for one in measures):
         rows.append([f"exact{known}", *_values(measures, "exact")])
     packing = result_values.packing(state, volume)
-    values = [one.exact or (MEASURE if offered else "–") for one in packing]
-    doubts = filter(None, [result_values.unborne(state.replay), sampling and sampling.doubt])
-    doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in doubts)
+    unknown = "being measured" if state.work.measuring.running else MEASURE
+    values = [one.exact or unknown for one in packing]
+    doubts = [result_values.unborne(state.replay), sampling and sampling.doubt]
+    doubts.append(UNBOUNDED if result_values.unbounded(state.replay.summary) else "")
+    doubt = "".join(f'<p class="flag" role="note">⚠ {line}</p>' for line in filter(None, doubts))
     now, was = Shown(state.cell, state.replay, state.exact), state.before
     change = "" if was is None else f'<p class="was">{result_values.changes(was, now)}</p>'
     left = f'<p class="left">{worded(state.replay, left_out(state.replay.summary))}</p>'
@@ -133,7 +138,7 @@ def _laid_out(
 ) -> str:
     """The line and the tables; rows, values: of the tables; left: what the numbers leave out."""
     seen = [(one, one.seen, f" (exact {one.exact})" * (one.exact not in NONE)) for one in measures]
-    parts = [*seen, *((one, one.exact, "") for one in packing if one.exact)]
+    parts = [*seen, *((one, one.exact, "") for one in packing if one.exact[:1] not in NONE)]
     line = "".join(
         f"<span>{term(one.key, one.symbol)} <b>{value}</b>{more}</span>"
         for one, value, more in parts
@@ -184,8 +189,6 @@ def left_out(summary: Summary) -> str:
         if (count := summary.get(key))
     ]
     line = f"Not counted: {', '.join(counts) or 'nothing'}."
-    if math.isnan(summary.get("eta1", 0.0)):  # only if S is certified to be unbounded
-        line = f"S is unbounded: some forces have no largest value, so η is undefined. {line}"
     if summary.get("rejected") or summary.get("unconverged"):
         line += (
             f" {term('failed', 'Failed attempts')}: {summary['rejected']} not in balance, "

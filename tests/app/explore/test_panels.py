@@ -275,6 +275,26 @@ def test_a_packing_without_forces_follows_the_friction(state):
     assert "force at the start" in bars.sorts.options
 
 
+def test_an_unbounded_set_says_why_values_are_missing_and_what_the_page_has_for_it(state):
+    """Twelve disks on a floor between two walls, five of them wedged between these."""
+    places = [
+        (k + 0.5 + row / 2, 0.5 + row * 0.75**0.5) for row in range(3) for k in range(5 - row)
+    ]
+    rows = "".join(f"{x!r},{y!r},0.5\n" for x, y in places)
+    view, results = upload_view.View(state), Results(state)
+    view._dropped([("heap.csv", b"x,y,r\n" + rows.encode())])
+    view.around.value, view.gravity.value, view.mu.value = "box", "1", "0.5"
+    press(view.read)
+    wait_for(state, lambda: state.cell.selection.imported)
+    told = re.sub("<[^>]*>", "", results.html)
+    assert "S is unbounded" in told and "∞" in told and "measure" not in told
+    assert "– (open box)" in told and "φ –" not in told.replace("packing fraction", "")
+    state.knowledge.rank()
+    wait_for(state)
+    assert "wedged" in state.work.message and "--" not in state.work.message
+    assert "press H" in state.work.message
+
+
 @pytest.mark.parametrize("contacts", [False, True])
 def test_tables_of_tilted_boxes_are_read(state, contacts):
     """Sides and tilt are typed in one field."""
@@ -1067,7 +1087,7 @@ def test_a_page_as_a_file_of_bodies_keeps_the_lines_of_thrust(visited):
     assert '"thrust": {"a": [' in page and "where the resultant of a joint can pass" in page
     assert '"outlines": [[' in page
     state.replay.summary["rattlers"] = 2
-    assert ">loose bodies<" in results_line.results(state, None, False)
+    assert ">loose bodies<" in results_line.results(state)
 
 
 def test_the_exact_eta3_is_a_named_line_beside_its_growth(state):

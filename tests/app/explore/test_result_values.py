@@ -35,7 +35,7 @@ def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
     assert found["eta3"].seen == short(0.15 * summary["eta3"])
     kept = 0.15 * ready.replay.growth["eta3"][-1]  # of the 50 networks that are stored
     assert float(found["eta3"].seen) > kept + 0.01
-    told = results(ready, None, False)
+    told = results(ready)
     assert 'data-term="error"' in told
     assert "seen in all 1000 networks" in told and "from these 50, the values from all 1000" in told
     assert found["eta3"].exact == short(0.15 * ready.exact["eta3"].item())
@@ -44,18 +44,18 @@ def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
 
 def test_a_change_of_friction_alone_is_compared_until_the_next_change(state):
     seen, was = state.replay.summary, state.cell.mu
-    assert state.before is None and "→" not in results(state, None, False)
+    assert state.before is None and "→" not in results(state)
     state.choose(mu=1)
     wait_for(state)
     now = state.replay.summary
-    line = re.sub("<[^>]*>", "", results(state, None, False))
+    line = re.sub("<[^>]*>", "", results(state))
     assert f"μ {was:g} → 1, η₁ {short(seen['eta1'])} → {short(now['eta1'])}, " in line
     assert f"h {seen['dimension']} → {now['dimension']}" in line
     state.looks.colour = "extent"
     assert f" at μ = {was:g})" in legend.legend(state)
     state.ask(state.cell.selection._replace(states=5), at_once=True)
     wait_for(state)
-    assert state.before is None and "→" not in results(state, None, False)
+    assert state.before is None and "→" not in results(state)
 
 
 def test_free_dimensions_are_derived(ready):

@@ -95,7 +95,7 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     """Networks of all of S exceed bounds given held forces: they are not drawn within them."""
     intervals = View(state)
     held(state, 4)
-    (h, fewer), shown = state.knowledge.narrowed.dimension, results(state, None, False)
+    (h, fewer), shown = state.knowledge.narrowed.dimension, results(state)
     assert f"{h} → {fewer} given the held forces" in shown
     assert "exact given the held forces" in shown and "seen in all of S" in shown
     bars, lead = intervals.drawing.bars.data, intervals.lead
@@ -106,7 +106,7 @@ def test_numbers_and_bars_say_that_they_obey_what_is_held(state):
     state.knowledge.release(4)
     wait_for(state)
     assert np.all(np.isfinite(intervals.drawing.bars.data["high"]))
-    assert f"{h} = " in results(state, None, False) and "given" not in lead.object
+    assert f"{h} = " in results(state) and "given" not in lead.object
 
 
 def test_networks_are_sampled_with_what_is_held(state, visited):
@@ -125,9 +125,9 @@ def test_networks_are_sampled_with_what_is_held(state, visited):
     shown = Known(state).words
     assert f"{fewer} of {h}" in shown and "played have it" in shown
     seen = "seen given the held forces (30 networks)"
-    assert seen in results(state, None, False) and "ignores" not in results(state, None, False)
+    assert seen in results(state) and "ignores" not in results(state)
     state.looks.tab = "perturb"
-    assert f"{seen}, which a push ignores" in results(state, None, False)
+    assert f"{seen}, which a push ignores" in results(state)
     state.looks.tab = "intervals"
     assert state.knowledge.narrowed is narrowed  # not computed again
     assert np.all(np.isfinite(View(state).drawing.bars.data["high"]))

@@ -1,7 +1,6 @@
 """Bring your own packing: drop its files, read the report, and use it like any other."""
 
 import html
-import re
 from typing import Any
 from urllib.parse import quote
 
@@ -13,6 +12,7 @@ from granforce.packing.importers.text import number_or_nan
 from granforce.records import InputError, brief, friction, make_cell, positive
 from granforce.system.wording import number
 
+from ....background.jobs import error_line
 from ....background.limits import LIMITS
 from ....results import photoelastic_frames, uploads
 from ....results.selection import Selection, typed
@@ -70,8 +70,6 @@ WALLS = {
 }  # fmt: skip
 AROUND = {"": "none", "floor": "a floor", "box": "a floor and two sides"}
 SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
-# Options of the command and arguments of the function in a message: " (--walls floor, or walls=)".
-OPTIONS = re.compile(r" \((?:--|\w+=)[^()]*\)")
 
 
 class View:
@@ -144,7 +142,7 @@ class View:
         try:
             self.files = uploads.added(self.files, new)
         except InputError as error:
-            self._refuse(str(error))
+            self._refuse(error_line(error))
             return
         self._ask()
         absent = [uploads.WORDS[part] for part in uploads.missing(self.files)]
@@ -161,7 +159,7 @@ class View:
         try:
             options = self._options()
         except InputError as error:
-            self._refuse(str(error))
+            self._refuse(error_line(error))
             return
         loose = uploads.loose(self.files) and not (options["box"] or options["gravity"])
         self.box.error_state = loose
@@ -255,7 +253,6 @@ class View:
         self.waiting.param.update(title=line, visible=bool(line))
 
     def _refuse(self, line: str) -> None:
-        line = OPTIONS.sub("", line)  # the page has fields instead
         self.error.param.update(title=line, visible=bool(line))
 
 
