@@ -6,6 +6,7 @@ import json
 import re
 import threading
 import warnings
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,6 +33,7 @@ from app.explore.tabs.export import export as export_view
 from app.explore.tabs.export import files, standalone
 from app.explore.tabs.force_space import force_space as plane_view
 from app.explore.tabs.friction import friction as statistics_view
+from app.explore.tabs.friction.claims import SAMPLERS
 from app.explore.tabs.intervals import intervals as intervals_view
 from app.explore.tabs.intervals.growth_figure import GrowthFigure
 from app.explore.tabs.push import push as perturb_view
@@ -569,6 +571,9 @@ def test_what_is_said_of_friction_is_made_from_the_study(state):
     every = json.loads((ROOT / "data" / "claims.json").read_text())["claims"]
     shown = [claim["id"] for figure in TOPICS for claim in study_data.claims(figure)]
     assert sorted(shown) == sorted(claim["id"] for claim in every)  # each once
+    ((most, _),) = Counter(claim["sampler"] for claim in every).most_common(1)
+    judged = f"judged by what is named below each, mostly {SAMPLERS[most]}."
+    assert judged in view.first.object and judged in told
     pushed = len(study_data.claims(2))
     assert told.count("<tr><td>") == len(every) - pushed > 20
 
