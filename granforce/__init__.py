@@ -135,6 +135,7 @@ _BY_QUESTION = {
         "load_packing": "packing.importers",
         "save_lammps": "packing.exporters",
         "save_vtk": "packing.exporters",
+        "cached": "study.kinds.cached",
         "open_store": "study.store",
         "Store": "study.store",
         "Entry": "study.store",

@@ -116,6 +116,7 @@ from granforce.records import make_contacts as make_contacts
 from granforce.records import make_contacts_at as make_contacts_at
 from granforce.records import make_packing as make_packing
 from granforce.study.evolution import evolution as evolution
+from granforce.study.kinds.cached import cached as cached
 from granforce.study.scan import scan as scan
 from granforce.study.series import infer_series as infer_series
 from granforce.study.store import Entry as Entry

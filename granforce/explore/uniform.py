@@ -95,11 +95,13 @@ class UniformSample(NamedTuple):
     ]
     setup_seconds: Annotated[float, quantity("setup_seconds")]
     sampling_seconds: Annotated[float, quantity("sampling_seconds", note="of dropped states, too")]
-    diagnosis_seconds: Annotated[float, "wall time of the diagnostics, s"]
+    diagnosis_seconds: Annotated[float, "wall time of the diagnostics, s; NaN if loaded"]
     method: Annotated[str, "billiard or hit_and_run"]
-    walls: Annotated[Walls, "the coordinates used"]
+    walls: Annotated[Walls, "the coordinates used; None if loaded"]
     reach: Annotated[float, "root mean square distance |s − 1| from the centre, from the warm-up"]
-    ends: Annotated[Sequence[ChainState], "of each chain, from which it can be continued"]
+    ends: Annotated[
+        Sequence[ChainState], "of each chain, from which it can be continued; none if loaded"
+    ]
 
     @property
     def effective(self) -> float:
@@ -109,7 +111,7 @@ class UniformSample(NamedTuple):
     @property
     def shortfall(self) -> str:
         """Why the sample is not to be relied on, and what to do; empty if it is."""
-        if not self.walls.dimension:
+        if self.counts["skipped"]:
             return ""
         why = unreliable(self.mixing.worst_r_hat, self.effective)
         if not self.reached and not why:
@@ -333,7 +335,9 @@ def sample_uniform(
 
 
 def _check_same(previous: UniformSample, chains: int, seed: int, method: str) -> None:
-    """InputError unless a sample was drawn with these arguments."""
+    """InputError unless a sample was drawn with these arguments, and has ends to go on from."""
+    if not previous.ends:
+        raise InputError("a sample from a store cannot be continued: ask for more states")
     streams: Any = previous.ends[0].rng.bit_generator.seed_seq
     drawn = {
         "chains": (len(previous.ends), chains),

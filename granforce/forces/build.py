@@ -6,6 +6,7 @@ other contacts; both are counted.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -70,6 +71,8 @@ def ensemble(
     InputError
         For conditions that exclude each other.
     """
+    given = {"mu": mu, "prescribed": prescribed, "stress": stress, "known": known}
+    given |= {"frozen": frozen, "prune": prune}
     count = len(packing.contacts.i)
     contacts, mu = with_friction(packing.contacts, packing.mu if mu is None else mu)
     packing = packing._replace(contacts=contacts)
@@ -91,13 +94,13 @@ def ensemble(
     free = np.flatnonzero(~held)
     if prune:
         free = backbone.without_danglers(packing, free, held)
-    full = _assemble(packing, conditions, free)
-    _check_frozen_and_known(packing, held, bounds, full.force_scale)
-    if not prune:
-        return full
-    pruned = _pruned(full, conditions)
-    _check_idle_and_known(pruned, bounds)
-    return pruned
+    S = _assemble(packing, conditions, free)
+    _check_frozen_and_known(packing, held, bounds, S.force_scale)
+    if prune:
+        S = _pruned(S, conditions)
+        _check_idle_and_known(S, bounds)
+    object.__setattr__(S, "conditions", copy.deepcopy(given))  # arrays may be changed
+    return S
 
 
 def with_idle(S: Ensemble) -> Ensemble:

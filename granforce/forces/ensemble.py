@@ -12,7 +12,7 @@ Two numbers, both in ⟨f_n⟩, decide whether a network is in S: its distance f
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
@@ -88,6 +88,10 @@ class Ensemble:
     computed: Annotated[
         Floats | None, "(N_c, 2) a network computed while the backbone was determined"
     ] = None
+    # Not copied to ensembles that are made from this one.
+    conditions: Annotated[
+        dict[str, Any] | None, "arguments of `ensemble`; None if made in another way"
+    ] = field(default=None, init=False)
 
     @property
     def per_contact(self) -> int:

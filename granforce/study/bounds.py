@@ -1,7 +1,8 @@
 """Exact bounds, limit loads, outlines and volumes, of S and of its stresses, as datasets."""
 
 import json
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -12,9 +13,13 @@ from granforce.explore.intervals import Intervals, LimitLoads
 from granforce.explore.outline import Outline
 from granforce.explore.stress_outline import StressOutline
 from granforce.explore.volume import Volume
+from granforce.forces.contact_problem import wedged
 from granforce.forces.ensemble import Ensemble
-from granforce.study.schema import extension, labelled, stored
+from granforce.study.schema import extension, labelled, loaded, stored
+from granforce.tolerances import CARRYING
 from granforce.types import Floats, Integers
+
+T = TypeVar("T")
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
@@ -24,6 +29,25 @@ def _dataset(result: Any, **arrays: Any) -> xr.Dataset:
     """The stored fields of a result, and more arrays, with its counts."""
     attrs = {"counts": json.dumps(result.counts)} if hasattr(result, "counts") else {}
     return labelled(stored(result) | arrays, attrs)
+
+
+def result_of(kind: Callable[..., T], dataset: xr.Dataset, **others: Any) -> T:
+    """The result of a dataset, with its counts, and what the dataset lacks."""
+    counts = dataset.attrs.get("counts")
+    more = {} if counts is None else {"counts": json.loads(counts)}
+    return loaded(kind, dataset, **more, **others)
+
+
+def intervals_of(S: Ensemble, dataset: xr.Dataset) -> Intervals:
+    """The Intervals of S in a dataset."""
+    low, high = dataset["low"].values, dataset["high"].values
+    return result_of(
+        Intervals,
+        dataset,
+        backbone=high[:, 0] > CARRYING * S.force_scale,
+        converged=not (np.isnan(low) | np.isnan(high)).any(),
+        wedged=wedged(S),
+    )
 
 
 def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -> xr.Dataset:

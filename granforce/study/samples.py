@@ -7,11 +7,12 @@ import xarray as xr
 
 from granforce import measures
 from granforce.experiment.infer import Draws, Inference
+from granforce.explore.mixing import Mixing
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.grain_pressures import GrainPressures
-from granforce.study.schema import extension, labelled, stored
+from granforce.study.schema import extension, labelled, loaded, stored
 from granforce.types import Floats, Integers
 
 
@@ -36,10 +37,7 @@ def walk_dataset(
 def walk_of(dataset: xr.Dataset) -> Walk:
     """The Walk of a dataset that contains all its states."""
     counted = ("accepted", "rejected", "unconverged", "skipped")
-    return Walk(
-        **{name: dataset[name].values for name in Walk._fields if name != "counts"},
-        counts={name: dataset[name].item() for name in counted},
-    )
+    return loaded(Walk, dataset, counts={name: dataset[name].item() for name in counted})
 
 
 def uniform_dataset(
@@ -55,6 +53,28 @@ def uniform_dataset(
             **S.skipped,
             "seconds": seconds,
         }
+    )
+
+
+def uniform_of(dataset: xr.Dataset) -> UniformSample:
+    """The UniformSample of a dataset that contains all its states, without its chains' ends."""
+    chains = len(np.unique(dataset["chain"]))
+    by_chain = {
+        name: dataset[name].values.reshape(chains, -1, *dataset[name].shape[1:])
+        for name in ("states", "residual", "violation")
+    }
+    counted = ("turns", "refused", "dropped", "held", "skipped")
+    return loaded(
+        UniformSample,
+        dataset,
+        **by_chain,
+        mixing=loaded(Mixing, dataset),
+        reached=bool(dataset["reached"]),
+        counts={name: dataset[name].item() for name in counted},
+        diagnosis_seconds=np.nan,
+        method="billiard",
+        reach=np.nan,
+        ends=(),
     )
 
 

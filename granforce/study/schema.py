@@ -151,8 +151,8 @@ def dataset_packing(dataset: xr.Dataset) -> Packing:
     """
     arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
     return Packing(
-        contacts=_loaded(Contacts, dataset),
-        shapes=_loaded(Shapes, dataset) if "mass" in dataset else None,
+        contacts=loaded(Contacts, dataset),
+        shapes=loaded(Shapes, dataset) if "mass" in dataset else None,
         mu=float(dataset["mu"]),
         pressure=float(dataset["pressure"]),
         info=json.loads(dataset.attrs["info"]),
@@ -161,10 +161,15 @@ def dataset_packing(dataset: xr.Dataset) -> Packing:
     )
 
 
-def _loaded(kind: Callable[..., T], dataset: xr.Dataset) -> T:
-    """A record of stored arrays; None for those that the dataset lacks."""
-    names = {name: field.stored for name, field in fields(kind).items()}
-    return kind(**{k: dataset[v].values if v in dataset else None for k, v in names.items()})
+def loaded(kind: Callable[..., T], dataset: xr.Dataset, **others: Any) -> T:
+    """A record of stored arrays and numbers, and of others; None for those that are in neither."""
+    declared = fields(kind)
+    found = {}
+    for name in getattr(kind, "_fields", ()):
+        stored = declared[name].stored
+        values = dataset[stored].values if stored in dataset else None
+        found[name] = values if values is None or values.ndim else values.item()
+    return kind(**found | others)
 
 
 def to_builtin(value: Any) -> Any:

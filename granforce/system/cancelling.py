@@ -45,6 +45,18 @@ _scope = contextvars.ContextVar("scope", default=_NEVER)
 _APART = "granforce-apart"  # threads with a call that cannot read the flag
 
 
+# What answers calls of cancellable functions instead of themselves: a store. While it computes an
+# answer, which will be warned about, it is `called`.
+answering: contextvars.ContextVar[Callable[..., Any] | None] = contextvars.ContextVar(
+    "answering", default=None
+)
+
+
+def called(function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """The function's own result."""
+    return function(*arguments, **options)
+
+
 @contextmanager
 def scope(cancel: Cancel | None = None) -> Iterator[None]:
     """A context whose work ends soon after cancel() → True, or after Ctrl-C in the main thread.
@@ -93,9 +105,11 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
     def inside(*arguments: P.args, **options: P.kwargs) -> T:
         cancel = cast("Cancel | None", options.pop("cancel", None))
         with _shown(function.__name__, options), scope(cancel):
-            result = function(*arguments, **options)
+            answer = answering.get()
+            result = (answer or called)(function, *arguments, **options)
             for one in result if isinstance(result, list) else [result]:
-                if (reason := getattr(one, "shortfall", "")) and not cancelled():
+                reason = "" if answer is called else getattr(one, "shortfall", "")
+                if reason and not cancelled():
                     warnings.warn(reason, ResultWarning, stacklevel=3)
             return result
 

@@ -11,6 +11,7 @@ from granforce.study.kinds.packings import (
     imported_parameters,
     keep_packing,
     parameters_of,
+    remember,
 )
 from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
 from granforce.study.kinds.states import INFERENCE, INFORMATIVE, UNIFORM, VOLUME, WALK
@@ -33,6 +34,7 @@ __all__ = [
     "imported_parameters",
     "keep_packing",
     "parameters_of",
+    "remember",
 ]
 
 KINDS = {

@@ -103,10 +103,13 @@ def _made(packing: Packing) -> Parameters | None:
     """The parameters that the info of a packing names, or None."""
     settings = ("seed", "radii", "dt", "box_mass", "sweeps", "accuracy", "drag_below", "box")
     given = {name: packing.info[name] for name in settings if name in packing.info}
+    disks = packing.info.get("disks", len(packing.r))  # others are behind walls
+    if not np.isnan(packing.pressure):  # not on a floor
+        given["pressure"] = packing.pressure
     if given.get("radii") == "list":
-        given["radii"] = packing.r.tolist()
+        given["radii"] = packing.r[:disks].tolist()
     try:
-        return _packing_parameters(len(packing.r), packing.mu, pressure=packing.pressure, **given)
+        return _packing_parameters(disks, packing.mu, **given)
     except (TypeError, ValueError):  # of another program
         return None
 
@@ -171,8 +174,7 @@ _last: tuple[tuple[str, str], Ensemble] | None = None
 def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
     """The ensemble of a stored packing and friction, with the forces outside a slice frozen."""
     global _last
-    named = {name: parameters[name] for name in _OF_ENSEMBLE if parameters.get(name) is not None}
-    key, last = (str(store.path), canonical(named)), _last
+    key, last = _key(store, parameters), _last
     if last is not None and last[0] == key:
         return last[1]
     last = _last = None  # its memory may be needed
@@ -182,6 +184,17 @@ def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
     S = ensemble(packing, parameters["mu"], frozen=frozen, **conditions_of(parameters))
     _last = key, S
     return S
+
+
+def remember(store: Store, parameters: Parameters, S: Ensemble) -> None:
+    """Let the next results use this ensemble, which must be that of the parameters."""
+    global _last
+    _last = _key(store, parameters), S
+
+
+def _key(store: Store, parameters: Parameters) -> tuple[str, str]:
+    named = {name: parameters[name] for name in _OF_ENSEMBLE if parameters.get(name) is not None}
+    return str(store.path), canonical(named)
 
 
 def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
