@@ -97,7 +97,10 @@ export class Buttons {
       else target.value = target.defaultValue
     })
     const extras = this.part("extras")
-    extras.addEventListener("toggle", () => open("check", extras.open))
+    extras.addEventListener("toggle", () => {
+      open("check", extras.open)
+      if (extras.open && extras.matches(":focus-within")) this.part("skips").scrollIntoView({ block: "nearest" })
+    })
     const force = this.part("force")
     force.addEventListener("input", () => { this.typed = true })
     force.addEventListener("change", () => {

@@ -10,6 +10,7 @@ from serving import (
     MODEL,
     ask,
     at_rest,
+    chain,
     column,
     expect,
     frames,
@@ -133,6 +134,25 @@ def test_hovering_tells_grain_and_contact(page):
     page.mouse.move(*at(page, x, y))
     page.get_by_text(f"{grain} (loose)").wait_for()
     expect(tip).to_contain_text(f"{r:.3f}")
+
+
+def test_the_packing_keeps_its_size_and_what_is_told_of_a_contact_stays_within_it(page):
+    """Where rows come to it, and where what compares networks is opened."""
+    page.mouse.move(*chain(page)[1:])
+    page.locator(".tip.on").wait_for()
+    beyond = """(() => {
+        const {describe, tip, root} = scene
+        scene.describe = {contact: () => [["a".repeat(30), "b".repeat(15)]]} // as held forces add
+        scene.fillTip()
+        const box = tip.getBoundingClientRect(), around = root.getBoundingClientRect()
+        scene.describe = describe
+        return [around.x - box.x, box.right - around.right, 300 - box.width]
+    })()"""
+    assert max(scene(page, beyond)) <= 0.5
+    opened = scene(page, "scene.size")
+    more(page).locator(".extras summary").click()
+    frames(page, 3)
+    assert scene(page, "scene.size") == opened
 
 
 def test_the_forces_on_a_disk_are_shown_and_balance(page):

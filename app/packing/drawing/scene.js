@@ -366,8 +366,8 @@ export class Scene {
 
   /** Next to the pointer, on the side with more room, and within the picture. */
   placeTip(px, py) {
-    const { tip, size } = this
-    const from = (at, long) => Math.max(0, Math.min(size - long, at > size / 2 ? at - TIP - long : at + TIP))
-    tip.style.transform = `translate(${from(px, tip.offsetWidth)}px, ${from(py, tip.offsetHeight)}px)`
+    const { tip, size } = this // 100 %: of the box, which grows where rows come
+    const from = (at) => `max(0px, min(${size}px - 100%, ${at > size / 2 ? `${at - TIP}px - 100%` : `${at + TIP}px`}))`
+    tip.style.transform = `translate(${from(px)}, ${from(py)})`
   }
 }
