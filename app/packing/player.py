@@ -261,7 +261,7 @@ def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
     """
     disks, links = replay.disks, replay.links
     whole = {"contact", "i", "j"}
-    radius = np.zeros(replay.summary["n"])
+    radius = np.zeros(1 + max(of.max() for of in (disks.grain, links.i, links.j)))  # 0: of walls
     radius[disks.grain] = disks.r
     return {
         "normal": replay.normal.ravel(),

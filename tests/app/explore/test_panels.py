@@ -18,7 +18,7 @@ from bokeh.io.doc import patch_curdoc
 from bokeh.models import CustomJS
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
-from small_store import KEPT, ROOT, STATES
+from small_store import DISKS, KEPT, ROOT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
@@ -27,6 +27,7 @@ from app.background.limits import Limits
 from app.browser.messages import fits
 from app.explore import results_line
 from app.explore.controls import Controls
+from app.explore.explanation import summary_html
 from app.explore.result_values import between
 from app.explore.results_line import Results
 from app.explore.tabs.export import export as export_view
@@ -205,12 +206,12 @@ def test_disks_without_a_box_ask_for_it(state):
     view.mu.value = "0.1"
     view._dropped([("disks.csv", table(packing))])
     assert view.waiting.visible and "Enter the sides" in view.waiting.title
-    assert view.box.visible and view.box.error_state and view.read.visible
+    assert view.box.visible and view.read.visible and not view.box.error_state
     assert not view.error.visible and not view.task.running
     view.box.value = ", ".join(map(repr, map(float, packing.box)))
     press(view.read)
     wait_for(state, lambda: "disks.csv" in view.report.object)
-    assert not view.waiting.visible and not view.box.error_state
+    assert not view.waiting.visible
 
 
 def test_disks_on_a_floor_need_walls_and_gravity(state):
@@ -286,8 +287,10 @@ def test_an_unbounded_set_says_why_values_are_missing_and_what_the_page_has_for_
     view, results = upload_view.View(state), Results(state)
     view._dropped([("heap.csv", b"x,y,r\n" + rows.encode())])
     view.around.value, view.gravity.value, view.mu.value = "box", "1", "0.5"
+    assert not view.box.error_state and Controls(state).n.value == DISKS
     press(view.read)
     wait_for(state, lambda: state.cell.selection.imported)
+    assert Controls(state).n.value == 12 and "These 12 disks" in summary_html(state.replay)
     told = re.sub("<[^>]*>", "", results.html)
     assert "S is unbounded" in told and "∞" in told and "measure" not in told
     assert "– (open box)" in told and "φ –" not in told.replace("packing fraction", "")

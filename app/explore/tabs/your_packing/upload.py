@@ -162,7 +162,6 @@ class View:
             self._refuse(error_line(error))
             return
         loose = uploads.loose(self.files) and not (options["box"] or options["gravity"])
-        self.box.error_state = loose
         self._wait(HOLD_WANTED if loose else "")
         if loose:
             return
