@@ -2,6 +2,7 @@
 // the prediction.
 
 import { button, createElement } from "../browser/dom.js"
+import { STILL } from "../browser/motion.js"
 import { QuantityPlot } from "./drawing/quantity_plot.js"
 
 const PREDICT = "Drag the marker to your prediction.", WAIT = "Computing the networks … The first time on a server, this can take a minute."
@@ -110,7 +111,7 @@ export class PredictDoSee {
 
   /** Scroll to the answer, unless it is in view, once the hand lets go. */
   reveal() {
-    const once = new AbortController(), behavior = window.matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth"
+    const once = new AbortController(), behavior = STILL.matches ? "auto" : "smooth"
     for (const end of ["pointerup", "keyup"]) window.addEventListener(end, () => {
       once.abort()
       this.voice.querySelector(".verdict")?.scrollIntoView({ block: "nearest", behavior })

@@ -7,6 +7,7 @@ import { Buttons } from "./buttons.js"
 import { Grab, UNCHOSEN } from "./hand/drag_force.js"
 import { extend, Live, roomy } from "./replay/live.js"
 import { Look } from "./drawing/chain_style.js"
+import { STILL } from "../browser/motion.js"
 import { plain } from "../browser/to_object.js"
 import { Pins } from "./drawing/pins.js"
 import { drawMotion } from "./drawing/first_motion.js"
@@ -23,7 +24,6 @@ const PLOTS_MS = 30 // shortest time between two repaints of the plots while a f
 const OLD = 0.9 // opacity of outdated results, which are also grey but still legible
 const NO_ERROR = "Enter an error bar of 0 or more, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // after which a moved view is stored in the link
-const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has its own column, see explore_page.py
 
 class Player {

@@ -1,11 +1,12 @@
 // Scrolls what a visitor unfolds into view, while it grows: plots follow their title.
 
+import { STILL } from "../browser/motion.js"
+
 const TITLE = "summary, .MuiAccordionSummary-root", FOLD = "details, .MuiAccordion-root"
 const GROWS_MS = 2000 // after a click, unless the visitor scrolls
 
 export function render({ model }) {
-  const still = matchMedia("(prefers-reduced-motion: reduce)")
-  const follow = ([{ target }]) => target.scrollIntoView({ block: "nearest", behavior: still.matches ? "auto" : "smooth" })
+  const follow = ([{ target }]) => target.scrollIntoView({ block: "nearest", behavior: STILL.matches ? "auto" : "smooth" })
   const growth = new ResizeObserver(follow), end = () => growth.disconnect()
   let ending = 0
 

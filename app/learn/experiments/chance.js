@@ -1,5 +1,6 @@
 // The random walk, in the plane of two forces, and the part of S there that it reaches.
 
+import { STILL } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
@@ -14,7 +15,6 @@ export class Chance extends PackingExperiment {
     this.canvas.show(packing, null)
     this.canvas.scene.pair = [contact, other]
     this.drawn = [...packing.number].map((number, row) => Object.assign([force(row, contact), force(row, other)], { number }))
-    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
   }
 
   /** Predictions cannot be outside the range that the text gives. */
@@ -54,7 +54,7 @@ export class Chance extends PackingExperiment {
 
   /** Play the walk, which began at this time. */
   walk(began) {
-    const last = this.drawn.length - 1, part = this.still ? 1 : Math.max(0, (performance.now() - began) / 1000 / SECONDS)
+    const last = this.drawn.length - 1, part = STILL.matches ? 1 : Math.max(0, (performance.now() - began) / 1000 / SECONDS)
     this.walking = part < 1
     this.stepTo(Math.min(last, Math.floor(part * last)))
     if (this.walking) this.frame = requestAnimationFrame(() => this.walk(began))

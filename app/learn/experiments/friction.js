@@ -2,6 +2,7 @@
 // every stop; the picture shows the stored packing with the nearest friction, running through its
 // networks.
 
+import { STILL } from "../../browser/motion.js"
 import { PackingExperiment } from "./packing_experiment.js"
 
 const SECONDS = 0.8 // from one network to the next
@@ -14,7 +15,6 @@ export class Friction extends PackingExperiment {
     const { mu, spread, packed, touching, free } = await source.get("curve")
     Object.assign(this, { stops: [...mu], spreads: [...spread], packed: [...packed], touching: [...touching], free: [...free], packings: new Map(), visited: new Set() })
     this.value = nearest(this.stops, START)
-    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     const fetch = (one) => source.get("packing", String(one)).then((packing) => this.packings.set(one, packing))
     const fetched = new Map([...new Set(this.packed)].map((one) => [one, fetch(one)]))
     await fetched.get(this.packed[this.stops.indexOf(this.value)])
@@ -41,8 +41,8 @@ export class Friction extends PackingExperiment {
     this.frame = requestAnimationFrame((next) => this.play(next))
     const { packing, palettes, network } = this, rows = packing.number.length, { normal, contacts } = packing
     if (!this.host.isConnected) return
-    const at = (time / 1000 / SECONDS) % (rows - 2), part = this.still ? 0 : at % 1, row = 1 + Math.floor(at)
-    if (this.still && row === this.row) return
+    const at = (time / 1000 / SECONDS) % (rows - 2), part = STILL.matches ? 0 : at % 1, row = 1 + Math.floor(at)
+    if (STILL.matches && row === this.row) return
     this.row = row
     for (let c = 0; c < contacts; c++) network[c] = (1 - part) * normal[row * contacts + c] + part * normal[(row + 1) * contacts + c]
     this.canvas.draw(network, this.before, palettes)

@@ -1,6 +1,7 @@
 // Two disks are pushed apart: the network follows, until disks start to move. Then the same disks are
 // pushed again, from other networks of the walk.
 
+import { STILL } from "../../browser/motion.js"
 import { networkAt } from "../../packing/replay/replay.js"
 import { OPENS } from "../../packing/drawing/first_motion.js"
 import { Sway } from "../../packing/drawing/displacement.js"
@@ -13,7 +14,6 @@ export class Push extends PackingExperiment {
     this.packing = await source.get("packing", "0.1")
     Object.assign(this, { source, limits: [], network: this.asPacked(this.packing) })
     this.canvas.show(this.packing, null)
-    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     this.sway = new Sway(this.canvas.scene)
     this.begin(0, await source.get("push", "0"))
     this.answer = this.limit
@@ -67,7 +67,7 @@ export class Push extends PackingExperiment {
       this.answered = true
       limits[start] = { value: limit, words: `network ${path.number}: ${limit.toFixed(2)}` }
     }
-    if (!this.still && moves !== Boolean(this.canvas.scene.offset)) this.sway.take(this.canvas.motion)
+    if (!STILL.matches && moves !== Boolean(this.canvas.scene.offset)) this.sway.take(this.canvas.motion)
     this.changed()
   }
 

@@ -1,6 +1,7 @@
 // Chapters of small scenes: the bodies with their forces, and the explored part of S over one or two
 // forces.
 
+import { STILL } from "../../browser/motion.js"
 import { unflat } from "../../browser/canvas_paths.js"
 import { Arrows } from "../drawing/scene_canvas.js"
 import { fixed } from "../model/middle.js"
@@ -130,8 +131,7 @@ export class SceneExperiment {
     let to = from
     for (let k = 0; k < STEPS; k++) to = body.step(to, this.random, [x, y])
     this.others = Math.hypot(...to.map((v, d) => v - from[d])) > FOUND * body.scaleOf()
-    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
-    this.go(from, to, still ? -Infinity : performance.now())
+    this.go(from, to, STILL.matches ? -Infinity : performance.now())
   }
 
   /** Move from one point of S to another, which began at this time. */

@@ -1,6 +1,7 @@
 // Computations in progress: a packing under compression, then a growing walk.
 
 import { CARRYING } from "../drawing/chain_style.js"
+import { STILL } from "../../browser/motion.js"
 import { plain } from "../../browser/to_object.js"
 
 const GLIDE = 250 // ms of the transition from the view of the moving packing to that of the finished one
@@ -152,7 +153,7 @@ export class Live {
   /** Move from a view to the one that is set. */
   glide(from) {
     const { scene } = this.player, to = scene.view, begin = performance.now()
-    if (!from || matchMedia("(prefers-reduced-motion: reduce)").matches) return
+    if (!from || STILL.matches) return
     const step = (now) => {
       const part = Math.min(1, Math.max(0, (now - begin) / GLIDE)), mix = (a, b) => a + part * (b - a)
       if (scene.frozen || (scene.view !== to && scene.view !== this.between)) return // moved by the user

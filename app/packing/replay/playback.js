@@ -1,6 +1,7 @@
 // Playing: the replay advances with every painted frame, and a pause comes to rest at a network.
 
 import { CATCH_UP } from "./live.js"
+import { STILL } from "../../browser/motion.js"
 
 const PLOTS_MS = 30 // shortest time between two repaints of the plots while playing,
 const PLOTS_FRAMES = 1.5 // also in frames, for slow frames,
@@ -8,7 +9,6 @@ const PLOTS_CONTACT_MS = 0.05 // and for each contact, as plots of many take lon
 const CROSSING = 20 // duration of a step between two states, relative to a normal step, so that the eye can follow,
 const LONGEST_S = 6 // with an upper limit
 const REST_MS = 400 // duration of a whole step when a pause moves to the nearest network
-const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 
 export class Playback {
   /**

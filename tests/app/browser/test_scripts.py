@@ -25,6 +25,10 @@ def test_imports_and_exports_are_of_the_one_form_that_makes_a_module():
         assert len(said) == len(IMPORT.findall(text)) + len(EXPORT.findall(text)), name
 
 
+def test_one_script_asks_for_reduced_motion():
+    assert sum(text.count("prefers-reduced-motion") for text in SCRIPTS.values()) == 1
+
+
 def test_what_a_script_exports_another_one_imports():
     taken = {
         (other, name)

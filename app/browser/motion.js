@@ -1,0 +1,3 @@
+// Whether the visitor asks for reduced motion: STILL.matches.
+
+export const STILL = matchMedia("(prefers-reduced-motion: reduce)")
