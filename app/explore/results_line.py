@@ -26,7 +26,7 @@ UNBOUNDED = (
     "that wedges the grains, choose a smaller μ."
 )
 UNIT = {"extent": " ⟨fₙ⟩"}
-FOLD = '<button type="button" class="fold" aria-label="all numbers, with their meaning"></button>'
+FOLD = '<button type="button" class="fold" title="all numbers, with their meaning"></button>'
 
 
 class Results(Scripted):
