@@ -14,22 +14,34 @@ import warnings
 import webbrowser
 from html import escape
 from pathlib import Path
+from typing import Any
 from urllib.error import URLError
 from urllib.parse import urlencode, urljoin
 
 import numpy as np
 
+from granforce.explore.intervals import Intervals
+from granforce.explore.random_walk import Walk, walk
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import Known
+from granforce.forces.nearest import starting_network
 from granforce.packing.importers import load_packing
 from granforce.records import InputError, InputWarning, Packing
 from granforce.study import kinds
+from granforce.study.bounds import intervals_dataset
+from granforce.study.cells import save
 from granforce.study.keys import Parameters
+from granforce.study.kinds.packings import check_complete
+from granforce.study.samples import walk_dataset
 from granforce.study.store import open_store
+from granforce.tolerances import INTERVAL_GAP
 
 # The folder into which the app's server writes the forces held on its pages; see `View.known`.
 HELD_VARIABLE = "GRANFORCE_HELD"
 PATIENCE = 60.0  # s until the server must respond
 PAUSE = 0.1  # s between attempts
+_RESULTS = Intervals | Walk  # of an Ensemble, which `show` takes
 ENDED = "the server of this page has ended: gf.show opens a new page"
 
 
@@ -71,15 +83,25 @@ class View:
         return f'<iframe src="{escape(self.address)}" width="100%" height="900"></iframe>'
 
 
-def show(packing: Packing, *, browser: bool | None = None) -> View:
-    """Open the app on a packing; returns at once.
+def show(
+    packing: Packing | Ensemble,
+    *results: Intervals | Walk,
+    seed: int | None = None,
+    browser: bool | None = None,
+) -> View:
+    """Open the app on a packing, or on results of its ensemble; returns at once.
 
-    The packing is saved in the default store. The server ends with this Python process.
+    Packing and results are saved in the default store: the page does not compute them again. The
+    server ends with this Python process.
 
     Parameters
     ----------
-    packing : Packing
-        The packing.
+    packing : Packing or Ensemble
+        The packing, or its ensemble with no conditions but the friction.
+    *results : Intervals or Walk
+        Of this ensemble: bounds of all contacts, or a walk of one chain with default options.
+    seed : int, optional
+        Of the walk; by default 0.
     browser : bool, optional
         Whether to open a browser; by default unless in a notebook, which shows the View itself.
 
@@ -91,16 +113,65 @@ def show(packing: Packing, *, browser: bool | None = None) -> View:
     Raises
     ------
     InputError
-        If packing is no Packing, or if the store cannot be written.
+        For anything else, for results of another ensemble, and if the store cannot be written.
+
+    Examples
+    --------
+    >>> S = gf.ensemble(packing)  # doctest: +SKIP
+    >>> gf.show(S, gf.intervals(S), gf.walk(S, 500))  # doctest: +SKIP
     """
-    if not isinstance(packing, Packing):
-        raise InputError(f"show takes a Packing, not {type(packing).__name__}")
-    parameters = _stored(packing)
+    whole = Ensemble if results else Packing | Ensemble
+    if not (isinstance(packing, whole) and all(isinstance(one, _RESULTS) for one in results)):
+        given = " and ".join(type(one).__name__ for one in (packing, *results))
+        raise InputError(
+            "show takes a Packing, or an Ensemble and its Intervals or Walk, as in show(S, "
+            f"intervals), not {given}"
+        )
+    if seed is not None and not any(isinstance(one, Walk) for one in results):
+        raise InputError("a seed is that of a walk, and there is none to show")
+    shown = packing if isinstance(packing, Packing) else packing.packing
+    parameters = _stored(shown)
+    link: Parameters = {}
+    if isinstance(packing, Ensemble):
+        link["mu"] = f"{packing.mu:.9g}"
+        for one in results:
+            link |= _kept(packing, parameters, one, seed or 0)
     root, folder, server = _server()
-    address = f"{root}?{_query(parameters)}"
+    address = f"{root}?{_query(parameters, **link)}"
     if browser or (browser is None and "ipykernel" not in sys.modules):
         open_when_ready(address)
     return View(address, folder / f"{parameters['imported']}.json", server)
+
+
+def _kept(S: Ensemble, packing: Parameters, result: Intervals | Walk, seed: int) -> Parameters:
+    """Save a result where the page looks for it; what a link says of it.
+
+    A walk is continued by no state, which verifies its last one: a wrong one would stay in the
+    store.
+    """
+    plain, store, mu = ensemble(S.packing, S.mu), open_store(), S.mu
+    alike = S.known is None and np.array_equal(S.index, plain.index) and not (S.A != plain.A).nnz
+    if not alike or not np.array_equal(S.b, plain.b) or (S.friction != plain.friction).any():
+        raise InputError("the page has no conditions but the friction: show(gf.ensemble(packing))")
+    if isinstance(result, Walk):
+        done = walk(S, max(1, len(result.states)), seed, begun=result)
+        parameters = kinds.WALK.parameters(packing, len(done.states), seed, mu=mu)
+        save(store, kinds.WALK, parameters, walk_dataset(S, done))
+        return {"source": "walk", "states": len(done.states), "walkseed": seed}
+    some, rounding = starting_network(S), INTERVAL_GAP * S.force_scale
+    if (
+        not np.array_equal(result.contacts, S.index)
+        or ((some < result.low - rounding) | (some > result.high + rounding)).any()
+    ):
+        raise InputError("these intervals are not those of all contacts of this ensemble")
+    check_complete(S, result, "exact bounds")
+    save(
+        store,
+        kinds.INTERVALS,
+        kinds.INTERVALS.parameters(packing, mu=mu),
+        intervals_dataset(S, result),
+    )
+    return {"tab": "intervals"}
 
 
 def query_of_file(path: str | None) -> str:
@@ -115,8 +186,9 @@ def _stored(packing: Packing) -> Parameters:
     return parameters
 
 
-def _query(parameters: Parameters) -> str:
-    return urlencode({"packing": parameters["imported"], "mu": f"{parameters['mu']:.9g}"})
+def _query(parameters: Parameters, **more: Any) -> str:
+    given = {"packing": parameters["imported"], "mu": f"{parameters['mu']:.9g}"}
+    return urlencode(given | more)
 
 
 def checked_port(address: str, port: int) -> int:
