@@ -131,6 +131,7 @@ _BY_QUESTION = {
         "plot": "figures.picture",
         "to_dataset": "labelled",
         "to_dataframe": "labelled",
+        "to_arviz": "labelled",
         "save_packing": "packing.importers",
         "load_packing": "packing.importers",
         "save_lammps": "packing.exporters",

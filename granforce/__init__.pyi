@@ -62,6 +62,7 @@ from granforce.forces.knowledge import Known as Known
 from granforce.forces.nearest import nearest as nearest
 from granforce.forces.nearest import nearest_of_many as nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp as nearest_piqp
+from granforce.labelled import to_arviz as to_arviz
 from granforce.labelled import to_dataframe as to_dataframe
 from granforce.labelled import to_dataset as to_dataset
 from granforce.motion.gauss_seidel import gauss_seidel as gauss_seidel

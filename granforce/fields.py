@@ -1,5 +1,6 @@
 """The declared fields of records, and how records describe themselves with them."""
 
+import importlib
 import typing
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
@@ -31,7 +32,33 @@ def record(kind: C) -> C:
     make.__annotations__ = {}  # the signature in `help` has names only
     lines = (f"    {name}: {text}" for name, text in texts.items())
     kind.__doc__ = "\n".join([(kind.__doc__ or "").rstrip(), "", *lines])
+    if any(label_of(name, field) for name, field in declared.items()):
+        methods = {name: _method(name) for name in ("to_dataset", "to_dataframe")}
+        if declared.keys() & {"states", "forces", "high"}:
+            methods["plot"] = _method("plot") if kind.__name__ == "Packing" else _plot
+        for name, method in methods.items():
+            setattr(kind, name, method)
     return kind
+
+
+def label_of(name: str, field: Field) -> str:
+    """The name of a field in datasets and tables, by default of arrays only; empty: not there."""
+    return field.label if field.label is not None else name if field.dims else ""
+
+
+def _method(name: str) -> Callable[..., Any]:
+    """The public function of this name as a method; it stands above all records."""
+
+    def method(record: Any, *arguments: Any, **options: Any) -> Any:
+        return getattr(importlib.import_module("granforce"), name)(record, *arguments, **options)
+
+    method.__name__, method.__doc__ = name, f"`gf.{name}` of this record."
+    return method
+
+
+def _plot(record: Any, ensemble: Any, **options: Any) -> Any:
+    """`gf.plot` of this record in the packing of its ensemble S."""
+    return ensemble.packing.plot(record, contacts=ensemble.index, **options)
 
 
 def derived(field: Field) -> Callable[[F], F]:

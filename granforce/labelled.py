@@ -13,7 +13,7 @@ from granforce.explore.intervals import Intervals
 from granforce.explore.pull import Pull
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
-from granforce.fields import fields
+from granforce.fields import fields, label_of
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.perturb.critical_force import CriticalForce
@@ -55,6 +55,8 @@ def to_dataset(
     result: Any, ensemble: Ensemble | None = None, *, unit: str = "packing"
 ) -> xr.Dataset:
     """A result as an xarray Dataset with labels: component="f_n", contact with i, j, x, y.
+
+    Records have this function, and `to_dataframe`, as methods: ``exact.to_dataset(S)``.
 
     Parameters
     ----------
@@ -188,6 +190,49 @@ def to_dataframe(
     return dataset.to_dataframe()
 
 
+def to_arviz(draws: Any, ensemble: Ensemble, *, unit: str = "packing") -> xr.DataTree:
+    """Draws of several chains for ArviZ: from version 1 on it takes this tree as it is.
+
+    ArviZ 0.23, the last for Python 3.11, turns it into InferenceData: ``az.from_datatree(tree)``.
+
+    Parameters
+    ----------
+    draws : UniformSample, Draws, Inference or (chains, k, N_c, 2) array
+        The draws, or an inference with some. Of a walk in one chain, ``walk.states[None]``.
+    ensemble, unit
+        As for `to_dataset`, which raises the same errors.
+
+    Returns
+    -------
+    xr.DataTree
+        Group posterior with ``force`` (chain, draw, contact, component), and group sample_stats
+        with ``residual`` and ``violation`` of each draw.
+
+    Raises
+    ------
+    InputError
+        For results without chains.
+    """
+    draws = getattr(draws, "draws", draws)
+    states = getattr(draws, "states", draws)
+    if not isinstance(states, np.ndarray) or states.ndim != 4:
+        raise InputError(
+            "ArviZ needs draws by chain: give a UniformSample, an Inference with draws, or an "
+            "array (chains, k, N_c, 2), such as walk.states[None]"
+        )
+    posterior = to_dataset(states, ensemble, unit=unit).rename(states="force", state="draw")
+    checks = {name: getattr(ensemble, name)(states) for name in ("residual", "violation")}
+    if states is not draws:
+        ensemble.refuse_foreign(states, draws.residual, "the result")
+    variables = {
+        name: xr.Variable(("chain", "draw"), values, _attributes(quantity(name)))
+        for name, values in checks.items()
+    }
+    numbers = {name: np.arange(posterior.sizes[name]) for name in ("chain", "draw")}
+    groups = {"posterior": posterior, "sample_stats": xr.Dataset(variables)}
+    return xr.DataTree.from_dict({name: one.assign_coords(numbers) for name, one in groups.items()})
+
+
 def table(dataset: xr.Dataset) -> pd.DataFrame:
     """The variables of contacts, or of angles, with a row for each, or for each in each state."""
     rows = "contact" if "contact" in dataset.dims else "angle"
@@ -224,7 +269,7 @@ def from_store(kind: type, stored: xr.Dataset, *labels: str) -> Declared:
     """Fields of a record in its stored dataset, by their labels, by default all that are there."""
     declared: Declared = {}
     for name, field in fields(kind).items():
-        label = _label(name, field)
+        label = label_of(name, field)
         if label and field.stored in stored and label in (labels or (label,)):
             field = field._replace(dims="contact") if field.each else field
             declared[label] = field, stored[field.stored].values
@@ -242,11 +287,6 @@ def in_mean_forces(declared: Declared, scale: float) -> Declared:
 
 def _is_force(field: Field) -> bool:
     return field.unit.split(";")[0] == FORCE
-
-
-def _label(name: str, field: Field) -> str:
-    """The name of a field in datasets and tables, by default of arrays only; empty: not there."""
-    return field.label if field.label is not None else name if field.dims else ""
 
 
 def _dimensions(field: Field) -> list[str]:
@@ -269,7 +309,7 @@ def _declared(result: Any, ensemble: Ensemble | None) -> Declared:
         return _several(result)
     declared: Declared = {}
     for name, field in fields(type(result)).items():
-        label = _label(name, field)
+        label = label_of(name, field)
         value = getattr(result, name, None) if label else None  # no mean without draws
         if value is not None:
             declared[label] = (field, value)

@@ -1179,8 +1179,50 @@ def test_samples_are_drawn_and_intervals_named_as_a_colour():
     options = {"contacts": S.index, "backend": "matplotlib"}
     for sample in (gf.walk(S, 4), gf.sample_uniform(S, 8)):
         assert gf.plot(S.packing, sample, "spread", **options)
-    with pytest.raises(gf.InputError, match=r"^an Intervals has no states .*colour=\"interval\""):
-        gf.plot(S.packing, gf.intervals(S))
+    exact, picture = gf.intervals(S), gf.plot(S.packing, colour="interval", **options)
+    (lines,), (others,) = (
+        [one for one in drawn.values() if "value" in one] for drawn in (picture, exact.plot(S))
+    )
+    assert lines.dframe()["value"].tolist() == others.dframe()["value"].tolist()
+    with pytest.raises(gf.InputError, match="leave colour out"):
+        exact.plot(S, colour="force")
+    with pytest.raises(gf.InputError, match=r"^a Volume has no networks to draw"):
+        gf.plot(S.packing, gf.volume(S))
+
+
+def test_results_are_labelled_and_drawn_by_methods():
+    S, groove = gf.ensemble(gf.pack(12, 0.3)), gf.ensemble(gf.scene("groove"))
+    contact = int(S.index[0])
+    draws = gf.infer(S, S.original, 0.1, states=8)
+    drawn = [gf.intervals(S), gf.nearest(S, S.original), gf.walk(S, 3), gf.sample_uniform(S, 8)]
+    drawn += [gf.reach(S, contact), draws, draws.draws, gf.rest(S), gf.critical_force(S, contact)]
+    for result in drawn:
+        assert result.plot(S, backend="matplotlib")
+        assert result.to_dataset(S).identical(gf.to_dataset(result, S))
+        assert result.to_dataframe(S).equals(gf.to_dataframe(result, S))
+    assert gf.load_factor(groove, "horizontal").plot(groove, label=None)
+    assert S.packing.plot(numbers=True) and S.packing.to_dataframe().size
+    assert not hasattr(gf.volume(S), "plot") and not hasattr(S.packing.contacts, "to_dataset")
+
+
+def test_draws_go_to_arviz():
+    S = gf.ensemble(gf.pack(30, 0.3))
+    sample = gf.sample_uniform(S, 200)
+    tree = gf.to_arviz(sample, S, unit="mean")
+    force, checks = tree["posterior"]["force"], tree["sample_stats"]
+    assert force.dims == ("chain", "draw", "contact", "component")
+    assert checks["residual"].dims == checks["violation"].dims == ("chain", "draw")
+    assert np.array_equal(checks["residual"], sample.residual)
+    assert np.array_equal(force, sample.states / S.force_scale)
+    inferred = gf.infer(S, S.original, 0.1, states=8)
+    assert gf.to_arviz(inferred, S)["posterior"].sizes["draw"] == 2
+    walk = gf.walk(S, 3)
+    assert gf.to_arviz(walk.states[None], S)["posterior"].sizes["draw"] == 3
+    for wrong in (walk, gf.infer(S, S.original, 0.1), S.packing):
+        with pytest.raises(gf.InputError, match="needs draws by chain"):
+            gf.to_arviz(wrong, S)
+    with pytest.raises(gf.InputError, match="belongs to another ensemble"):
+        gf.to_arviz(gf.sample_uniform(gf.ensemble(S.packing, mu=0.5), 8), S)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import holoviews as hv
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.intervals import intervals
+from granforce.explore.intervals import Intervals, intervals
 from granforce.figures import style
 from granforce.figures.networks import CIRCLE, bodies, outline
 from granforce.forces.build import ensemble
@@ -47,7 +47,7 @@ _WORDS = {
 @takes(Packing)
 def plot(
     packing: Packing,
-    states: npt.ArrayLike | None = None,
+    states: npt.ArrayLike | Intervals | None = None,
     colour: str | npt.ArrayLike = "mobilisation",
     *,
     contacts: npt.ArrayLike | None = None,
@@ -64,14 +64,15 @@ def plot(
     ----------
     packing : Packing
         The packing.
-    states : (…, k, 2) array, Walk or UniformSample, optional
-        A network, or networks, also of several chains, in the packing's unit of force; their mean
-        is drawn. By default the packing's own network.
+    states : (…, k, 2) array or record, optional
+        A network, or networks, also of several chains, in the packing's unit of force, or a record
+        that has them, such as a Walk; their mean is drawn. By default the packing's own network,
+        which Intervals colour by their lengths. Records draw themselves: ``walk.plot(S)``.
     colour : str or (k,) array, default "mobilisation"
         "mobilisation" f_t/(μ f_n), "force", "spread" (standard deviation of f_n over states),
         "interval" (length of the exact interval of f_n, computed here), or numbers.
     contacts : (k,) array of int, optional
-        Their numbers in the packing, needed if there are fewer than in the packing
+        Their numbers in the packing, to leave others out, and needed if there are fewer states
         (`Ensemble.index`).
     label : str, optional
         Quantity and unit of the numbers, for the colour bar; by default the name of a pandas or
@@ -94,8 +95,14 @@ def plot(
     style.ready(backend)
     count = len(packing.contacts.i)
     shown = np.arange(count) if contacts is None else _numbered(contacts, count)
-    states = _states(states)
-    drawn = packing.forces[shown] if states is None else real_array(states, "states")
+    bounds = None
+    if isinstance(states, Intervals):
+        if not isinstance(colour, str) or colour not in ("mobilisation", "interval"):
+            raise InputError("Intervals give the colours: leave colour out")
+        bounds, states, colour = states, None, "interval"
+    drawn = real_array(packing.forces if states is None else _states(states), "states")
+    if drawn.shape[-2:] == (count, 2) and len(shown) < count:
+        drawn = drawn[..., shown, :]
     if drawn.shape[-2:] != (len(shown), 2):
         raise InputError(
             f"states have shape {drawn.shape}, for {len(shown)} contacts of the packing; give "
@@ -109,7 +116,7 @@ def plot(
         unit, scale = _unit(packing, mean)
     else:  # only widths need a unit, and none as exact as that of an ensemble, which costs seconds
         unit, scale = mean[:, 0].mean() or 1.0, ""
-    values, name, look = _coloured(packing, shown, several, mean, colour, unit)
+    values, name, look = _coloured(packing, shown, several, mean, colour, unit, bounds)
     if name and label is not None:
         raise InputError(f"label is for numbers as colour; with {brief(colour)} leave it out")
     label = name or label or str(getattr(colour, "name", None) or "value")
@@ -139,16 +146,14 @@ def _numbered(contacts: npt.ArrayLike, count: int) -> Integers:
 
 
 def _states(given: Any) -> Any:
-    """Networks, also those of a Walk or a UniformSample; InputError for a record without any."""
+    """Networks, also those of a record; InputError for a record without any."""
     fields = getattr(given, "_fields", None)  # of a named tuple
     if fields is None:
         return given
-    if "states" in fields:
-        return given.states
-    raise InputError(
-        f"{with_article(type(given).__name__)} has no states to draw; for exact intervals give "
-        'colour="interval" without states, or numbers as colour'
-    )
+    for name in ("states", "forces"):
+        if name in fields:
+            return getattr(given, name)
+    raise InputError(f"{with_article(type(given).__name__)} has no networks to draw")
 
 
 def _unit(packing: Packing, mean: Floats) -> tuple[float, str]:
@@ -167,6 +172,7 @@ def _coloured(
     mean: Floats,
     colour: str | npt.ArrayLike,
     unit: float,
+    bounds: Intervals | None,
 ) -> tuple[Floats, str, dict[str, Any]]:
     """Numbers (k,) for the colour, their name (empty for given numbers), and the colour scale."""
     if not isinstance(colour, str):
@@ -183,21 +189,19 @@ def _coloured(
         values[admitted] = np.clip(values[admitted], -1, 1)
         return values, _WORDS[colour], look | {"clim": (-1, 1)}
     if colour == "interval":
-        values = _extents(packing)[numbers]
+        values = _extents(bounds or intervals(ensemble(packing)), len(packing.contacts.i))[numbers]
     else:
         values = mean[:, 0] if colour == "force" else several[..., 0].std(axis=0)
     return values / unit, _WORDS[colour], look
 
 
-def _extents(packing: Packing) -> Floats:
-    """Lengths (N_c,) of the exact intervals of f_n, force; 0 where no network presses.
+def _extents(bounds: Intervals, count: int) -> Floats:
+    """Lengths (count,) of the exact intervals of f_n, force; 0 where no network presses.
 
     Infinite ones get the colour of the longest finite one.
     """
-    S = ensemble(packing)
-    bounds = intervals(S)
-    extents = np.zeros(len(packing.contacts.i))
-    extents[S.index] = bounds.high[:, 0] - bounds.low[:, 0]
+    extents = np.zeros(count)
+    extents[bounds.contacts] = bounds.high[:, 0] - bounds.low[:, 0]
     return np.minimum(extents, extents.max(where=np.isfinite(extents), initial=0.0))
 
 
