@@ -20,6 +20,7 @@ from granforce.study.scan import run
 from granforce.study.schema import attributes
 from granforce.study.series import ends_of, over_frames, pair_names
 from granforce.study.store import open_store
+from granforce.system import cancelling
 from granforce.types import Progress
 
 # Attributes of the numbers of a snapshot.
@@ -42,6 +43,7 @@ _FORCES = {"forces": "of the simulation", "low": "least in S", "high": "largest 
 
 
 @takes(snapshots=Snapshots)
+@cancelling.shown
 def evolution(
     path: str | Path,
     snapshots: Snapshots,

@@ -49,6 +49,7 @@ CELL_BYTES = 2000  # of memory, per cell that is not yet computed
 NO_STORES = (".csv", ".json", ".npz")  # endings of files that a user expects instead
 
 
+@cancelling.shown
 def scan(
     path: str | Path,
     mu: Sequence[float] | float,

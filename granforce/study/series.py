@@ -42,6 +42,7 @@ from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import attributes, labelled, packing_dataset, to_builtin
 from granforce.study.store import Store, is_store, open_store
+from granforce.system import cancelling
 from granforce.system.files import expanded, sibling
 from granforce.types import Floats, Integers, Progress
 
@@ -178,6 +179,7 @@ FRAME = Kind(
 )
 
 
+@cancelling.shown
 def infer_series(
     path: str | Path,
     frames: Sequence[Frame],

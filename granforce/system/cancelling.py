@@ -116,6 +116,17 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
     return inside
 
 
+def shown(function: Callable[P, T]) -> Callable[P, T]:
+    """A decorator of functions that processes work for: progress=True draws a bar."""
+
+    @functools.wraps(function)
+    def inside(*arguments: P.args, **options: P.kwargs) -> T:
+        with _shown(function.__name__, options):
+            return function(*arguments, **options)
+
+    return inside
+
+
 @contextmanager
 def _shown(name: str, options: dict[str, Any]) -> Iterator[None]:
     """Replace progress=True in options by a tqdm bar; InputError for what cannot be called."""

@@ -20,6 +20,8 @@ from granforce.records import InputError
 from granforce.study import cluster as dask_cluster
 from granforce.study import kinds, scan
 from granforce.study.cells import StudyCell, load
+from granforce.study.evolution import evolution
+from granforce.study.series import infer_series
 from granforce.study.store import open_store
 
 
@@ -35,6 +37,19 @@ def test_a_scan_gives_the_same_for_any_number_of_workers(tmp_path):
         assert a.equals(b)
     found, _ = scan.walks(tmp_path / "one", cells, workers=2)
     assert [line["cached"] for line in found] == [True] * 4
+
+
+def test_progress_true_draws_a_bar(tmp_path, capsys):
+    _, failed = scan.scan(tmp_path / "s", 0.3, 1, 12, 3, workers=1, progress=True)
+    assert not failed and "scan: " in capsys.readouterr().err
+    calls = (
+        lambda **options: scan.scan(tmp_path / "s", 0.3, 1, 12, 3, **options),
+        lambda **options: evolution(tmp_path / "s", None, **options),
+        lambda **options: infer_series(tmp_path / "s", [], mu=0.3, **options),
+    )
+    for call in calls:
+        with pytest.raises(InputError, match="progress must be True, or a function"):
+            call(progress=3)
 
 
 def test_one_worker_needs_no_script_that_is_a_file(tmp_path):
