@@ -25,6 +25,7 @@ from small_store import ROOT, cell_parameters
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
+from app.state.view_settings import TABS
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
@@ -36,15 +37,19 @@ HELD = "?mu=0.1&n=30&seed=1&states=30&relax=nearest_piqp"  # as the small store 
 PATIENCE = 300  # s, on a busy machine
 # Session after session the server may keep this much, in bytes; it was found to keep 4 kB.
 KEPT = 100_000
+LARGEST = "9" * 300
+ALIVE = Path(__file__).with_name("alive.py")
 HEADER = '{"msgid": "1", "msgtype": "PATCH-DOC"}'
 # What stands in the log where a thread has died, or code of the page's own has failed.
-TROUBLE = "Exception in thread", "a job failed outside", "could not be", f"{ROOT}/app/"
+TROUBLE = ("Exception in thread", "a job failed outside", "could not be", f"{ROOT}/app/")
+TROUBLE += ("NameError", "failed with following error")
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """Address and process of the app, and its folder; at the end all its threads are there."""
-    yield from serving(tmp_path_factory.mktemp("served"))
+    folder = tmp_path_factory.mktemp("served")
+    yield from serving(folder, "--setup", str(ALIVE), ALIVE=str(folder / "alive"))
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +58,13 @@ def shared(tmp_path_factory):
     yield from serving(tmp_path_factory.mktemp("shared"), GRANFORCE_LIMITS=LIMITS)
 
 
-def serving(folder, **variables):
+def serving(folder, *options, **variables):
     shipped = folder / "start.zarr"
     study.get(open_store(shipped), kinds.WALK, cell_parameters(0.1), dtypes={"states": "float32"})
-    with serve(folder, *CLOSED, GRANFORCE_DATA=str(shipped), **variables) as (url, server):
+    with serve(folder, *CLOSED, *options, GRANFORCE_DATA=str(shipped), **variables) as (
+        url,
+        server,
+    ):
         yield url, server, folder
     log = (folder / "log").read_text()
     for word in TROUBLE:
@@ -84,8 +92,7 @@ class Client:
         )
         client = cls(WebSocketClientConnectionWrapper(plain), None)
         await client.answer("ACK")
-        await Protocol().create("PULL-DOC-REQ").send(client.socket)
-        client.document = (await client.answer("PULL-DOC-REPLY")).content["doc"]
+        client.document = await client.pulled()
         return client
 
     async def answer(self, kind):
@@ -104,8 +111,8 @@ class Client:
 
     async def tell(self, bundle, data):
         """Send what the script of a component sends to its model."""
-        model = next(_ids(self.document, bundle))
-        await self.patch([_event("data_event", [["model", {"id": model}], ["data", data]])])
+        model = {"id": next(_models(self.document, bundle))["id"]}
+        await self.patch([_event("data_event", [["model", model], ["data", data]])])
 
     async def patch(self, events):
         """Send events, whatever they are, as a patch of the document."""
@@ -118,6 +125,25 @@ class Client:
         for fragment in fragments:
             await self.socket.write_message(fragment, binary=isinstance(fragment, bytes))
 
+    async def pulled(self):
+        """The document as the server has it now."""
+        await Protocol().create("PULL-DOC-REQ").send(self.socket)
+        return (await self.answer("PULL-DOC-REPLY")).content["doc"]
+
+    async def told(self, words):
+        """Wait until the page tells this; its document."""
+        end = time.monotonic() + PATIENCE
+        while words not in json.dumps(document := await self.pulled(), ensure_ascii=False):
+            assert time.monotonic() < end
+            await asyncio.sleep(0.1)
+        return document
+
+    async def press(self, label):
+        """Press the button whose label begins so."""
+        pressed = ["model", {"id": _button(await self.pulled(), label)}]
+        data = {"type": "map", "entries": []}
+        await self.patch([_event("dom_event", [pressed, ["node", "click"], ["data", data]])])
+
     def close(self):
         self.socket.close()
 
@@ -127,14 +153,32 @@ def _event(name, entries=()):
     return {"kind": "MessageSent", "msg_type": "bokeh_event", "msg_data": data}
 
 
-def _ids(part, bundle):
-    """The ids of the components of this name in a document."""
+def _models(part, bundle):
+    """The components of this name in a document."""
     if isinstance(part, dict):
         if part.get("attributes", {}).get("bundle") == bundle:
-            yield part["id"]
+            yield part
         part = list(part.values())
     for inner in part if isinstance(part, list) else ():
-        yield from _ids(inner, bundle)
+        yield from _models(inner, bundle)
+
+
+def _computing(document):
+    """What the line at the bottom tells of a computation; empty where none is under way."""
+    (line,) = _models(document, "StatusLine")
+    return line["attributes"]["data"]["attributes"].get("progress", {}).get("entries")
+
+
+def _button(part, label):
+    """The id of the button whose label begins so, in a document; None without one."""
+    if isinstance(part, dict):
+        data = part.get("attributes", {}).get("data")
+        told = data.get("attributes", {}) if isinstance(data, dict) else {}
+        if str(told.get("label", "")).startswith(label) and told.get("visible", True):
+            return part["id"]
+        part = list(part.values())
+    found = (_button(inner, label) for inner in part) if isinstance(part, list) else ()
+    return next((one for one in found if one), None)
 
 
 def visits(work):
@@ -175,7 +219,7 @@ async def _crowd(url, count):
     asked = [LONG.format(k % 5) if k % 2 else HELD for k in range(count)]
     clients = await asyncio.gather(*(Client.opened(url, query) for query in asked))
     await asyncio.gather(*(client.ready() for client in clients))
-    assert all(next(_ids(client.document, "Player"), None) for client in clients)
+    assert all(next(_models(client.document, "Player"), None) for client in clients)
     for client in clients:
         client.close()
 
@@ -269,8 +313,7 @@ def test_limits_hold_whatever_is_said(shared):
             await client.tell("Player", said)
         for _ in range(40):
             await client.tell("Player", {"pull": [0, 1.0]})
-        await Protocol().create("PULL-DOC-REQ").send(client.socket)
-        document = (await client.answer("PULL-DOC-REPLY")).content["doc"]
+        document = await client.pulled()
         client.close()
         return json.dumps(document)
 
@@ -288,24 +331,6 @@ HOSTILE = (
 )
 
 
-async def _pulled(client):
-    """The document of a page as the server has it now."""
-    await Protocol().create("PULL-DOC-REQ").send(client.socket)
-    return (await client.answer("PULL-DOC-REPLY")).content["doc"]
-
-
-def _button(part, label):
-    """The id of the button whose label begins so, in a document; None without one."""
-    if isinstance(part, dict):
-        data = part.get("attributes", {}).get("data")
-        told = data.get("attributes", {}) if isinstance(data, dict) else {}
-        if str(told.get("label", "")).startswith(label) and told.get("visible", True):
-            return part["id"]
-        part = list(part.values())
-    found = (_button(inner, label) for inner in part) if isinstance(part, list) else ()
-    return next((one for one in found if one), None)
-
-
 def test_links_start_nothing_dear_and_who_starts_it_keeps_nobody_waiting(shared):
     """Two open links that ask for hours, press Compute all the same; a third has his states."""
     url, server, folder = shared
@@ -319,20 +344,18 @@ def test_links_start_nothing_dear_and_who_starts_it_keeps_nobody_waiting(shared)
         for client in clients:
             await client.ready()
         await asyncio.to_thread(computes, shared, 301)
-        said = [json.dumps(await _pulled(client), ensure_ascii=False) for client in clients]
+        said = [json.dumps(await client.pulled(), ensure_ascii=False) for client in clients]
         assert "must lie between" in said[0]
         assert all("press Compute" in document for document in said[1:])
         assert new() == [301]
         for client in clients[1:]:
-            pressed = ["model", {"id": _button(await _pulled(client), "Compute μ")}]
-            data = {"type": "map", "entries": []}
-            await client.patch([_event("dom_event", [pressed, ["node", "click"], ["data", data]])])
+            await client.press("Compute μ")
         begun = computed(server)
         while computed(server) < begun + 2.0:
             await asyncio.sleep(0.05)
         await asyncio.to_thread(computes, shared, 302)
-        under_way = [json.dumps(await _pulled(client)) for client in clients[1:]]
-        assert all("Cancel" in document for document in under_way)
+        under_way = [await client.pulled() for client in clients[1:]]
+        assert all(map(_computing, under_way))
         for client in clients:
             client.close()
 
@@ -366,26 +389,127 @@ def test_a_hundred_sessions_leave_nothing(served):
     assert (sizes[2] - sizes[0]) / 100 < KEPT, sizes
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(5, marks=pytest.mark.stress)])
-def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, times):
-    for _ in range(times):
-        with serve(tmp_path) as (url, server):
-            visits(_computing(url, server, tmp_path / "cache"))
-            children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text().split()
-            os.kill(server.pid, signal.SIGTERM)
-            server.wait(PATIENCE)
-            assert server.returncode == 0
-        store = open_store(tmp_path / "cache")  # which takes parts away that were being written
-        assert all(verdict.ok for verdict in store.verify())
-        assert not list((tmp_path / "cache").glob(".tmp-*"))
-        assert not [child for child in children if Path(f"/proc/{child}").exists()]
+def test_pages_that_are_reloaded_or_never_shown_hold_no_thread(served):
+    """Their work is ended when the server gives the pages up."""
+    url = served[0]
+
+    async def visit():
+        for seed in (30, 31):
+            await AsyncHTTPClient().fetch(url + LONG.format(seed), request_timeout=PATIENCE)
+        for _ in range(3):
+            client = await Client.opened(url, LONG.format(34))
+            await client.ready()
+            await client.told("of 20000 networks")
+            client.close()
+
+    visits(visit())
+    computes(served, 201)
 
 
-async def _computing(url, server, cache):
-    clients = [await Client.opened(url, LONG.format(k)) for k in range(3)]
+SELECTION = (
+    "mu", "packed", "n", "seed", "states", "walkseed", "sweeps", "dt", "box_mass", "pressure",
+    "radii", "source", "relax", "packing",
+)  # fmt: skip
+VIEW = (
+    "tab", "contact", "frame", "reference", "between", "colour", "thickness", "sort",
+    "scale",
+)  # fmt: skip
+
+
+def test_a_link_with_the_largest_numbers_computes_nothing(served):
+    """One line says what is too large, and the usual states are seen; each alone: test_app.py."""
+
+    async def visit(given, names, told):
+        query = "&".join([given, *(f"{name}={LARGEST}" for name in names)])
+        client = await Client.opened(served[0], query)
+        await client.ready()
+        assert not _computing(await client.told(told))
+        client.close()
+
+    visits(visit("?", SELECTION, "this link cannot be read: source must be walk or uniform"))
+    visits(visit(HELD, VIEW, "seen in all 30 networks"))
+
+
+def test_the_largest_allowed_of_everything_can_be_cancelled(served):
+    # But of μ: at 1000 a packing may have one network only, whose walk ends before it is seen.
+    largest = LONG.format(2**53 - 1) + "&walkseed=9007199254740991&sweeps=1000&dt=0.1"
+    largest += "&box_mass=10000&pressure=1e6&radii=uniform:1,20"
+
+    async def visit():
+        client = await Client.opened(served[0], largest)
+        await client.ready()
+        await client.told("of 20000 networks")
+        client.document = await client.pulled()
+        await client.tell("StatusLine", {"cancel": True})
+        while _computing(await client.pulled()):
+            await asyncio.sleep(0.1)
+        client.close()
+
+    visits(visit())
+    computes(served, 202)
+
+
+def test_closed_pages_are_forgotten(served):
+    """Those of all attacks, and one with each tab."""
+    url, server, folder = served
+    alive = folder / "alive"
+
+    def held():
+        """How many pages the server holds."""
+        alive.touch()
+        end = time.monotonic() + PATIENCE
+        while not (told := alive.read_text()):
+            assert time.monotonic() < end and server.poll() is None
+            time.sleep(0.05)
+        alive.unlink()
+        return int(told)
+
+    async def visit():
+        clients = [await Client.opened(url, f"{HELD}&tab={tab}") for tab in TABS]
+        for client in clients:
+            await client.ready()
+        assert await asyncio.to_thread(held) >= len(TABS)
+        for client in clients:
+            client.close()
+
+    visits(visit())
+    end = time.monotonic() + PATIENCE
+    while held() > 1:  # Panel may keep the last one until the next
+        assert time.monotonic() < end
+        time.sleep(0.5)
+
+
+def end_while_it_computes(url, server, folder):
+    """A server that is told to end while it computes leaves no process, and the store whole."""
+    visits(_begun(url, server, folder / "cache"))
+    children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text().split()
+    os.kill(server.pid, signal.SIGTERM)
+    server.wait(PATIENCE)
+    assert server.returncode == 0
+    store = open_store(folder / "cache")  # which takes parts away that were being written
+    assert all(verdict.ok for verdict in store.verify())
+    assert not list((folder / "cache").glob(".tmp-*"))
+    assert not [child for child in children if Path(f"/proc/{child}").exists()]
+
+
+async def _begun(url, server, cache):
+    made = len(list(cache.glob("packing-*")))
+    clients = [await Client.opened(url, LONG.format(k)) for k in range(50, 53)]
     for client in clients:
         await client.ready()
-    await asyncio.to_thread(until_it_left, cache, "packing-*", 1, server)
+    await asyncio.to_thread(until_it_left, cache, "packing-*", made + 1, server)
     before = computed(server)
     while computed(server) < before + 1.0:
         await asyncio.sleep(0.05)
+
+
+def test_a_server_can_be_told_to_end_while_it_computes(served):
+    """The last test: none has the server after it."""
+    end_while_it_computes(*served)
+
+
+@pytest.mark.stress
+def test_five_servers_can_be_told_to_end_while_they_compute(tmp_path):
+    for _ in range(5):
+        with serve(tmp_path) as (url, server):
+            end_while_it_computes(url, server, tmp_path)

@@ -2,22 +2,17 @@
 
 import io
 import re
-import time
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from packings import REFERENCE, reference, skewed
 from serving import (
-    CLOSED,
     MODEL,
-    PATIENCE,
     bars_drawn,
     column,
     frames,
     scene,
-    serve,
     until,
     zoomed,
 )
@@ -286,28 +281,6 @@ def test_plots_are_saved_as_svg(visit, tmp_path):
     path = download(page, lambda: page.evaluate(save), tmp_path)
     svg = ElementTree.fromstring(path.read_text())
     assert path.suffix == ".svg" and len(list(svg.iter())) > 30
-
-
-def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
-    alive, setup = tmp_path / "alive", Path(__file__).with_name("alive.py")
-    variables = {"GRANFORCE_DATA": str(shipped), "ALIVE": str(alive)}
-
-    def wait_for(count):
-        end = time.monotonic() + PATIENCE / 1000
-        while not (alive.exists() and int(alive.read_text() or -1) in count):
-            assert time.monotonic() < end, alive.read_text()
-            time.sleep(0.1)
-
-    with serve(tmp_path, "--setup", str(setup), *CLOSED, **variables) as (url, _):
-        pages = [visit(at=url) for _ in range(2)]
-        for tab in ("Friction", "Force space", "Push", "Your packing", "Export"):
-            pages[0].get_by_role("tab", name=tab).click()
-        # The last tab is there once all before it have been built.
-        pages[0].get_by_role("button", name="SVG", exact=True).wait_for()
-        wait_for([2])
-        for page in pages:
-            page.close()
-        wait_for([0, 1])  # Panel may keep the last one until the next
 
 
 def test_packing_and_plots_are_one_figure_of_a_chosen_width(visit, tmp_path):
