@@ -146,7 +146,7 @@ def test_walk_and_measure_agree(run, tmp_path):
 
 def test_scan_table_and_resume(run, tmp_path):
     words = ["scan", "--mu", "0,0.3", "-n", 20, "--states", 4, "--relax", "nearest"]
-    words += ["--out", tmp_path / "s.zarr"]
+    words += ["--workers", 1, "--out", tmp_path / "s.zarr"]
     code, out, err = run(*words)
     assert code == 0
     assert len(out.splitlines()) == 3

@@ -113,7 +113,7 @@ def test_g_squared_of_grains_is_calibrated_and_inferred(folder, capsys):
     frame = synthetic_frame(packing, noise=0.0)
     frame.write("positions.csv", "links.csv", pressures=True)
     sigma = 0.1 * float(np.mean(frame.only.pressure))
-    words = "infer positions.csv links.csv --frames all --mu 0.3 --states 0"
+    words = "infer positions.csv links.csv --frames all --mu 0.3 --states 0 --workers 1"
     (one,) = told(f"{words} --pressure-column pressure --calibration 1,0,{sigma}", capsys)
     (two,) = told(words, capsys)
     assert one["freedom"] > two["freedom"]

@@ -31,13 +31,16 @@ WRITTEN = {
     ("stress", "out"): ("outline", "stress pack.npz --angles 8 --out {}"),
     ("perturb", "out"): ("responses", "perturb pack.npz --contacts 2,5 --precision 0.1 --out {}"),
     ("informative", "out"): ("ranking", "informative pack.npz --states 9 --best 2 --out {}"),
-    ("scan", "out"): ("scan", "scan --mu 0.3 -n 12 --states 2 --out {}"),
+    ("scan", "out"): ("scan", "scan --mu 0.3 -n 12 --states 2 --workers 1 --out {}"),
     ("figures", "out"): ("picture", "figures scan.zarr --out {}"),
     ("plot", "out"): ("picture", "plot pack.npz --out {}"),
     ("export", "grains"): ("exported", "export pack.npz {} contacts.{suffix}"),
     ("export", "contacts"): ("exported", "export pack.npz grains.{suffix} {}"),
     ("import lammps", "out"): ("packing", "import lammps {dump} --mu 0.3 --out {}"),
-    ("import lammps", "csv"): ("rows", "import lammps {dump} --mu 0.3 --frames all --csv {}"),
+    ("import lammps", "csv"): (
+        "rows",
+        "import lammps {dump} --mu 0.3 --frames all --workers 1 --csv {}",
+    ),
     ("import table", "out"): (
         "open packing",
         "import table grains.csv --walls floor --gravity 1 --mu 1 --out {}",
@@ -63,10 +66,14 @@ FORMS = {
     ("intervals", "mean"): ("forces in ⟨f_n⟩", "intervals pack.npz --unit mean --out {}", TABLES),
     ("intervals", "infinite"): ("infinite bounds", "intervals pack-scene.npz --out {}", TABLES),
     ("import lammps", "frames"): (
-        *("snapshots", "import lammps {dump} --mu 0.3 --frames all --out {}", ["zarr"]),
+        *("snapshots", "import lammps {dump} --mu 0.3 --frames all --workers 1 --out {}", ["zarr"]),
     ),
     ("infer", "frames"): (
-        *("frames", "infer {frame} --frames all --mu 0.3 --states 0 --out {}", ["zarr"]),
+        *(
+            "frames",
+            "infer {frame} --frames all --mu 0.3 --states 0 --workers 1 --out {}",
+            ["zarr"],
+        ),
     ),
 }
 SHORT = {

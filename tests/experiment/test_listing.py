@@ -366,5 +366,5 @@ def test_by_the_command_line_with_compressed_files(away, made, capsys):
     assert err == "" and "left, right, bottom, top" in out
     (one,) = frames_of(away, columns={"i": "1", "j": "2", "fn": "3", "ft": "4"})
     assert one.positions.endswith("positions.txt.gz")
-    assert main(f"infer {files} --frames all --states 0 {options}".split()) == 0
+    assert main(f"infer {files} --frames all --states 0 --workers 1 {options}".split()) == 0
     assert f"granforce: frame 1: {N} of {N} grains are flagged" in capsys.readouterr().err

@@ -186,7 +186,7 @@ def test_a_series_leaves_out_empty_frames_and_says_so(name, tmp_path, capsys):
         Path(path).write_text(text)
     options = ["--mu", "0.3", *(["--box", "3", "3"] if name == "mercury" else [])]
     out = ["--out", str(tmp_path / "s.zarr"), "--cache", str(tmp_path / "cache")]
-    assert main(["import", name, *paths, *options, "--frames", "all", *out]) == 0
+    assert main(["import", name, *paths, *options, "--frames", "all", "--workers", "1", *out]) == 0
     said = capsys.readouterr()
     assert len(said.out.splitlines()) == 2
     assert re.search("time ?step 0 has no (atoms|particles): left out", said.err)

@@ -38,7 +38,7 @@ BROKEN = "Step-0002_Adjacency.txt"
 def test_frames_are_inferred_and_found_again(tmp_path):
     frames = frames_of(folder_of(tmp_path))
     assert [frame.number for frame in frames] == [1, 2, 3]
-    dataset, failed = series.infer_series(tmp_path / "store", frames, workers=2, **OPTIONS)
+    dataset, failed = series.infer_series(tmp_path / "store", frames, workers=1, **OPTIONS)
     assert not failed and dataset.sizes["frame"] == 3
     assert np.isfinite(dataset["inferred"]).any("contact").all()
     assert np.isnan(dataset["change"][0]).all() and np.isfinite(dataset["change"][1]).any()
@@ -121,7 +121,8 @@ def test_by_the_command_line(away, capsys):
     folder_of(away / "lab", (1, 2))
 
     def words(frames="all", out="series.zarr"):
-        return f"infer lab --frames {frames} --mu 0.3 --reach 0.1 --states 16 --out {out}".split()
+        words = f"infer lab --frames {frames} --mu 0.3 --reach 0.1 --states 16 --out {out}"
+        return [*words.split(), "--workers", "1"]
 
     assert main([*words(), "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
@@ -144,7 +145,9 @@ def test_without_states_there_are_no_error_bars(away, capsys):
     """The same forces as with them."""
     (away / "lab").mkdir()
     folder_of(away / "lab", (1, 2))
-    words = "infer lab --frames all --mu 0.3 --reach 0.1 --out series.zarr --json --states"
+    words = (
+        "infer lab --frames all --mu 0.3 --reach 0.1 --workers 1 --out series.zarr --json --states"
+    )
     forces = {}
     for states in (0, 4):
         assert main([*words.split(), str(states)]) == 0
