@@ -12,6 +12,9 @@ from llvmlite import binding
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+# What kept parts are marked with, besides numba's "bitcode" and "object".
+_PART = "part"
+
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]  # numba has no type hints
     """Code that others link, neither optimised nor run separately."""
@@ -32,7 +35,8 @@ class _Part(JITCodeLibrary):  # type: ignore[misc]  # numba has no type hints
         self._finalized = True
 
     def serialize_using_object_code(self) -> Any:
-        return self.serialize_using_bitcode()
+        name, _, code = self.serialize_using_bitcode()
+        return name, _PART, code
 
 
 class PartCompiler(Compiler):  # type: ignore[misc]
@@ -41,3 +45,26 @@ class PartCompiler(Compiler):  # type: ignore[misc]
     def define_pipelines(self) -> Any:
         self.state.library = _Part(self.state.targetctx.codegen(), self.state.func_id.func_name)
         return super().define_pipelines()
+
+
+def _keep_parts() -> None:
+    """Make numba load kept parts as parts.
+
+    It would make them machine code, which kernels that link them later would run in place of their
+    own: a factorisation took eight times as long in the process that compiled it.
+    """
+    read = JITCodeLibrary._unserialize
+
+    def unserialize(cls: Any, codegen: Any, state: Any) -> Any:
+        name, kind, code = state
+        if kind != _PART:
+            return read(codegen, state)
+        part = _Part(codegen, name)
+        part._final_module = binding.parse_bitcode(code)
+        part._finalize_final_module()
+        return part
+
+    JITCodeLibrary._unserialize = classmethod(unserialize)
+
+
+_keep_parts()
