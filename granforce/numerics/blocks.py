@@ -16,7 +16,7 @@ numbers, the three below the diagonal are read (LOWER) if L is a Cholesky factor
 above (UPPER) if the block holds both L and U of `lu`, whose U is stored transposed.
 """
 
-from granforce.numerics.lanes import fma, inline, load, store, within
+from granforce.numerics.lanes import fma, inline, keep_three, less, load, store, three, within
 
 # A pivot that rounding drives to zero or below belongs to a direction without weight.
 NO_PIVOT = 1e-40
@@ -42,10 +42,10 @@ def divide(L, x, d, side, lanes):
 @inline
 def subtract_column(Z, z, X, x, count, Y, y, lanes):
     """z ← z − x yᵀ for `count` consecutive blocks z and x; y stays in registers."""
-    y_block = _block(Y, y, lanes)
+    columns = _columns(Y, y, lanes)
     for k in range(0, 9 * count, 9):
-        block = _less_product_of_blocks(_block(Z, z + k, lanes), X, x + k, y_block, lanes)
-        _set_block(Z, z + k, block, lanes)
+        rows = _less_product(_rows(Z, z + k, lanes), X, x + k, columns, lanes)
+        _keep_rows(Z, z + k, rows, lanes)
 
 
 @inline
@@ -61,62 +61,59 @@ def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
     for q in range(below):
         if end == begin + 1:
             x = 9 * (start[end] - below)
-            y_block = _block(Y, x + 9 * q, lanes)
+            columns = _columns(Y, x + 9 * q, lanes)
             for a in range(q + beyond, below):
                 z = 9 * target[number + a - q]
-                block = _less_product_of_blocks(_block(Z, z, lanes), X, x + 9 * a, y_block, lanes)
-                _set_block(Z, z, block, lanes)
+                rows = _less_product(_rows(Z, z, lanes), X, x + 9 * a, columns, lanes)
+                _keep_rows(Z, z, rows, lanes)
         else:
-            for a in range(q + beyond, below):
-                z = 9 * target[number + a - q]
-                block = _block(Z, z, lanes)
+            for a in range(q + beyond, below, 2):
+                other = min(a + 1, below - 1)
+                z, w = 9 * target[number + a - q], 9 * target[number + other - q]
+                one, two = _rows(Z, z, lanes), _rows(Z, w, lanes)
                 for k in range(begin + 1, end + 1):
                     x = 9 * (start[k] - below)
-                    y_block = _block(Y, x + 9 * q, lanes)
-                    block = _less_product_of_blocks(block, X, x + 9 * a, y_block, lanes)
-                _set_block(Z, z, block, lanes)
+                    columns = _columns(Y, x + 9 * q, lanes)
+                    one = _less_product(one, X, x + 9 * a, columns, lanes)
+                    two = _less_product(two, X, x + 9 * other, columns, lanes)
+                _keep_rows(Z, z, one, lanes)
+                _keep_rows(Z, w, two, lanes)
         number += below - q
     return number
 
 
 @inline
-def _less_product_of_blocks(block, X, x, y_block, lanes):
-    """A block minus x yᵀ, with y given by its entries."""
-    z0, z1, z2 = _less_row_product(block[0], block[1], block[2], X, x, y_block, lanes)
-    z3, z4, z5 = _less_row_product(block[3], block[4], block[5], X, x + 3, y_block, lanes)
-    z6, z7, z8 = _less_row_product(block[6], block[7], block[8], X, x + 6, y_block, lanes)
-    return z0, z1, z2, z3, z4, z5, z6, z7, z8
+def _columns(Y, y, lanes):
+    return three(Y, y, 3, lanes), three(Y, y + 1, 3, lanes), three(Y, y + 2, 3, lanes)
 
 
 @inline
-def _less_row_product(z0, z1, z2, X, x, y_block, lanes):
-    x0, x1, x2 = -load(X, x, lanes), -load(X, x + 1, lanes), -load(X, x + 2, lanes)
-    z0 = fma(x2, y_block[2], fma(x1, y_block[1], fma(x0, y_block[0], z0)))
-    z1 = fma(x2, y_block[5], fma(x1, y_block[4], fma(x0, y_block[3], z1)))
-    z2 = fma(x2, y_block[8], fma(x1, y_block[7], fma(x0, y_block[6], z2)))
-    return z0, z1, z2
+def _rows(Z, z, lanes):
+    return three(Z, z, 1, lanes), three(Z, z + 3, 1, lanes), three(Z, z + 6, 1, lanes)
 
 
 @inline
-def _block(X, x, lanes):
+def _keep_rows(Z, z, rows, lanes):
+    keep_three(Z, z, lanes, rows[0])
+    keep_three(Z, z + 3, lanes, rows[1])
+    keep_three(Z, z + 6, lanes, rows[2])
+
+
+@inline
+def _less_product(rows, X, x, columns, lanes):
+    """The rows of a block minus x yᵀ, with y given by its columns."""
     return (
-        *(load(X, x, lanes), load(X, x + 1, lanes), load(X, x + 2, lanes)),
-        *(load(X, x + 3, lanes), load(X, x + 4, lanes), load(X, x + 5, lanes)),
-        *(load(X, x + 6, lanes), load(X, x + 7, lanes), load(X, x + 8, lanes)),
+        _less_row(rows[0], X, x, columns, lanes),
+        _less_row(rows[1], X, x + 3, columns, lanes),
+        _less_row(rows[2], X, x + 6, columns, lanes),
     )
 
 
 @inline
-def _set_block(X, x, block, lanes):
-    store(X, x, lanes, block[0])
-    store(X, x + 1, lanes, block[1])
-    store(X, x + 2, lanes, block[2])
-    store(X, x + 3, lanes, block[3])
-    store(X, x + 4, lanes, block[4])
-    store(X, x + 5, lanes, block[5])
-    store(X, x + 6, lanes, block[6])
-    store(X, x + 7, lanes, block[7])
-    store(X, x + 8, lanes, block[8])
+def _less_row(row, X, x, columns, lanes):
+    row = less(row, load(X, x, lanes), columns[0])
+    row = less(row, load(X, x + 1, lanes), columns[1])
+    return less(row, load(X, x + 2, lanes), columns[2])
 
 
 @within
