@@ -38,14 +38,9 @@ Search = Generator[Push, Outcome, Any]
 
 def relax(step: Step, push: Push) -> Outcome:
     """The Outcome of the flow for a Push."""
-    return relax_all(step, [push])[0]
-
-
-def relax_all(step: Step, pushes: Sequence[Push]) -> list[Outcome]:
-    """The Outcome of the flow for each Push, in their order."""
-    ends: dict[int, Outcome] = {}
-    follow(step, [_one(push) for push in pushes], ends.__setitem__)
-    return [ends[k] for k in range(len(pushes))]
+    ends: list[Outcome] = []
+    follow(step, [_one(push)], lambda _, end: ends.append(end))
+    return ends[0]
 
 
 def _one(push: Push) -> Generator[Push, Outcome, Outcome]:

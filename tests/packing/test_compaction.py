@@ -8,9 +8,7 @@ from granforce.cell import Cell
 from granforce.forces.balance import stress_of
 from granforce.forces.build import ensemble
 from granforce.motion import contact_dynamics as dynamics
-from granforce.motion import flow_lanes
 from granforce.motion.rest import rest
-from granforce.numerics.lanes import ONE
 from granforce.packing import settling
 from granforce.packing.closing import _stretch, margin, strained
 from granforce.packing.compaction import (
@@ -72,16 +70,6 @@ def test_contacts_of_the_backbone_are_closed_and_press(mu):
     S = ensemble(packed(60, mu))
     assert np.abs(S.contacts.gap).max() < 1e-10
     assert S.original[:, 0].min() > 1e-6 * S.force_scale
-
-
-def test_the_test_of_rest_is_the_same_in_lanes(monkeypatch):
-    packing = pack(60, 0.3, 1)
-    in_lanes = rest(packing)
-    monkeypatch.setattr(flow_lanes, "lanes_for", lambda count: ONE)
-    alone = rest(packing)
-    assert alone.at_rest and alone.distance == in_lanes.distance
-    np.testing.assert_array_equal(alone.stayed, in_lanes.stayed)
-    np.testing.assert_array_equal(alone.forces, in_lanes.forces)
 
 
 @pytest.mark.parametrize("mu", [0.01, 0.1, 1.0, 10.0])
